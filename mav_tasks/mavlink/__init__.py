@@ -1,0 +1,1 @@
+"""MAVLink on the wire: bytes to messages and back. Pure; the only package that sees the dialect."""

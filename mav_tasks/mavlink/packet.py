@@ -1,0 +1,142 @@
+"""A header view over raw MAVLink bytes: split, re-number, strip a signature. Needs no dialect.
+
+Forwarding works on raw packets: an unknown id is passed on whole, and a packet with a bad CRC stays
+bad. Nothing here raises on bytes from outside. MAVLink guide, "Packet Serialization".
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+from mav_tasks.mavlink.address import Address
+
+MAGIC_V1 = 0xFE
+MAGIC_V2 = 0xFD
+SIGNED = 0x01  # the only incompat flag there is
+SIGNATURE_LENGTH = 13
+MAX_PACKET = 280  # 10 header + 255 payload + 2 CRC + 13 signature
+
+_HEADER_V1 = 6
+_HEADER_V2 = 10
+_CRC = 2
+
+
+class Packet(NamedTuple):
+    """One packet as it came in, with the header fields that routing needs."""
+
+    raw: bytes
+    seq: int
+    system_id: int
+    component_id: int
+    message_id: int
+
+    @property
+    def source(self) -> Address:
+        """The sender's address."""
+        return Address(self.system_id, self.component_id)
+
+    @property
+    def is_v2(self) -> bool:
+        """Whether the packet is MAVLink 2 (else MAVLink 1)."""
+        return self.raw[0] == MAGIC_V2
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether a MAVLink 2 signature is attached."""
+        return self.is_v2 and bool(self.raw[2] & SIGNED)
+
+    @property
+    def payload(self) -> bytes:
+        """The payload as sent: MAVLink 2 cuts trailing zeros off."""
+        start = _HEADER_V2 if self.is_v2 else _HEADER_V1
+        return self.raw[start : start + self.raw[1]]
+
+
+def split_datagram(data: bytes) -> list[Packet]:
+    """Give the whole packets of one datagram, in order.
+
+    Each datagram is parsed afresh, so that a truncated one cannot swallow the next. Bytes between
+    packets are skipped; the caller counts them as ``len(data) - sum(len(p.raw))``.
+    """
+    packets: list[Packet] = []
+    start, end = 0, len(data)
+    while end - start >= _HEADER_V1 + _CRC:
+        magic = data[start]
+        if magic == MAGIC_V2 and end - start >= _HEADER_V2 + _CRC:
+            stop = start + _HEADER_V2 + data[start + 1] + _CRC
+            if data[start + 2] & SIGNED:
+                stop += SIGNATURE_LENGTH
+            if stop <= end and data[start + 2] & ~SIGNED == 0:
+                packets.append(
+                    Packet(
+                        data[start:stop],
+                        data[start + 4],
+                        data[start + 5],
+                        data[start + 6],
+                        data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16,
+                    )
+                )
+                start = stop
+                continue
+        elif magic == MAGIC_V1:
+            stop = start + _HEADER_V1 + data[start + 1] + _CRC
+            if stop <= end:
+                packets.append(
+                    Packet(
+                        data[start:stop],
+                        data[start + 2],
+                        data[start + 3],
+                        data[start + 4],
+                        data[start + 5],
+                    )
+                )
+                start = stop
+                continue
+        start += 1
+    return packets
+
+
+def with_seq(packet: Packet, seq: int) -> bytes:
+    """Give the packet's bytes under another sequence number, unsigned.
+
+    A signature covers the sequence number, so it is taken off; the link that sends puts its own on.
+    The CRC is corrected by its linearity and never verified: no CRC_EXTRA is needed, unknown ids
+    work, and what was corrupt stays corrupt.
+    """
+    raw = packet.raw
+    if raw[0] == MAGIC_V2:
+        if raw[2] & SIGNED:
+            raw = _patched(raw[:-SIGNATURE_LENGTH], 2, raw[2] & ~SIGNED)
+        return raw if raw[4] == seq else _patched(raw, 4, seq)
+    return raw if raw[2] == seq else _patched(raw, 2, seq)
+
+
+def _patched(raw: bytes, index: int, value: int) -> bytes:
+    """Set one byte and carry the change into the CRC.
+
+    crc(a ^ b) == crc(a) ^ crc0(b), with crc0 the CRC from an initial value of 0; ``b`` is the
+    changed byte and as many zeros as follow it up to and with CRC_EXTRA (1 in place of 2 CRC
+    bytes: ``len(raw) - index - 2``).
+    """
+    crc = _tail_crcs(len(raw) - index - _CRC)[raw[index] ^ value]
+    patched = bytearray(raw)
+    patched[index] = value
+    patched[-2] ^= crc & 0xFF
+    patched[-1] ^= crc >> 8
+    return bytes(patched)
+
+
+@cache  # at most one table for each packet length there is
+def _tail_crcs(zeros: int) -> tuple[int, ...]:
+    """CRC (initial value 0) of each byte value followed by ``zeros`` zero bytes.
+
+    Built from the eight single bits, again by linearity, so that the first packet of a length
+    costs a millisecond at most.
+    """
+    table = [0] * 256
+    for bit in range(8):
+        crc = 1 << bit
+        for _ in range(8 * (zeros + 1)):
+            crc = crc >> 1 ^ (0x8408 if crc & 1 else 0)
+        for lower in range(1 << bit):
+            table[1 << bit | lower] = table[lower] ^ crc
+    return tuple(table)

@@ -1,0 +1,31 @@
+"""Sequence numbers of packets that pass through: real loss stays visible, ours causes none.
+
+Outgoing seq = incoming + injected − withheld (mod 256), for each source and receiver.
+"""
+
+from mav_tasks.mavlink.address import Address
+
+
+class SequenceKeeper:
+    """The sequence numbers towards one receiver, for each source."""
+
+    def __init__(self) -> None:
+        self._offset: dict[Address, int] = {}
+        self._next: dict[Address, int] = {}
+
+    def forwarded(self, source: Address, seq: int) -> int:
+        """Give the number under which a packet numbered ``seq`` is passed on."""
+        number = (seq + self._offset.get(source, 0)) & 0xFF
+        self._next[source] = (number + 1) & 0xFF
+        return number
+
+    def withheld(self, source: Address) -> None:
+        """Note that a packet of the source is not passed on."""
+        self._offset[source] = (self._offset.get(source, 0) - 1) & 0xFF
+
+    def injected(self, source: Address) -> int:
+        """Give the number of a packet of our own, put into the source's stream."""
+        number = self._next.get(source, 0)
+        self._next[source] = (number + 1) & 0xFF
+        self._offset[source] = (self._offset.get(source, 0) + 1) & 0xFF
+        return number

@@ -1,0 +1,216 @@
+"""Create or update `.venv`, so that a run that was interrupted anywhere is repaired by the next.
+
+Called by `tools/setup` with the interpreter that a new environment shall have. Standard library
+only: nothing is installed yet. Two runs at once take turns. An environment that was not made here
+is used as it is and never removed.
+"""
+
+import argparse
+import fcntl
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VENV = ROOT / ".venv"
+VENV_PYTHON = VENV / "bin" / "python"
+LOCK = ROOT / "tools" / "lock" / "requirements.txt"
+DIALECT = ROOT / "mav_tasks" / "mavlink" / "_dialect.py"
+#: What the environment was made from. Written last; "unfinished" while a new one is being made.
+STAMP = VENV / ".mav-tasks-setup"
+UNFINISHED = "unfinished\n"
+#: A change of any of these means there is something to do.
+INPUTS = (
+    "pyproject.toml",
+    "tools/lock/requirements.txt",
+    "tools/setup_venv.py",
+    "tools/hatch_build.py",
+    "tools/build_dialect.py",
+    "dialects/mav_tasks.xml",
+    "dialects/base_additions.xml",
+)
+
+
+class SetupError(Exception):
+    """The environment could not be made; the message says why."""
+
+
+def is_current() -> bool:
+    """Asked with the environment's own interpreter: is there nothing to do?"""
+    return DIALECT.is_file() and _read_stamp() == _stamp(platform.python_version())
+
+
+def set_up() -> None:
+    with _one_at_a_time():
+        version = _usable_version()
+        if version and _read_stamp() == _stamp(version) and DIALECT.is_file():
+            return  # another run has just done it
+        if version is None:
+            _create()
+        elif _read_stamp():
+            STAMP.write_text(UNFINISHED, encoding="utf-8")
+        _run(
+            "2/3 installing the pinned packages (minutes, the first time)",
+            _pip_install("-r", str(LOCK)),
+        )
+        _run(
+            "3/3 installing mav-tasks itself, editable, with its MAVLink dialect",
+            _pip_install("--no-deps", "--no-build-isolation", "--editable", str(ROOT)),
+        )
+        # pip does not compile what is editable; the dialect is large enough to notice.
+        _call([str(VENV_PYTHON), "-m", "compileall", "-q", str(DIALECT)])
+        version = _version_of(VENV_PYTHON) or ""
+        STAMP.write_text(_stamp(version), encoding="utf-8")
+        _say(f"ready: {VENV.name} has Python {version}{_note_on_pybullet()}")
+
+
+def _usable_version() -> str | None:
+    """The Python version of an environment that can be used or updated; None: make a new one."""
+    stamp = _read_stamp()
+    if stamp == UNFINISHED or not VENV.exists() or not any(VENV.iterdir()):
+        return None
+    version = _version_of(VENV_PYTHON)
+    if stamp is None:
+        if version is None or tuple(map(int, version.split(".")[:2])) < (3, 11):
+            raise SetupError(
+                f"{VENV} was not made by tools/setup, and has no Python 3.11 or later with pip: "
+                "remove it and run this again"
+            )
+        return version
+    # The folder was moved or copied, or Python replaced: scripts and links point elsewhere.
+    return version if version and stamp.splitlines()[0] == _origin(version) else None
+
+
+def _create() -> None:
+    _say(f"1/3 creating {VENV.name} with Python {platform.python_version()}")
+    _remove_old()
+    VENV.mkdir()
+    STAMP.write_text(UNFINISHED, encoding="utf-8")
+    _call([sys.executable, "-m", "venv", str(VENV)])
+
+
+def _remove_old() -> None:
+    # Renamed first: an interrupted removal must not leave half an environment under this name.
+    if VENV.exists():
+        VENV.rename(ROOT / f".venv.old-{os.getpid()}")
+    for old in ROOT.glob(".venv.old-*"):
+        shutil.rmtree(old)
+
+
+def _stamp(version: str) -> str:
+    digest = hashlib.sha256()
+    for name in INPUTS:
+        digest.update((ROOT / name).read_bytes())
+    return f"{_origin(version)}\n{digest.hexdigest()}\n"
+
+
+def _origin(version: str) -> str:
+    return f"Python {version} in {ROOT}"
+
+
+def _read_stamp() -> str | None:
+    try:
+        return STAMP.read_text(encoding="utf-8")
+    except OSError:
+        return None
+
+
+def _version_of(python: Path) -> str | None:
+    command = [str(python), "-c", "import platform, pip; print(platform.python_version())"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout.strip()
+
+
+def _pip_install(*arguments: str) -> list[str]:
+    quiet = ("--no-input", "--disable-pip-version-check", "--progress-bar=off")
+    return [str(VENV_PYTHON), "-m", "pip", "install", *quiet, *arguments]
+
+
+def _run(step: str, command: list[str]) -> None:
+    """Run pip with its talk reduced to a counter on a terminal, and shown only if it fails."""
+    begin = time.monotonic()
+    _say(step)
+    said: list[str] = []
+    packages = 0
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            said.append(line)
+            packages += line.startswith(("Collecting", "Requirement already"))
+            if sys.stdout.isatty():
+                doing = "installing them" if line.startswith("Installing") else "found"
+                print(f"\r\033[K    {packages} packages {doing}", end="", flush=True)
+    if sys.stdout.isatty():
+        print("\r\033[K", end="")
+    if process.returncode:
+        raise SetupError(f"{' '.join(command)} failed:\n{''.join(said[-30:])}")
+    _say(f"    done in {time.monotonic() - begin:.0f} s")
+
+
+def _call(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SetupError(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+
+
+def _note_on_pybullet() -> str:
+    done = subprocess.run(
+        [str(VENV_PYTHON), "-c", "import pybullet"], capture_output=True, check=False
+    )
+    if done.returncode == 0:
+        return " and pybullet"
+    return (
+        ", without pybullet: the simulated rover has its kinematic body. pybullet has wheels for "
+        "Python 3.11 on Linux x86-64; to get it there, install python3.11 or uv, remove .venv and "
+        "run this again"
+    )
+
+
+@contextmanager
+def _one_at_a_time() -> Iterator[None]:
+    # A lock on a file that is always there leaves nothing behind, and ends with the process.
+    with LOCK.open(encoding="utf-8") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            _say("another set-up is running; waiting for it")
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _say(text: str) -> None:
+    print(f"setup: {text}", flush=True)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Create or update .venv (see tools/setup).")
+    parser.add_argument(
+        "--is-current", action="store_true", help="do nothing; 0 if there is nothing to do"
+    )
+    if parser.parse_args().is_current:
+        return 0 if is_current() else 1
+    try:
+        set_up()
+    except SetupError as error:
+        print(f"setup: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("\nsetup: interrupted; the next run goes on from here", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
