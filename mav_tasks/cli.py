@@ -1,0 +1,84 @@
+"""The command line. Nothing heavy is imported before a command needs it."""
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from mav_tasks.errors import UsageError
+
+EXIT_USAGE = 2
+
+app = typer.Typer(
+    help="A MAVLink task server: commands become queued tasks that a rover drives.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,  # plain help: rich alone would cost a third of the time to show it
+    pretty_exceptions_enable=False,
+)
+
+DEFAULT_CLIENTS = ["udpin:127.0.0.1:14560"]
+DEFAULT_PUSH = ["127.0.0.1:14550", "127.0.0.1:14540"]
+DEFAULT_VEHICLES = ["udpout:127.0.0.1:14580"]
+
+
+@app.command()
+def serve(
+    client: Annotated[
+        list[str], typer.Option(help="Link for clients; may be given several times.")
+    ] = DEFAULT_CLIENTS,
+    push: Annotated[
+        list[str],
+        typer.Option(help="Address at which a client listens: QGroundControl, MAVSDK scripts."),
+    ] = DEFAULT_PUSH,
+    no_push: Annotated[bool, typer.Option("--no-push", help="Push to nobody.")] = False,
+    vehicle: Annotated[
+        list[str], typer.Option(help="Link to vehicles; may be given several times.")
+    ] = DEFAULT_VEHICLES,
+    arming: Annotated[
+        str,
+        typer.Option(help="Who arms: server, operator, or auto (server on loopback links only)."),
+    ] = "auto",
+    insecure: Annotated[
+        bool, typer.Option("--insecure", help="Allow links that other machines can reach.")
+    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Log in more detail.")] = False,
+) -> None:
+    """Run the task server: clients on UDP 14560, the rover on 14580."""
+    from mav_tasks.serve import serve as run  # noqa: PLC0415
+
+    raise typer.Exit(
+        run(
+            clients=client,
+            push=[] if no_push else push,
+            vehicles=vehicle,
+            arming=arming,
+            insecure=insecure,
+            verbose=verbose,
+        )
+    )
+
+
+@app.command(
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    add_help_option=False,
+)
+def sim(context: typer.Context) -> None:
+    """Run simulated rovers on UDP 14580; options are rover_sim's (--help shows them)."""
+    sys.stdout.flush()
+    # The simulated rover is a program of its own: nothing of the server is in its process.
+    os.execv(sys.executable, [sys.executable, "-m", "rover_sim", *context.args])
+
+
+def main() -> None:
+    """Entry point: one clear line for what the operator can mend, exit code 2."""
+    try:
+        app()
+    except UsageError as error:
+        sys.stderr.write(f"mav-tasks: {error}\n")
+        sys.exit(EXIT_USAGE)
+
+
+if __name__ == "__main__":
+    main()

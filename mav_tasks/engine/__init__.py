@@ -1,0 +1,1 @@
+"""The whole server as one pure object: services and tasks composed."""

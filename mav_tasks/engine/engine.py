@@ -1,0 +1,222 @@
+"""The whole server as one pure object with five methods. Composition only: decisions are elsewhere.
+
+``handle`` takes what came in, ``handle_deadline`` what the time asks for; ``take_events`` gives the
+journal what happened and ``take_packets`` the links what to send. Time comes in as ``now``,
+monotonic seconds, never going back.
+"""
+
+from typing import assert_never
+
+from mav_tasks.engine.commands import Commands
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.gcs_side import GcsSide, Received
+from mav_tasks.engine.inputs import (
+    Committed,
+    Input,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    SettingsChanged,
+    Shutdown,
+    StoreFailed,
+    WallClock,
+)
+from mav_tasks.engine.motion_gate import may_pass
+from mav_tasks.engine.publisher import Publisher
+from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
+from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.codec import Packer, target_of
+from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.services.command_receiver import command_of
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import Event, ServerStopped
+
+#: the server decides what vehicles send, and how often each client gets it
+CLAIMED_STREAMS = frozenset({m.RequestDataStream.id})
+
+
+class Engine:
+    """The task server without its sockets, its clock and its disk."""
+
+    def __init__(self, settings: Settings, *, now: float) -> None:
+        self._settings = settings
+        self._packets: list[Outgoing] = []
+        self._journal: list[Event] = []
+        self._book = TaskBook()
+        packer = Packer()
+        self._gcs = GcsSide(queue=self._packets, packer=packer, settings=settings, now=now)
+        self._vehicles = VehicleSide(
+            queue=self._packets, packer=packer, book=self._book, settings=settings
+        )
+        self._commands = Commands(self._gcs, self._vehicles, self._book, settings)
+        self._publisher = Publisher(self._gcs, self._vehicles, self._book, self._commands)
+        self._stop_by: float | None = None
+        self._stopped = False
+        self._wall_offset = 0.0
+        #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``:
+        #: what the runner sends when the engine itself has failed
+        self.last_words: tuple[Outgoing, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Engine({list(self._vehicles)}, {list(self._gcs)}, {self._book!r})"
+
+    def handle(self, item: Input, *, now: float) -> None:
+        """Take one input in."""
+        match item:
+            case Packets():
+                self._receive(item, now=now)
+            case LinkChanged(side=LinkSide.CLIENTS):
+                self._gcs.change_link(item, now=now)
+            case LinkChanged():
+                self._vehicles.change_link(item, now=now)
+            case Committed(through=through):
+                self._book.durable = through
+                self._commands.committed(through)
+                self._step_vehicles(now=now)
+            case StoreFailed():
+                self._commands.store_failed()
+            case SettingsChanged(settings=settings):
+                self._apply(settings)
+            case WallClock(offset=offset):
+                self._wall_offset = offset
+            case Shutdown():
+                self._shut_down(now=now)
+            case _:
+                assert_never(item)
+        self._settle(now=now)
+
+    def next_deadline(self) -> float | None:
+        """Give when ``handle_deadline`` has something to do; None: never, as things are."""
+        deadlines = [
+            self._publisher.next_deadline(),
+            self._vehicles.next_deadline(),
+            self._commands.next_deadline(),
+            None if self._stopped else self._stop_by,
+        ]
+        return min((d for d in deadlines if d is not None), default=None)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Do what is due by now; may come late, or for nothing."""
+        self._vehicles.handle_deadline(now=now)
+        self._commands.handle_deadline(now=now)
+        self._settle(now=now)
+        self._publisher.handle_deadline(now=now)
+
+    def take_events(self) -> list[Event]:
+        """Give what happened since the last call, to be made durable in this order.
+
+        They are numbered from 1 over the life of the engine; ``Committed`` counts them.
+        """
+        events, self._journal = self._journal, []
+        return events
+
+    def take_packets(self) -> list[Outgoing]:
+        """Give the datagrams to send, in order."""
+        self.last_words = tuple(
+            words
+            for vehicle in self._vehicles
+            if vehicle.control.is_engaged
+            for words in vehicle.last_words
+        )
+        packets = self._packets.copy()
+        self._packets.clear()  # the list itself is shared with every outlet
+        return packets
+
+    def snapshot(self, *, now: float) -> Snapshot:
+        """Give an immutable view of everything."""
+        return Snapshot(
+            vehicles=tuple(
+                VehicleSnapshot(
+                    system_id=vehicle.system_id,
+                    persona=vehicle.persona.name,
+                    armed=vehicle.armed,
+                    heard=vehicle.is_heard(now=now),
+                    control=vehicle.control.phase.name,
+                    paused=vehicle.tasks.paused,
+                    begun=vehicle.tasks.begun,
+                    waiting=tuple(vehicle.tasks.waiting),
+                )
+                for vehicle in self._vehicles
+            ),
+            clients=tuple(repr(client) for client in self._gcs),
+            tasks=self._book.all(),
+            decoded=f"vehicles {self._vehicles.counts}, clients {self._gcs.counts}",
+        )
+
+    def _receive(self, item: Packets, *, now: float) -> None:
+        from_vehicles = self._vehicles.owns(item.link)
+        if not from_vehicles and not self._gcs.owns(item.link):
+            return
+        for peer, data in item.datagrams:
+            for packet in split_datagram(data):
+                if not from_vehicles:
+                    received = self._gcs.receive(item.link, peer, packet, now=now)
+                    if received is not None:
+                        self._receive_from_client(received, now=now)
+                    continue
+                vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
+                if vehicle is not None:
+                    if packet.message_id == m.CommandAck.id:
+                        self._publisher.withhold(packet)
+                    else:
+                        self._gcs.forward(packet, now=now)
+
+    def _receive_from_client(self, received: Received, *, now: float) -> None:
+        client, packet, message = received.client, received.packet, received.message
+        self._publisher.welcome(client)
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            self._commands.receive(client, packet, command_of(message), now=now)
+        elif isinstance(message, m.SetMode):
+            self._commands.set_mode(client, packet, message, now=now)
+        elif packet.message_id not in CLAIMED_STREAMS:
+            self._forward(client, received, now=now)
+
+    def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
+        """Pass a client's packet to the vehicles that it is for."""
+        target = 0 if received.message is None else target_of(received.message).system_id
+        for vehicle in self._vehicles:
+            if target in (0, vehicle.system_id) and may_pass(
+                vehicle, client.key, received.message, now=now
+            ):
+                vehicle.forward(received.packet)
+
+    def _settle(self, *, now: float) -> None:
+        """Bring vehicles' answers to clients, and what happened to clients and the journal."""
+        for vehicle in self._vehicles:
+            for answered in vehicle.take_answers():
+                self._commands.deliver(vehicle, answered, now=now)
+        if self._stop_by is not None:
+            self._note_stopped(now=now)
+        events = self._book.take_events()
+        if events:
+            self._publisher.publish(events, now=now)
+            self._journal += events
+        self._publisher.send_statuses(now=now)
+
+    def _step_vehicles(self, *, now: float) -> None:
+        """Let vehicles that wait for nothing but durability begin."""
+        for vehicle in self._vehicles:
+            if vehicle.tasks.begun is None and not vehicle.tasks.is_idle:
+                vehicle.step(now=now)
+
+    def _apply(self, settings: Settings) -> None:
+        self._settings = settings
+        self._gcs.apply(settings)
+        self._vehicles.apply(settings)
+        self._commands.apply(settings)
+
+    def _shut_down(self, *, now: float) -> None:
+        self._commands.close()
+        self._stop_by = now + self._settings.watch.shutdown
+        for vehicle in self._vehicles:
+            vehicle.shut_down(now=now)
+
+    def _note_stopped(self, *, now: float) -> None:
+        assert self._stop_by is not None
+        stands = not any(vehicle.control.is_engaged for vehicle in self._vehicles)
+        if not self._stopped and (stands or now >= self._stop_by):
+            self._stopped = True
+            self._book.record(ServerStopped(now))

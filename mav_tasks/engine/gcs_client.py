@@ -1,0 +1,113 @@
+"""One client: an endpoint on a client link. What it has been shown, and what it asked for."""
+
+from collections import OrderedDict
+
+from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import statustext
+from mav_tasks.services.command_receiver import CommandReceiver, Pending
+from mav_tasks.services.message_interval import Thinner
+from mav_tasks.services.statustext import RateLimit
+from mav_tasks.services.task_status import TaskStatusSender
+from mav_tasks.settings import Clients
+from mav_tasks.tasks.task import Submitter, Task
+
+MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
+
+Nonces = dict[Address, OrderedDict[int, Pending]]
+
+
+class GcsClient:
+    """One endpoint that listens, and perhaps commands."""
+
+    def __init__(
+        self, outlet: Outlet, *, settings: Clients, nonces: Nonces, is_configured: bool, now: float
+    ) -> None:
+        self.outlet = outlet
+        self.heard_at = now
+        #: spoken to before it was heard: gets heartbeats until it answers
+        self.is_configured = is_configured
+        self.is_heard = False
+        self.address = Address(0, 0)
+        #: has used our dialect: gets TASK_STATUS
+        self.uses_dialect = False
+        self.thinner = Thinner(default_interval=settings.stream_interval)
+        self.statuses = TaskStatusSender(rate=settings.status_rate, now=now)
+        self._texts = RateLimit(rate=settings.text_rate, burst=statustext.BURST, now=now)
+        self._text_id = 0
+        self._introduced: set[int] = set()
+        self._nonces = nonces
+        self._receivers: dict[Address, CommandReceiver] = {}
+
+    def __repr__(self) -> str:
+        return f"GcsClient({self.address} at {self.key})"
+
+    @property
+    def key(self) -> tuple[str, Peer]:
+        """What tells clients apart: link and endpoint."""
+        return (self.outlet.link, self.outlet.peer)
+
+    @property
+    def endpoint(self) -> str:
+        """The endpoint in words."""
+        peer = self.outlet.peer
+        return ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
+
+    def submitter(self, source: Address) -> Submitter:
+        """Give who submits when a packet of ``source`` comes from here."""
+        return Submitter(self.outlet.link, self.endpoint, *source)
+
+    def submitted(self, task: Task) -> bool:
+        """Whether a task was submitted from this endpoint."""
+        submitter = task.submitter
+        return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
+
+    def receiver(self, source: Address) -> CommandReceiver:
+        """Give the memory of the commands of one address at this endpoint."""
+        receiver = self._receivers.get(source)
+        if receiver is None:
+            if len(self._receivers) >= MAX_ADDRESSES:
+                del self._receivers[next(iter(self._receivers))]
+            nonces = self._nonces.setdefault(source, OrderedDict())
+            receiver = self._receivers[source] = CommandReceiver(nonces)
+        return receiver
+
+    def knows(self, system_id: int) -> bool:
+        """Whether the client has seen a heartbeat of this vehicle's autopilot."""
+        return system_id in self._introduced
+
+    def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
+        """Show a vehicle by its latest heartbeat, before anything else of its system.
+
+        ``last_seq`` is the number of the autopilot's last packet: the one after it follows on.
+        """
+        self._introduced.add(heartbeat.system_id)
+        self.outlet.forward(heartbeat._replace(seq=last_seq))
+
+    def forward(self, packet: Packet, *, now: float) -> None:
+        """Pass a vehicle's packet on, unless it is one too many of its stream."""
+        system_id = packet.system_id
+        if system_id not in self._introduced:
+            if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
+                return
+            self._introduced.add(system_id)
+        if not self.is_heard and packet.message_id != m.Heartbeat.id:
+            self.outlet.withhold(packet.source)
+        elif self.thinner.passes(system_id, packet.component_id, packet.message_id, now=now):
+            self.outlet.forward(packet)
+        else:
+            self.outlet.withhold(packet.source)
+
+    def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
+        """Send a STATUSTEXT of a vehicle's task server, unless there were too many."""
+        if not self.is_heard or not self.knows(source.system_id):
+            return
+        if severity > MavSeverity.WARNING and not self._texts.take(now=now):
+            return
+        self._text_id = self._text_id % 0xFFFF + 1
+        for chunk in statustext.chunks(severity, text, text_id=self._text_id):
+            self.outlet.send(chunk, source)

@@ -1,0 +1,136 @@
+"""All clients and the links to them: who is there, what they are shown and told.
+
+Any bytes may come in here; only a packet with a good CRC makes its sender a client. What a client
+wants is given back as a value; the engine sees to it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mav_tasks.engine.gcs_client import GcsClient, Nonces
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Decoder, Packer
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.heartbeat import HeartbeatSender
+from mav_tasks.settings import Settings
+
+MAX_NONCE_ADDRESSES = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A packet of a client. ``message`` is None when its id is not in the dialect."""
+
+    client: GcsClient
+    packet: Packet
+    message: m.Message | None
+
+
+class GcsSide:
+    """The clients by link and endpoint."""
+
+    def __init__(
+        self, *, queue: list[Outgoing], packer: Packer, settings: Settings, now: float
+    ) -> None:
+        self._queue = queue
+        self._packer = packer
+        self._settings = settings
+        self._decoder = Decoder()
+        self._links: set[str] = set()
+        self._nonces: Nonces = {}
+        self._clients: dict[tuple[str, Peer], GcsClient] = {}
+        self.heartbeat = HeartbeatSender(now=now)
+
+    def __iter__(self) -> Iterator[GcsClient]:
+        return iter(self._clients.values())
+
+    @property
+    def counts(self) -> str:
+        """One line on what could be decoded."""
+        return str(self._decoder.counts)
+
+    def change_link(self, change: LinkChanged, *, now: float) -> None:
+        """Take a link into use, or out of it."""
+        if not change.up:
+            self._links.discard(change.link)
+            for key in [key for key in self._clients if key[0] == change.link]:
+                del self._clients[key]
+            return
+        self._links.add(change.link)
+        for peer in change.peers:
+            self._add(change.link, peer, is_configured=True, now=now)
+
+    def owns(self, link: str) -> bool:
+        """Whether a link of this name is a client link."""
+        return link in self._links
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings, for clients to come."""
+        self._settings = settings
+
+    def client(self, key: tuple[str, Peer]) -> GcsClient | None:
+        """Give a client by its key, if it is still there."""
+        return self._clients.get(key)
+
+    def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Received | None:
+        """Take a packet in; None if it means nothing."""
+        message = None
+        if packet.message_id in m.ALL:
+            message = self._decoder.decode(packet)
+            if message is None:
+                return None
+        client = self._clients.get((link, peer))
+        if client is None:
+            if message is None:  # unverified bytes make nobody a client
+                return None
+            client = self._add(link, peer, is_configured=False, now=now)
+        client.heard_at = now
+        client.is_heard = True
+        client.address = packet.source
+        return Received(client, packet, message)
+
+    def forward(self, packet: Packet, *, now: float) -> None:
+        """Show a vehicle's packet to every client that is to have it."""
+        for client in self._clients.values():
+            client.forward(packet, now=now)
+
+    def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
+        """Send a STATUSTEXT to every client."""
+        for client in self._clients.values():
+            client.tell(text, severity, source, now=now)
+
+    def forget_silent(self, *, now: float) -> None:
+        """Drop clients that have been silent for long; configured ones become unheard again."""
+        limit = self._settings.clients.forget_after
+        for key, client in list(self._clients.items()):
+            if now - client.heard_at > limit:
+                if client.is_configured:
+                    client.is_heard = False
+                else:
+                    del self._clients[key]
+
+    def _add(self, link: str, peer: Peer, *, is_configured: bool, now: float) -> GcsClient:
+        self._make_room()
+        client = GcsClient(
+            Outlet(link, peer, self._queue, self._packer),
+            settings=self._settings.clients,
+            nonces=self._nonces,
+            is_configured=is_configured,
+            now=now,
+        )
+        self._clients[link, peer] = client
+        return client
+
+    def _make_room(self) -> None:
+        """Bound what unknown endpoints can make us remember."""
+        if len(self._clients) >= self._settings.clients.max_clients:
+            others = [c for c in self._clients.values() if not c.is_configured]
+            if others:
+                longest_silent = min(others, key=lambda client: client.heard_at)
+                del self._clients[longest_silent.key]
+        while len(self._nonces) > MAX_NONCE_ADDRESSES:
+            del self._nonces[next(iter(self._nonces))]

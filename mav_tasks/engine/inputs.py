@@ -1,0 +1,84 @@
+"""What can come into the engine, and what goes out of it: values, nothing else."""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import NamedTuple
+
+from mav_tasks.settings import Settings
+
+Peer = Hashable  # an endpoint on a link; what it is only the link knows
+
+
+class LinkSide(Enum):
+    """Who is on the other end of a link."""
+
+    CLIENTS = auto()
+    VEHICLES = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Packets:
+    """Datagrams of one link, in the order in which they came."""
+
+    link: str
+    datagrams: Sequence[tuple[Peer, bytes]]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkChanged:
+    """A link came up or went down.
+
+    ``peers`` are endpoints known beforehand: spoken to before they have been heard.
+    ``is_local``: nobody beyond this machine can be on it.
+    """
+
+    link: str
+    side: LinkSide
+    up: bool
+    peers: tuple[Peer, ...] = ()
+    is_local: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Committed:
+    """All events up to and with this number are durable."""
+
+    through: int
+
+
+@dataclass(frozen=True, slots=True)
+class StoreFailed:
+    """The store could not make events durable; it goes on trying."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsChanged:
+    """New settings are in force."""
+
+    settings: Settings
+
+
+@dataclass(frozen=True, slots=True)
+class WallClock:
+    """UTC = monotonic time + ``offset`` seconds; sent at start and at each step of the clock."""
+
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
+class Shutdown:
+    """The server is to end: stop what it drives."""
+
+
+Input = Packets | LinkChanged | Committed | StoreFailed | SettingsChanged | WallClock | Shutdown
+
+
+class Outgoing(NamedTuple):
+    """One datagram to send."""
+
+    link: str
+    peer: Peer
+    data: bytes

@@ -1,0 +1,47 @@
+"""Which of a client's messages may move a vehicle, and when.
+
+A client that streams setpoints must not drive the instant a task ends, and nobody but a person at
+the sticks moves a vehicle that a task is driving.
+"""
+
+from collections.abc import Hashable
+
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.mavlink import messages as m
+
+#: drive the vehicle: pass only for a client that has control of it
+MOTION = (
+    m.SetPositionTargetLocalNed,
+    m.SetPositionTargetGlobalInt,
+    m.SetAttitudeTarget,
+    m.SetActuatorControlTarget,
+    m.FollowTarget,
+    m.MissionItem,  # with current = 2 it is ArduPilot's "go to"
+)
+GO_TO = (2, 3)  # MISSION_ITEM.current: go there now, at once or to this altitude
+STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
+RC_CENTRE = 1500
+RC_IGNORED = (0, 65535)
+
+
+def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, now: float) -> bool:
+    """Whether a client's message is passed on to the vehicle."""
+    if isinstance(message, m.MissionItem) and message.current not in GO_TO:
+        return True  # part of an upload
+    if isinstance(message, MOTION):
+        return vehicle.may_move(client, now=now)
+    if isinstance(message, m.ManualControl | m.RcChannelsOverride):
+        if vehicle.tasks.is_stopped:
+            return False
+        if _off_centre(message):
+            vehicle.sticks_moved(now=now)
+    return True
+
+
+def _off_centre(message: m.ManualControl | m.RcChannelsOverride) -> bool:
+    """Whether a person moves the sticks, rather than resting at them."""
+    if isinstance(message, m.ManualControl):
+        sticks = (message.x, message.y, message.r)
+        return any(abs(s) > STICKS_CENTRED for s in sticks if s != 0x7FFF)
+    channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
+    return any(abs(c - RC_CENTRE) > STICKS_CENTRED for c in channels if c not in RC_IGNORED)

@@ -1,0 +1,91 @@
+"""A vehicle's own position, heading and standstill, from LOCAL_POSITION_NED and ATTITUDE."""
+
+from math import cos, hypot, isfinite, sin
+
+from mav_tasks.mavlink.messages import Attitude, LocalPositionNed
+from mav_tasks.settings import Watch
+from mav_tasks.tasks.guidance import Motion
+from mav_tasks.tasks.task import Pose
+
+REBOOT = 1000  # ms that a vehicle's clock must go back to mean a restart, not reordering
+
+
+class MotionMonitor:
+    """What one vehicle measures of its motion."""
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._position: LocalPositionNed | None = None
+        self._position_at = 0.0
+        self._attitude: Attitude | None = None
+        self._attitude_at = 0.0
+        self._moved_at: float | None = None
+        self._last_boot_ms: dict[int, int] = {}
+        self.rebooted = False
+
+    def receive(self, message: Attitude | LocalPositionNed, *, now: float) -> None:
+        """Take a message in; one that is not finite, or older than the last, is dropped."""
+        if not _is_finite(message) or not self._is_newer(message):
+            return
+        if isinstance(message, LocalPositionNed):
+            self._position, self._position_at = message, now
+        else:
+            self._attitude, self._attitude_at = message, now
+        if self._moved_at is None or not self._is_slow():
+            self._moved_at = now
+
+    def latest(self) -> Motion | None:
+        """Give the last measured motion, or None before both messages have come."""
+        position, attitude = self._position, self._attitude
+        if position is None or attitude is None:
+            return None
+        north, east = cos(attitude.yaw), sin(attitude.yaw)
+        return Motion(
+            pose=Pose(position.x, position.y, attitude.yaw),
+            forward=position.vx * north + position.vy * east,
+            sideways=position.vy * north - position.vx * east,
+            yaw_rate=attitude.yawspeed,
+            at=min(self._position_at, self._attitude_at),
+        )
+
+    def is_still(self, *, now: float) -> bool:
+        """Whether fresh data say that the vehicle has stood for a while."""
+        motion = self.latest()
+        return (
+            motion is not None
+            and now - motion.at <= self._watch.motion_fresh
+            and self._moved_at is not None
+            and now - self._moved_at >= self._watch.still_time
+        )
+
+    def forget(self) -> None:
+        """Start afresh, as after a restart of the vehicle."""
+        self._position = self._attitude = None
+        self._moved_at = None
+        self._last_boot_ms.clear()
+        self.rebooted = False
+
+    def _is_newer(self, message: Attitude | LocalPositionNed) -> bool:
+        last = self._last_boot_ms.get(message.id)
+        if last is not None and message.time_boot_ms < last:
+            if last - message.time_boot_ms < REBOOT:
+                return False
+            self.rebooted = True
+        self._last_boot_ms[message.id] = message.time_boot_ms
+        return True
+
+    def _is_slow(self) -> bool:
+        position, attitude = self._position, self._attitude
+        watch = self._watch
+        return (
+            position is not None
+            and attitude is not None
+            and hypot(position.vx, position.vy) < watch.still_speed
+            and abs(attitude.yawspeed) < watch.still_turn_rate
+        )
+
+
+def _is_finite(message: Attitude | LocalPositionNed) -> bool:
+    if isinstance(message, LocalPositionNed):
+        return all(map(isfinite, (message.x, message.y, message.vx, message.vy)))
+    return isfinite(message.yaw) and isfinite(message.yawspeed)

@@ -1,0 +1,102 @@
+"""Tells clients what happened, and keeps them supplied: heartbeats, statuses, introductions."""
+
+from mav_tasks.engine import translate
+from mav_tasks.engine.commands import Commands
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.mavlink.enums import MavState
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.heartbeat import component_heartbeat
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import Event, TaskChanged
+from mav_tasks.tasks.task import TaskId
+
+
+class Publisher:
+    """What goes to clients without their asking each time."""
+
+    def __init__(
+        self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook, commands: Commands
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._commands = commands
+
+    def welcome(self, client: GcsClient) -> None:
+        """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
+        for vehicle in self._vehicles:
+            if vehicle.last_heartbeat is not None and not client.knows(vehicle.system_id):
+                client.introduce(vehicle.last_heartbeat, last_seq=vehicle.last_seq)
+
+    def withhold(self, packet: Packet) -> None:
+        """Note for every client that a packet of a vehicle is not passed on."""
+        for client in self._gcs:
+            client.outlet.withhold(packet.source)
+
+    def publish(self, events: list[Event], *, now: float) -> None:
+        """Tell of events: in words to all who listen, as TASK_STATUS to who submitted."""
+        for event in events:
+            spoken = translate.text_of(event)
+            if spoken is not None:
+                system_id, severity, text = spoken
+                vehicle = self._vehicles.vehicles.get(system_id)
+                if vehicle is not None:
+                    self._gcs.tell(text, severity, vehicle.server_address, now=now)
+            if isinstance(event, TaskChanged):
+                self.note_change(event.task_id)
+
+    def note_change(self, task_id: TaskId) -> None:
+        """Have the submitter of a task told of its state."""
+        task = self._book.get(task_id)
+        if task is None:
+            return
+        for client in self._gcs:
+            if client.uses_dialect and client.submitted(task):
+                client.statuses.changed(task.id)
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do."""
+        deadline = self._gcs.heartbeat.next_deadline()
+        for client in self._gcs:
+            due = client.statuses.next_deadline()
+            if due is not None:
+                deadline = min(deadline, due)
+        return deadline
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Send the task servers' heartbeats and the statuses that are due."""
+        if self._gcs.heartbeat.is_due(now=now):
+            self._gcs.forget_silent(now=now)
+            self._send_heartbeats(now=now)
+        self.send_statuses(now=now)
+
+    def send_statuses(self, *, now: float) -> None:
+        """Send each client the statuses that are due."""
+        for client in self._gcs:
+            due = client.statuses.next_deadline()
+            if due is None or now < due:
+                continue
+            active: list[int] = [
+                vehicle.tasks.begun.id
+                for vehicle in self._vehicles
+                if vehicle.tasks.begun is not None
+            ]
+            for task_id in client.statuses.due(active, now=now):
+                self._commands.send_status(client, task_id, with_position=False, now=now)
+
+    def _send_heartbeats(self, *, now: float) -> None:
+        """One from inside each vehicle that is heard.
+
+        DEVIATION: the task server's component falls silent with its vehicle; its heartbeats would
+        otherwise hide from a ground station that the vehicle is lost.
+        """
+        for vehicle in self._vehicles:
+            if not vehicle.is_heard(now=now):
+                continue
+            begun = vehicle.tasks.begun is not None
+            heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
+            for client in self._gcs:
+                if client.knows(vehicle.system_id):
+                    client.outlet.send(heartbeat, vehicle.server_address)

@@ -1,0 +1,435 @@
+"""One vehicle: what it says, what its tasks demand, and how the demand is carried out.
+
+Its rule of order: STOP before everything; what somebody else did to the vehicle before what we
+want; and no setpoint at all to a vehicle that is not ours.
+"""
+
+from collections.abc import Hashable
+from math import inf
+
+from mav_tasks.engine.inputs import Outgoing
+from mav_tasks.engine.motion_monitor import MotionMonitor
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.heartbeat import HeartbeatMonitor
+from mav_tasks.services.interval_requester import IntervalRequester
+from mav_tasks.services.offboard import OffboardControl, Phase, Refused, is_request_of
+from mav_tasks.services.persona import Persona
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SERVER, VehicleNoted
+from mav_tasks.tasks.guidance import Motion
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
+
+OUR_HOLD = 1.5  # s after we asked for HOLD, in which a change to it is our own doing
+REFUSALS = {
+    None: TaskReason.NONE,
+    Refused.MODE: TaskReason.MODE_REFUSED,
+    Refused.ARM: TaskReason.ARM_REFUSED,
+}
+
+
+class Vehicle:
+    """The vehicle with one system id, on one place of a vehicle link."""
+
+    def __init__(
+        self,
+        system_id: int,
+        *,
+        heartbeat: m.Heartbeat,
+        persona: Persona,
+        outlet: Outlet,
+        book: TaskBook,
+        settings: Settings,
+        may_arm: bool,
+        now: float,
+    ) -> None:
+        self.system_id = system_id
+        self.persona = persona
+        self.outlet = outlet
+        self.tasks = VehicleTasks(system_id, book, settings)
+        self.motion = MotionMonitor(settings.watch)
+        self.sender = CommandSender()
+        self.intervals = IntervalRequester(now=now)
+        self.last_heartbeat: Packet | None = None
+        self.last_seq = 0  # of the autopilot's packets
+        self._book = book
+        self._settings = settings
+        self._source = Address(settings.identity.system_id, settings.identity.component_id)
+        self._target = Address(system_id, AUTOPILOT)
+        self.control = OffboardControl(self._target, persona, self.sender, settings.watch)
+        self._monitor = HeartbeatMonitor(
+            heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
+        )
+        self.control.heard(armed=self._monitor.armed, mode=self._monitor.custom_mode)
+        self._arming_allowed = may_arm  # by setting
+        self._may_arm = may_arm  # until somebody disarms or changes the mode
+        self._asked_mode: int | None = None  # by a client, through us
+        self._mode_is_ours = False
+        self._next_tick = inf
+        self._was_heard = True
+        self._other_controller_at = -inf
+        self._granted: set[Hashable] = set()
+        self._own_components: set[int] = set()
+        self._answers: list[Answered] = []
+        self.last_words = self._prepare_last_words()
+
+    def __repr__(self) -> str:
+        return f"Vehicle({self.system_id}, {self.control!r}, {self.tasks!r})"
+
+    @property
+    def server_component(self) -> int:
+        """The component id under which the task server appears inside this vehicle's system."""
+        first = self._settings.identity.component_id
+        free = (c for c in range(first, first + 4) if c not in self._own_components)
+        return next(free, first)
+
+    @property
+    def server_address(self) -> Address:
+        """The task server's address inside this vehicle's system."""
+        return Address(self.system_id, self.server_component)
+
+    @property
+    def armed(self) -> bool:
+        """Whether the vehicle was last seen armed."""
+        return self._monitor.armed
+
+    def is_heard(self, *, now: float) -> bool:
+        """Whether its heartbeats are coming."""
+        return self._monitor.is_heard(now=now)
+
+    # what comes in
+
+    def receive(self, message: m.Message, component_id: int, *, now: float) -> None:
+        """Take in a message that the server itself makes use of."""
+        if isinstance(message, m.CommandAck):
+            self.sender.receive(message, component=component_id, now=now)
+            self._flush(now=now)
+        elif component_id != AUTOPILOT:
+            if isinstance(message, m.Heartbeat):
+                self._note_component(component_id, now=now)
+        elif isinstance(message, m.Heartbeat):
+            self._receive_heartbeat(message, now=now)
+        elif isinstance(message, m.Attitude | m.LocalPositionNed):
+            self.motion.receive(message, now=now)
+            if self.motion.rebooted:
+                self._rebooted(now=now)
+            if not self._is_ticking and not self.tasks.is_idle:
+                self.step(now=now)
+
+    def _receive_heartbeat(self, heartbeat: m.Heartbeat, *, now: float) -> None:
+        was_armed, was_mode = self._monitor.armed, self._monitor.custom_mode
+        self._monitor.receive(heartbeat, now=now)
+        armed, mode = self._monitor.armed, self._monitor.custom_mode
+        self.control.heard(armed=armed, mode=mode)
+        if not self._was_heard:
+            self._was_heard = True
+            self._note("heard again", now=now)
+        if mode != was_mode:
+            self._mode_changed(was_mode, mode, now=now)
+        if was_armed and not armed:
+            self._disarmed(now=now)
+        if not self._is_ticking:
+            self.step(now=now)
+
+    def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
+        asking = self.control.phase in (Phase.ASKING_MODE, Phase.RELEASING, Phase.STOPPING)
+        by_client = mode == self._asked_mode
+        ours = mode in (self.persona.control_mode, self.persona.hold_mode) and (asking or by_client)
+        if mode == self.persona.hold_mode and self.control.asked_for_hold_since(now - OUR_HOLD):
+            ours = True
+        self._mode_is_ours = ours
+        self._asked_mode = None
+        if ours or was_mode == self.persona.booting_mode:
+            return
+        self._may_arm = False
+        if self.control.phase is not Phase.STOPPING:
+            self._take_over(f"mode changed to {mode}", now=now)
+
+    def _disarmed(self, *, now: float) -> None:
+        if self.control.phase in (Phase.DISARMING, Phase.STOPPING):
+            return
+        self._may_arm = False
+        self._take_over("disarmed", now=now)
+
+    def _rebooted(self, *, now: float) -> None:
+        self.motion.forget()
+        self.intervals.ask_all_again()
+        self._note("restarted: its clock went back", now=now)
+        self.tasks.hold(TaskReason.FRAME_RESET, now=now)
+
+    def _take_over(self, what: str, *, now: float) -> None:
+        """Somebody else has the vehicle: let go, and let the queue stand if it was ours."""
+        if self.tasks.is_stopped:
+            return
+        engaged = self.control.is_engaged
+        self.control.lose()
+        if engaged and self.tasks.begun is not None:
+            self._note(f"taken over: {what}", now=now)
+            self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
+
+    def _note_component(self, component_id: int, *, now: float) -> None:
+        if component_id in self._own_components:
+            return
+        before = self.server_component
+        self._own_components.add(component_id)
+        if self.server_component != before:
+            self._note(
+                f"component {before} is its own; tasks are at {self.server_component}", now=now
+            )
+
+    def move_to(self, outlet: Outlet) -> None:
+        """The vehicle is heard at another endpoint now."""
+        self.outlet = outlet
+        self.last_words = self._prepare_last_words()
+
+    # what clients ask for, beyond tasks
+
+    def relay(
+        self, packet: Packet, message: m.Message, origin: Hashable, *, command: int, now: float
+    ) -> None:
+        """Forward a client's command; its answer comes from ``take_answers``."""
+        target = getattr(message, "target_component", 0) or AUTOPILOT
+        disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
+        self.sender.relay(
+            packet,
+            message,
+            origin,
+            component=target,
+            command=command,
+            now=now,
+            give_up_after=self._settings.watch.forward_answer,
+            urgent=disarms,
+        )
+        self._flush(now=now)
+
+    def forward(self, packet: Packet) -> None:
+        """Pass on a packet that no answer is kept for."""
+        self.outlet.inject(packet)
+
+    def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
+        """Note that a client's mode request goes to the vehicle through us.
+
+        Our own mode then counts as set by us. Any other one is a takeover, believed when a
+        heartbeat shows it; but nothing that we still ask for may work against it.
+        """
+        self._asked_mode = mode
+        if mode == self.persona.control_mode:
+            self._granted.add(client)
+            self._mode_is_ours = self._mode_is_ours or self._monitor.custom_mode == mode
+        elif self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
+            self._take_over(f"client asks for mode {mode}", now=now)
+
+    def may_move(self, client: Hashable, *, now: float) -> bool:
+        """Whether a client's motion message may pass; one that does makes tasks wait."""
+        allowed = (
+            self.armed
+            and self.tasks.begun is None
+            and not self.tasks.is_stopped
+            and not self.control.is_engaged
+            and client in self._granted
+        )
+        if allowed:
+            self._other_controller_at = now
+        return allowed
+
+    def sticks_moved(self, *, now: float) -> None:
+        """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""
+        self._other_controller_at = now
+        if self.control.phase in (Phase.ASKING_ARM, Phase.CONTROL):
+            self.outlet.send(self.control.zero_setpoint(), self._source)
+        self._take_over("driven by hand", now=now)
+
+    def second_controller(self, who: Address, *, now: float) -> None:
+        """Setpoints or an address like ours, not from us: HOLD once, then let go."""
+        if now - self._other_controller_at > self._settings.watch.other_controller:
+            self._note(f"second controller {who}", now=now)
+        self._other_controller_at = now
+        if self.control.is_engaged and self.control.phase is not Phase.STOPPING:
+            self.outlet.send(self.control.zero_setpoint(), self._source)
+            self.outlet.send(self.control.hold_request(), self._source)
+            self._take_over(f"second controller {who}", now=now)
+
+    def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
+        """STOP: zero and HOLD leave in this very step."""
+        self._asked_mode = None
+        self._granted.clear()
+        killed = self.tasks.stop(clear=clear, actor=actor, now=now)
+        self.control.begin_stop(now=now)
+        self._next_tick = now + self._settings.watch.setpoint_period
+        self._flush(now=now)
+        return killed
+
+    def hold(self, *, actor: str, now: float) -> TaskId | None:
+        """A client wants HOLD: zeros and the mode at once; a task and its queue pause."""
+        paused = None
+        if not self.tasks.is_idle:
+            paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
+        self.control.begin_release(now=now)
+        self.step(now=now)
+        return paused
+
+    def pause(self, *, actor: str, now: float) -> TaskId | None:
+        """Let task and queue stand; zeros leave in this very step."""
+        paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
+        self.step(now=now)
+        return paused
+
+    def proceed(self, *, actor: str, now: float) -> TaskId | None:
+        """Release STOP, takeover and pause; arming is allowed again."""
+        self._may_arm = self._arming_allowed
+        going_on = self.tasks.proceed(self.view(now=now), actor=actor, now=now)
+        self.step(now=now)
+        return going_on
+
+    def shut_down(self, *, now: float) -> None:
+        """The server ends: pause what is begun and stop what we drive."""
+        if self.tasks.begun is not None:
+            self.tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
+        if self.control.is_engaged and self.control.phase is not Phase.STOPPING:
+            self.control.begin_stop(now=now)
+            self._flush(now=now)
+
+    # time
+
+    @property
+    def _is_ticking(self) -> bool:
+        return self._next_tick < inf
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do."""
+        silent_at = self._monitor.heard_at + self._settings.watch.heartbeat_lost + 1e-3
+        return min(
+            self._next_tick,
+            self.intervals.next_deadline(),
+            self.sender.next_deadline() or inf,
+            silent_at if self._was_heard else inf,
+        )
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Do what is due: the setpoint tick, repeats, rates, silence."""
+        if self._was_heard and not self.is_heard(now=now):
+            self._was_heard = False
+            self._note("silent", now=now)
+        self.sender.handle_deadline(now=now)
+        if now >= self._next_tick:
+            if now - self._next_tick > self._settings.watch.late_tick and self.control.in_control:
+                self.outlet.send(self.control.zero_setpoint(), self._source)
+                self.tasks.hold(TaskReason.LATE, now=now)
+            self.step(now=now)
+        self._flush(now=now)
+
+    def step(self, *, now: float) -> None:
+        """Let the tasks say what they demand, and do it."""
+        seen = self.view(now=now)
+        begun_before = self.tasks.begun
+        demand = self.tasks.step(seen, now=now)
+        if begun_before is not self.tasks.begun and self.tasks.begun is None:
+            self._granted.clear()
+        self._follow(demand, seen, now=now)
+        self._flush(now=now)
+        self._plan_tick(now=now)
+
+    def _plan_tick(self, *, now: float) -> None:
+        if not self.control.is_engaged and self.tasks.begun is None:
+            self._next_tick = inf
+        elif now >= self._next_tick or self._next_tick == inf:
+            period = self._settings.watch.setpoint_period
+            following = self._next_tick + period
+            self._next_tick = following if now < following < inf else now + period
+
+    def view(self, *, now: float) -> VehicleView:
+        """Give one look at the vehicle for the task domain."""
+        watch = self._settings.watch
+        return VehicleView(
+            heard=self.is_heard(now=now),
+            mode=self._mode_kind(),
+            armed=self._monitor.armed,
+            may_arm=self._may_arm,
+            in_control=self.control.in_control,
+            refusal=REFUSALS[self.control.refused],
+            motion=self.motion.latest(),
+            still=self.motion.is_still(now=now),
+            other_controller=now - self._other_controller_at < watch.other_controller,
+        )
+
+    def latest_motion(self) -> Motion | None:
+        """Give the last measured motion."""
+        return self.motion.latest()
+
+    def take_answers(self) -> list[Answered]:
+        """Give the answers to clients' commands since the last call."""
+        answers, self._answers = self._answers, []
+        return answers
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings; what is under way keeps the old ones where it must."""
+        self._settings = settings
+        self.tasks.apply(settings)
+
+    def _mode_kind(self) -> ModeKind:
+        mode = self._monitor.custom_mode
+        if mode == self.persona.hold_mode:
+            return ModeKind.HOLD
+        if mode == self.persona.control_mode and self._mode_is_ours:
+            return ModeKind.OURS
+        return ModeKind.MANUAL if mode == self.persona.manual_mode else ModeKind.OTHER
+
+    def _follow(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
+        match demand.kind:
+            case DemandKind.TAKE:
+                self.control.take(may_arm=seen.may_arm, now=now)
+            case DemandKind.DRIVE:
+                self.control.drive(demand.velocity.forward, demand.velocity.yaw_rate)
+            case DemandKind.HOLD:
+                self.control.release(still=seen.still, disarm=False, now=now)
+            case DemandKind.HAND_BACK:
+                self.control.release(still=seen.still, disarm=True, now=now)
+            case DemandKind.STOP:
+                self.control.stop(still=seen.still, now=now)
+
+    def _flush(self, *, now: float) -> None:
+        """Move what the services want sent to the way out, and their answers to who asked."""
+        request = self.intervals.next_request(now=now)
+        if request is not None:
+            request.target_system, request.target_component = self._target
+            self.sender.request(request, now=now, give_up_after=self._settings.watch.ask_vehicle)
+        for setpoint in self.control.take_messages():
+            self.outlet.send(setpoint, self._source)
+        outgoing, answers = self.sender.take()
+        for item in outgoing:
+            if isinstance(item, Packet):
+                self.outlet.inject(item)
+            else:
+                self.outlet.send(item, self._source)
+        for answer in answers:
+            self._dispatch(answer)
+
+    def _dispatch(self, answer: Answered) -> None:
+        if answer.origin is not None:
+            self._answers.append(answer)
+        elif is_request_of(answer):
+            self.control.answered(answer)
+        elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:
+            ack = answer.ack
+            self.intervals.answered(
+                accepted=None if ack is None else ack.result == MavResult.ACCEPTED
+            )
+
+    def _note(self, text: str, *, now: float) -> None:
+        self._book.record(VehicleNoted(self.system_id, text, now))
+
+    def _prepare_last_words(self) -> tuple[Outgoing, ...]:
+        """Zero and HOLD as packets, for an exit on which nothing can be computed any more."""
+        queue: list[Outgoing] = []
+        spare = self.outlet.sibling(queue)
+        spare.send(self.control.zero_setpoint(), self._source)
+        spare.send(self.control.hold_request(), self._source)
+        return tuple(queue)

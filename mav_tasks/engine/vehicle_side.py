@@ -1,0 +1,211 @@
+"""All vehicles and the links to them: finding, hearing, and the way to each.
+
+Any bytes may come in here; only a packet with a good CRC from a known or newly heartbeating system
+changes anything.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.codec import Decoder, Packer
+from mav_tasks.mavlink.enums import MavType
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Router
+from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
+from mav_tasks.services.persona import persona_of
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import VehicleNoted
+
+MAX_PEERS = 256  # endpoints on one vehicle link
+
+#: messages that nobody but a controller of the vehicle sends
+SETPOINTS = frozenset(
+    {m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id, m.SetAttitudeTarget.id}
+)
+#: what the server itself makes use of; everything else is forwarded unread
+USED = frozenset(
+    {m.Heartbeat.id, m.Attitude.id, m.LocalPositionNed.id, m.CommandAck.id} | SETPOINTS
+)
+NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
+
+
+@dataclass(slots=True)
+class _Link:
+    is_local: bool
+    heartbeat: HeartbeatSender
+    outlets: dict[Peer, Outlet] = field(default_factory=dict)
+
+
+class VehicleSide:
+    """The vehicles by system id, and the vehicle links."""
+
+    def __init__(
+        self, *, queue: list[Outgoing], packer: Packer, book: TaskBook, settings: Settings
+    ) -> None:
+        self._queue = queue
+        self._packer = packer
+        self._book = book
+        self._settings = settings
+        self._decoder = Decoder()
+        self._links: dict[str, _Link] = {}
+        self._router = Router()
+        self._noted: set[str] = set()
+        self.vehicles: dict[int, Vehicle] = {}
+
+    def __iter__(self) -> Iterator[Vehicle]:
+        return iter(self.vehicles.values())
+
+    @property
+    def counts(self) -> str:
+        """One line on what could be decoded."""
+        return str(self._decoder.counts)
+
+    def change_link(self, change: LinkChanged, *, now: float) -> None:
+        """Take a link into use, or out of it."""
+        if not change.up:
+            self._links.pop(change.link, None)
+            return
+        link = _Link(change.is_local, HeartbeatSender(now=now))
+        for peer in change.peers:
+            link.outlets[peer] = self._outlet(change.link, peer)
+        self._links[change.link] = link
+
+    def owns(self, link: str) -> bool:
+        """Whether a link of this name is a vehicle link."""
+        return link in self._links
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        for vehicle in self:
+            vehicle.apply(settings)
+
+    def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
+        """Take a packet in; gives the vehicle in whose name it is to be forwarded, if any.
+
+        COMMAND_ACK is not to be forwarded: it goes to the one who asked.
+        """
+        message: m.Message | None = None
+        if packet.message_id in USED:
+            message = self._decoder.decode(packet)
+            if message is None:
+                return None
+        if self._is_intruder(packet):
+            self._note_intruder(packet, message, now=now)
+            return None
+        vehicle = self.vehicles.get(packet.system_id)
+        if vehicle is None:
+            if not isinstance(message, m.Heartbeat):
+                return None
+            vehicle = self._meet(link, peer, packet, message, now=now)
+            if vehicle is None:
+                return None
+        elif not self._is_in_place(vehicle, link, peer, now=now):
+            return None
+        if packet.component_id == AUTOPILOT:
+            vehicle.last_seq = packet.seq
+        vehicle.intervals.heard(packet.message_id)
+        if message is not None:
+            if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
+                vehicle.last_heartbeat = packet
+            vehicle.receive(message, packet.component_id, now=now)
+        return vehicle
+
+    def next_deadline(self) -> float | None:
+        """Give when ``handle_deadline`` has something to do."""
+        deadlines = [link.heartbeat.next_deadline() for link in self._links.values()]
+        deadlines += [vehicle.next_deadline() for vehicle in self]
+        return min(deadlines, default=None)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Send heartbeats and let each vehicle do what is due."""
+        source = self._our_address
+        for link in self._links.values():
+            if link.heartbeat.is_due(now=now):
+                for outlet in link.outlets.values():
+                    outlet.send(gcs_heartbeat(), source)
+        for vehicle in self:
+            if now >= vehicle.next_deadline():
+                vehicle.handle_deadline(now=now)
+
+    @property
+    def _our_address(self) -> Address:
+        identity = self._settings.identity
+        return Address(identity.system_id, identity.component_id)
+
+    def _outlet(self, link: str, peer: Peer) -> Outlet:
+        return Outlet(link, peer, self._queue, self._packer)
+
+    def _meet(
+        self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
+    ) -> Vehicle | None:
+        """A first heartbeat: from an autopilot that we can drive, it is a new vehicle."""
+        if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
+            return None
+        persona = persona_of(heartbeat)
+        if persona is None:
+            self._note_once(
+                packet.system_id,
+                f"autopilot {heartbeat.autopilot} is not supported in this version",
+                now=now,
+            )
+            return None
+        link = self._links[link_name]
+        outlet = link.outlets.get(peer)
+        if outlet is None:
+            if len(link.outlets) >= MAX_PEERS:
+                return None
+            outlet = link.outlets[peer] = self._outlet(link_name, peer)
+            outlet.send(gcs_heartbeat(), self._our_address)
+        self._router.learn(packet.system_id, (link_name, peer))
+        vehicle = Vehicle(
+            packet.system_id,
+            heartbeat=heartbeat,
+            persona=persona,
+            outlet=outlet,
+            book=self._book,
+            settings=self._settings,
+            may_arm=self._settings.arming == "server"
+            or (self._settings.arming == "auto" and link.is_local),
+            now=now,
+        )
+        self.vehicles[packet.system_id] = vehicle
+        self._book.record(VehicleNoted(packet.system_id, f"found ({persona.name})", now))
+        vehicle.step(now=now)
+        return vehicle
+
+    def _is_in_place(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
+        """Whether a packet comes from where the vehicle is; two of one id must not be mixed."""
+        if self._router.place_of(vehicle.system_id) == (link, peer):
+            return True
+        if vehicle.is_heard(now=now):
+            self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
+            return False
+        outlets = self._links[link].outlets
+        if peer not in outlets and len(outlets) >= MAX_PEERS:
+            return False
+        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
+        self._router.learn(vehicle.system_id, (link, peer))
+        return True
+
+    def _is_intruder(self, packet: Packet) -> bool:
+        return packet.source == self._our_address or packet.message_id in SETPOINTS
+
+    def _note_intruder(self, packet: Packet, message: m.Message | None, *, now: float) -> None:
+        """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
+        target = 0 if message is None else getattr(message, "target_system", 0)
+        for vehicle in self:
+            if target in (0, vehicle.system_id):
+                vehicle.second_controller(packet.source, now=now)
+
+    def _note_once(self, system_id: int, text: str, *, now: float) -> None:
+        key = f"{system_id} {text}"
+        if key not in self._noted and len(self._noted) < MAX_PEERS:
+            self._noted.add(key)
+            self._book.record(VehicleNoted(system_id, text, now))

@@ -1,0 +1,62 @@
+"""One exception tree; everything that this package raises on purpose is in it.
+
+::
+
+    MavTasksError
+    ├── UsageError            the operator can mend it: one clear line, exit code 2
+    │   ├── LinkUrlError      a link URL that says nothing we can open
+    │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
+    │   ├── InsecureLinkError a link beyond loopback without a key
+    │   └── MissingExtraError an optional package is not installed
+    ├── Rejection             a request refused: reason code and words for the client
+    ├── StoreError            the journal cannot be read or written
+    └── IllegalTransition     our own mistake: a move that the lifecycle table lacks
+
+Bytes from outside never raise: they are parsed to a value or counted (see ``mavlink``).
+"""
+
+
+class MavTasksError(Exception):
+    """Root of the tree."""
+
+
+class UsageError(MavTasksError):
+    """What the operator asked for cannot be done; the text says what to change."""
+
+
+class LinkUrlError(UsageError):
+    """A link URL could not be understood."""
+
+
+class LinkOpenError(UsageError):
+    """The operating system refused to open a link."""
+
+
+class InsecureLinkError(UsageError):
+    """A link reachable from other machines, without a signing key."""
+
+
+class MissingExtraError(UsageError):
+    """An optional dependency is missing; the text names the extra to install."""
+
+
+class Rejection(MavTasksError):
+    """A client's request refused.
+
+    ``reason`` is a TASK_REASON number of the dialect (100 and above); the MAV_RESULT that goes on
+    the wire follows from it by the table in ``engine/translate.py``, so that the task domain can
+    refuse without knowing MAVLink.
+    """
+
+    def __init__(self, reason: int, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
+        self.text = text
+
+
+class StoreError(MavTasksError):
+    """The store cannot keep or give back what it should."""
+
+
+class IllegalTransition(MavTasksError):
+    """A task was moved along an edge that the lifecycle table does not have."""

@@ -1,0 +1,54 @@
+"""The whole server on memory links, in its caller's time: for tests and demonstrations.
+
+It is the same engine, store and pump as the runner's; only sockets, clock and signals are missing.
+"""
+
+from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import LinkSide, Outgoing, Packets
+from mav_tasks.links.memory import MemoryLink, MemoryNet
+from mav_tasks.runner import Pump, link_changed
+from mav_tasks.settings import Settings
+from mav_tasks.store import MemoryStore, Store
+
+CLIENT_LINK = "server:clients"
+VEHICLE_LINK = "server:vehicles"
+
+
+class InMemoryServer:
+    """A server on a MemoryNet: clients find it as CLIENT_LINK, it finds ``vehicles`` by name."""
+
+    def __init__(
+        self,
+        net: MemoryNet,
+        *,
+        vehicles: tuple[str, ...],
+        settings: Settings | None = None,
+        store: Store | None = None,
+        now: float = 0.0,
+    ) -> None:
+        self.engine = Engine(settings or Settings(), now=now)
+        self.store = store or MemoryStore()
+        self.pump = Pump(self.engine, self.store, self._send)
+        clients = net.link(CLIENT_LINK)
+        towards = net.link(VEHICLE_LINK, peers=vehicles)
+        self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, towards)}
+        self.pump.handle(link_changed(towards, LinkSide.VEHICLES), now=now)
+        self.pump.handle(link_changed(clients, LinkSide.CLIENTS), now=now)
+        self.pump.turn(now=now)
+
+    def next_deadline(self) -> float | None:
+        """Give when ``turn`` has something to do, unless something arrives before."""
+        return None if self.pump.is_over else self.engine.next_deadline()
+
+    def turn(self, *, now: float) -> None:
+        """Read the links, and do what is due."""
+        if self.pump.is_over:
+            return
+        for link in self._links.values():
+            datagrams = link.receive(len(link.arrived))
+            if datagrams:
+                self.pump.handle(Packets(link.name, datagrams), now=now)
+        self.pump.turn(now=now)
+
+    def _send(self, outgoing: Outgoing) -> None:
+        self._links[outgoing.link].send(outgoing.peer, outgoing.data)

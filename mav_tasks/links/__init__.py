@@ -1,0 +1,1 @@
+"""Links: bytes to and from peers, and nothing else."""

@@ -1,0 +1,96 @@
+"""Links without sockets, in one process and in virtual time: a net that can be as bad as a radio.
+
+Deterministic: the same seed and the same traffic give the same losses.
+"""
+
+import heapq
+from collections import deque
+from dataclasses import dataclass
+from itertools import count
+from random import Random
+
+from mav_tasks.links.base import Peer
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """How bad the net is. Delays in seconds; probabilities 0–1 for each datagram."""
+
+    delay: float = 0.001
+    jitter: float = 0.0  # up to this much more: datagrams overtake each other
+    loss: float = 0.0
+    duplication: float = 0.0
+
+
+class MemoryNet:
+    """Carries datagrams between its links; ``now`` is the caller's to move forward."""
+
+    def __init__(self, *, seed: int = 0, conditions: Conditions | None = None) -> None:
+        self.now = 0.0
+        self.conditions = conditions or Conditions()
+        self._random = Random(seed)
+        self._links: dict[str, MemoryLink] = {}
+        self._under_way: list[tuple[float, int, str, str, bytes]] = []
+        self._order = count()
+
+    def link(self, name: str, *, peers: tuple[str, ...] = ()) -> "MemoryLink":
+        """Give a new link whose peers know it by ``name``."""
+        link = self._links[name] = MemoryLink(self, name, peers)
+        return link
+
+    def send(self, source: str, target: str, data: bytes) -> None:
+        """Put a datagram under way, or lose it, or double it."""
+        how = self.conditions
+        copies = 0 if self._random.random() < how.loss else 1
+        if copies and self._random.random() < how.duplication:
+            copies = 2
+        for _ in range(copies):
+            at = self.now + how.delay + self._random.random() * how.jitter
+            heapq.heappush(self._under_way, (at, next(self._order), source, target, data))
+
+    def next_arrival(self) -> float | None:
+        """Give when the next datagram arrives."""
+        return self._under_way[0][0] if self._under_way else None
+
+    def deliver(self) -> None:
+        """Put what has arrived by ``now`` into the links."""
+        while self._under_way and self._under_way[0][0] <= self.now:
+            _, _, source, target, data = heapq.heappop(self._under_way)
+            link = self._links.get(target)
+            if link is not None:
+                self.arrive(link, source, data)
+
+    def arrive(self, link: "MemoryLink", source: str, data: bytes) -> None:
+        """Put one datagram into its link; a net that observes does more."""
+        link.arrived.append((source, data))
+
+
+class MemoryLink:
+    """One end on a MemoryNet; peers are names."""
+
+    is_local = True
+
+    def __init__(self, net: MemoryNet, name: str, peers: tuple[Peer, ...]) -> None:
+        self._net = net
+        self.name = name
+        self.peers = peers
+        self.arrived: deque[tuple[Peer, bytes]] = deque()
+
+    def __repr__(self) -> str:
+        return f"MemoryLink({self.name})"
+
+    def fileno(self) -> int:
+        """There is no descriptor: whoever moves the net's time reads the link."""
+        return -1
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` datagrams that have arrived."""
+        return [self.arrived.popleft() for _ in range(min(limit, len(self.arrived)))]
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Put a datagram under way to the link of that name."""
+        self._net.send(self.name, str(peer), data)
+
+    def close(self) -> None:
+        """Lose what has arrived."""
+        self.arrived.clear()

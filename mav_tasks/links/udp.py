@@ -1,0 +1,69 @@
+"""UDP, listening or dialling: one socket, any number of peers."""
+
+import socket
+
+from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.base import Peer
+from mav_tasks.links.url import LinkUrl, is_loopback
+
+RECEIVE_BUFFER = 1 << 20  # bytes; a burst of telemetry waits here while the disk is slow
+MAX_DATAGRAM = 65536
+
+
+class UdpLink:
+    """A UDP socket. ``peers`` are (host, port): of a dialling link its URL, and those pushed to."""
+
+    def __init__(self, url: LinkUrl, *, push: tuple[tuple[str, int], ...] = ()) -> None:
+        self.name = str(url)
+        self.lost = 0  # datagrams that the system did not take
+        try:
+            family, address = _resolve(url.host, url.port)
+            pushed = tuple(_resolve(host, port)[1] for host, port in push)
+            self._socket = socket.socket(family, socket.SOCK_DGRAM)
+            self._socket.setblocking(False)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            if url.kind == "udpin":
+                self._socket.bind(address)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
+        dialled: tuple[tuple[str, int], ...] = (address,) if url.kind == "udpout" else ()
+        self.peers: tuple[Peer, ...] = dialled + pushed
+        self.is_local = url.is_loopback and all(is_loopback(host) for host, _ in push)
+
+    def __repr__(self) -> str:
+        return f"UdpLink({self.name})"
+
+    def fileno(self) -> int:
+        """Give the socket's descriptor."""
+        return self._socket.fileno()
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` datagrams that are there now."""
+        received: list[tuple[Peer, bytes]] = []
+        receive_from = self._socket.recvfrom
+        try:
+            for _ in range(limit):
+                data, peer = receive_from(MAX_DATAGRAM)
+                received.append((peer, data))
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError:  # an earlier datagram found nobody there: says nothing of this one
+            self.lost += 1
+        return received
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send one datagram; one that the system does not take is lost, as on any network."""
+        try:
+            self._socket.sendto(data, peer)  # type: ignore[call-overload]
+        except OSError:
+            self.lost += 1
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+def _resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]]:
+    family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+    return family, (str(address[0]), int(address[1]))

@@ -1,0 +1,185 @@
+"""The I/O shell: one loop, one timer, one pump; signals and the orderly end. It decides nothing.
+
+What must be durable first the engine holds back by itself: whatever ``take_packets`` gives may
+leave at once, and so it leaves before the events of the same turn reach the store.
+"""
+
+import asyncio
+import logging
+import signal
+import time
+from collections.abc import Callable, Sequence
+
+from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import (
+    Committed,
+    Input,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    Shutdown,
+    StoreFailed,
+    WallClock,
+)
+from mav_tasks.links.base import Link
+from mav_tasks.store import Kept, Store
+from mav_tasks.tasks.events import Event, ServerStopped, SubmissionRefused, VehicleNoted
+
+log = logging.getLogger("mav_tasks")
+
+DRAIN = 64  # datagrams read from one link before the others and the timer have their turn
+WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
+
+EXIT_FAILED = 70  # EX_SOFTWARE: the engine itself failed
+
+
+class Pump:
+    """Engine, store and links, turned by whoever knows the time."""
+
+    def __init__(self, engine: Engine, store: Store, send: Callable[[Outgoing], None]) -> None:
+        self.engine = engine
+        self._store = store
+        self._send = send
+        self.is_over = False
+
+    def handle(self, item: Input, *, now: float) -> None:
+        """Take one input in; ``turn`` brings out what follows."""
+        self.engine.handle(item, now=now)
+
+    def turn(self, *, now: float) -> None:
+        """Do what is due, and send and store until nothing is left to do."""
+        due = self.engine.next_deadline()
+        if due is not None and due <= now:
+            self.engine.handle_deadline(now=now)
+        while True:
+            for outgoing in self.engine.take_packets():
+                self._send(outgoing)
+            events = self.engine.take_events()
+            if events:
+                self._store.append(events)
+                self._note(events)
+            outcomes = self._store.take_outcomes()
+            if not outcomes:
+                return
+            for outcome in outcomes:
+                self.engine.handle(
+                    Committed(outcome.through)
+                    if isinstance(outcome, Kept)
+                    else StoreFailed(outcome.text),
+                    now=now,
+                )
+
+    def send_last_words(self) -> None:
+        """Stop every vehicle that is being driven, without asking the engine anything."""
+        for outgoing in self.engine.last_words:
+            self._send(outgoing)
+
+    def _note(self, events: list[Event]) -> None:
+        for event in events:
+            noteworthy = isinstance(event, SubmissionRefused | VehicleNoted)
+            log.log(logging.WARNING if noteworthy else logging.INFO, "%s", event)
+            if isinstance(event, ServerStopped):
+                self.is_over = True
+
+
+def link_changed(link: Link, side: LinkSide) -> LinkChanged:
+    """Give the input that says that a link is up."""
+    return LinkChanged(link.name, side, up=True, peers=link.peers, is_local=link.is_local)
+
+
+class Runner:
+    """Runs an engine on real links until a signal ends it."""
+
+    def __init__(
+        self, engine: Engine, store: Store, *, clients: Sequence[Link], vehicles: Sequence[Link]
+    ) -> None:
+        self._sides = [(link, LinkSide.VEHICLES) for link in vehicles]
+        self._sides += [(link, LinkSide.CLIENTS) for link in clients]
+        self._links = {link.name: link for link, _ in self._sides}
+        self._store = store
+        self._pump = Pump(engine, store, self._send)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._over: asyncio.Future[int] | None = None
+        self._wall_offset: float | None = None
+
+    async def run(self) -> int:
+        """Serve until SIGINT or SIGTERM; gives the exit code."""
+        self._loop = asyncio.get_running_loop()
+        self._over = self._loop.create_future()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._loop.add_signal_handler(number, self._on_signal)
+        try:
+            for link, side in self._sides:
+                self._guarded(link_changed(link, side))
+                self._loop.add_reader(link.fileno(), self._on_readable, link)
+            return await self._over
+        finally:
+            for link, _ in self._sides:
+                self._loop.remove_reader(link.fileno())
+                link.close()
+            self._store.close()
+
+    def _on_readable(self, link: Link) -> None:
+        datagrams = link.receive(DRAIN)
+        if datagrams:
+            self._guarded(Packets(link.name, datagrams))
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        self._guarded(None)
+
+    def _on_signal(self) -> None:
+        assert self._loop is not None
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second one is not waited for
+            self._loop.add_signal_handler(number, self._leave_at_once)
+        self._guarded(Shutdown())
+
+    def _leave_at_once(self) -> None:
+        self._pump.send_last_words()
+        self._finish(0)
+
+    def _guarded(self, item: Input | None) -> None:
+        """One turn of the pump. If the engine fails, stop the vehicles and end: no zombie."""
+        try:
+            self._turn(item)
+        except Exception:  # whatever our own mistake is, a vehicle must not drive on for it
+            log.critical("internal error: stopping every vehicle and ending", exc_info=True)
+            self._pump.send_last_words()
+            self._finish(EXIT_FAILED)
+
+    def _turn(self, item: Input | None) -> None:
+        assert self._loop is not None
+        now = self._loop.time()
+        offset = time.time() - now
+        if self._wall_offset is None or abs(offset - self._wall_offset) > WALL_STEP:
+            self._wall_offset = offset
+            self._pump.handle(WallClock(offset), now=now)
+        if item is not None:
+            self._pump.handle(item, now=now)
+        self._pump.turn(now=now)
+        if self._pump.is_over:
+            self._finish(0)
+            return
+        self._rearm(self._loop)
+
+    def _rearm(self, loop: asyncio.AbstractEventLoop) -> None:
+        due = self._pump.engine.next_deadline()
+        if self._timer is not None:
+            if self._timer.when() == due:
+                return
+            self._timer.cancel()
+            self._timer = None
+        if due is not None:
+            self._timer = loop.call_at(due, self._on_timer)
+
+    def _finish(self, code: int) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._over is not None and not self._over.done():
+            self._over.set_result(code)
+
+    def _send(self, outgoing: Outgoing) -> None:
+        self._links[outgoing.link].send(outgoing.peer, outgoing.data)

@@ -1,0 +1,1 @@
+"""MAVLink microservices, one protocol role a file. Pure; they know nothing of tasks."""

@@ -1,0 +1,185 @@
+"""Commands to one vehicle, ours and those of clients: one in flight for each command id.
+
+MAVLink guide, "Command Protocol". There is a lane for each (component, command id). An ack names
+neither the request nor the asker, so a second command of the same lane waits until the first is
+answered or given up, and for a while after it was given up a late ack is taken for the first one's
+and dropped. Urgent commands (disarm, HOLD) never wait. DEVIATION: our own repeats keep
+``confirmation`` 0, because a vehicle carries each copy out whatever it says.
+"""
+
+from collections import deque
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+from mav_tasks.mavlink.messages import CommandAck, CommandLong, Message
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.retry import Retry
+
+REPEAT = 0.25  # s, between our own repeats
+LATE = 0.4  # s, during which acks of a command given up are still expected
+MAX_WAITING = 16  # commands of one id; more are answered "busy" at once
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """A command is over: ``ack`` is the vehicle's answer, None if it gave none in time."""
+
+    origin: Hashable  # who asked; None: ourselves
+    component: int
+    command: int
+    ack: CommandAck | None
+    request: Message
+
+
+_LaneKey = tuple[int, int]  # component, command id
+
+
+@dataclass(slots=True)
+class _Request:
+    origin: Hashable
+    lane: _LaneKey
+    message: Message
+    packet: Packet | None  # a client's, forwarded as it came; None: ours, to be encoded
+    retry: Retry
+
+
+@dataclass(slots=True)
+class _Lane:
+    """All commands of one id."""
+
+    in_flight: _Request | None = None
+    waiting: deque[_Request] = field(default_factory=deque)
+    quiet_until: float = 0.0  # late acks may still come; nothing is sent meanwhile
+
+
+class CommandSender:
+    """The commands under way to one vehicle."""
+
+    def __init__(self) -> None:
+        self._lanes: dict[_LaneKey, _Lane] = {}
+        self._outgoing: list[Message | Packet] = []
+        self._answers: list[Answered] = []
+
+    def __repr__(self) -> str:
+        flying = [command for (_, command), lane in self._lanes.items() if lane.in_flight]
+        return f"CommandSender(in_flight={flying})"
+
+    def request(
+        self, message: CommandLong, *, now: float, give_up_after: float, urgent: bool = False
+    ) -> None:
+        """Send a command of our own, repeated until it is answered or given up."""
+        retry = Retry.starting(now=now, interval=REPEAT, give_up_after=give_up_after)
+        self._enqueue(
+            _Request(None, (message.target_component, message.command), message, None, retry),
+            now=now,
+            urgent=urgent,
+        )
+
+    def relay(
+        self,
+        packet: Packet,
+        message: Message,
+        origin: Hashable,
+        *,
+        component: int,
+        command: int,
+        now: float,
+        give_up_after: float,
+        urgent: bool = False,
+    ) -> None:
+        """Forward a client's command once; its answer, or its lack of one, comes from ``take``."""
+        retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
+        request = _Request(origin, (component, command), message, packet, retry)
+        self._enqueue(request, now=now, urgent=urgent)
+
+    def withdraw(self, component: int, command: int) -> None:
+        """Send no further copy of our own commands of this id, and none that wait.
+
+        Clients' commands of the id that still wait are answered as if the vehicle had not.
+        """
+        lane = self._lanes.get((component, command))
+        if lane is None:
+            return
+        for request in lane.waiting:
+            self._answer(request, None)
+        lane.waiting.clear()
+        if lane.in_flight is not None and lane.in_flight.origin is None:
+            lane.quiet_until = lane.in_flight.retry.next_at - REPEAT + LATE
+            lane.in_flight = None
+
+    def is_pending(self, component: int, command: int) -> bool:
+        """Whether a command of ours of this id is in flight or waits."""
+        lane = self._lanes.get((component, command))
+        if lane is None:
+            return False
+        requests = [*lane.waiting, *([lane.in_flight] if lane.in_flight else [])]
+        return any(request.origin is None for request in requests)
+
+    def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
+        """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
+        lane = self._lanes.get((component, ack.command))
+        if lane is None or lane.in_flight is None:
+            return
+        request, lane.in_flight = lane.in_flight, None
+        if request.retry.sent > 1:  # each copy is answered: the others' acks are on their way
+            lane.quiet_until = now + LATE / 2
+        self._answer(request, ack)
+        self._advance(lane, now=now)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Repeat what is due and give up what is too old."""
+        for lane in self._lanes.values():
+            flying = lane.in_flight
+            if flying is not None and flying.retry.is_over(now):
+                lane.in_flight = None
+                lane.quiet_until = now + LATE
+                self._answer(flying, None)
+            while lane.waiting and lane.waiting[0].retry.is_over(now):
+                self._answer(lane.waiting.popleft(), None)
+            self._advance(lane, now=now)
+
+    def next_deadline(self) -> float | None:
+        """Give when ``handle_deadline`` has something to do."""
+        deadlines: list[float] = []
+        for lane in self._lanes.values():
+            if lane.in_flight is not None:
+                deadlines.append(lane.in_flight.retry.next_deadline())
+            if lane.waiting:
+                deadlines.append(lane.waiting[0].retry.give_up_at)
+                if lane.in_flight is None:
+                    deadlines.append(lane.quiet_until)
+        return min(deadlines, default=None)
+
+    def take(self) -> tuple[list[Message | Packet], list[Answered]]:
+        """Give what is to be sent, and what was answered, since the last call."""
+        outgoing, self._outgoing = self._outgoing, []
+        answers, self._answers = self._answers, []
+        return outgoing, answers
+
+    def _enqueue(self, request: _Request, *, now: float, urgent: bool) -> None:
+        lane = self._lanes.setdefault(request.lane, _Lane())
+        if urgent:
+            if lane.in_flight is not None:
+                self._answer(lane.in_flight, None)
+            lane.in_flight = request
+            self._send(request, now=now)
+            return
+        if len(lane.waiting) >= MAX_WAITING:
+            self._answer(request, None)
+            return
+        lane.waiting.append(request)
+        self._advance(lane, now=now)
+
+    def _advance(self, lane: _Lane, *, now: float) -> None:
+        if lane.in_flight is None and lane.waiting and now >= lane.quiet_until:
+            lane.in_flight = lane.waiting.popleft()
+        flying = lane.in_flight
+        if flying is not None and flying.retry.is_due(now):
+            self._send(flying, now=now)
+
+    def _send(self, request: _Request, *, now: float) -> None:
+        request.retry.note_sent(now)
+        self._outgoing.append(request.message if request.packet is None else request.packet)
+
+    def _answer(self, request: _Request, ack: CommandAck | None) -> None:
+        self._answers.append(Answered(request.origin, *request.lane, ack, request.message))

@@ -1,0 +1,69 @@
+"""Heartbeats: watching a vehicle's, and our own. MAVLink guide, "Heartbeat/Connection"."""
+
+from mav_tasks.mavlink.enums import MavAutopilot, MavModeFlag, MavState, MavType
+from mav_tasks.mavlink.messages import Heartbeat
+
+INTERVAL = 1.0  # s, MAVLink guide
+
+
+class HeartbeatMonitor:
+    """What a vehicle's heartbeats say, and whether they still come."""
+
+    def __init__(self, first: Heartbeat, *, lost_after: float, now: float) -> None:
+        self._lost_after = lost_after
+        self.heard_at = now
+        self.latest = first
+
+    def __repr__(self) -> str:
+        return f"HeartbeatMonitor(mode={self.custom_mode}, armed={self.armed})"
+
+    @property
+    def armed(self) -> bool:
+        """Whether the vehicle says that it is armed."""
+        return bool(self.latest.base_mode & MavModeFlag.SAFETY_ARMED)
+
+    @property
+    def custom_mode(self) -> int:
+        """The autopilot's own mode number."""
+        return int(self.latest.custom_mode)
+
+    def receive(self, heartbeat: Heartbeat, *, now: float) -> None:
+        """Take a heartbeat in."""
+        self.latest = heartbeat
+        self.heard_at = now
+
+    def is_heard(self, *, now: float) -> bool:
+        """Whether heartbeats are coming."""
+        return now - self.heard_at <= self._lost_after
+
+
+class HeartbeatSender:
+    """The rhythm of heartbeats that we send: the first at once, then one a second."""
+
+    def __init__(self, *, now: float) -> None:
+        self._next_at = now
+
+    def next_deadline(self) -> float:
+        """Give when the next one is due."""
+        return self._next_at
+
+    def is_due(self, *, now: float) -> bool:
+        """Whether one is to be sent now; plans the next, without a burst after a late wake-up."""
+        if now < self._next_at:
+            return False
+        self._next_at = max(self._next_at + INTERVAL, now + 0.5 * INTERVAL)
+        return True
+
+
+def gcs_heartbeat() -> Heartbeat:
+    """Give what the server says of itself on vehicle links: a ground station."""
+    return Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)
+
+
+def component_heartbeat(state: MavState) -> Heartbeat:
+    """Give what the task server's component inside a vehicle's system says to clients.
+
+    Autopilot INVALID and base_mode 0, because MAVSDK takes flight mode and autopilot type from any
+    component that says more.
+    """
+    return Heartbeat(MavType.ONBOARD_CONTROLLER, MavAutopilot.INVALID, 0, 0, state, 3)

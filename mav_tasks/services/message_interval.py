@@ -1,0 +1,92 @@
+"""Rates of telemetry: thinning for one client. MAVLink guide: SET_MESSAGE_INTERVAL.
+
+The server owns the rates on the vehicle links; what a client asks for is met by leaving messages
+out of what is forwarded to it.
+"""
+
+from mav_tasks.mavlink import messages as m
+
+#: Messages that vehicles send as streams, by id: only these are thinned. Everything else is an
+#: answer or an event, of which none may be lost.
+STREAMED = frozenset(
+    {
+        m.SysStatus.id,
+        m.SystemTime.id,
+        m.GpsRawInt.id,
+        27,  # RAW_IMU
+        26,  # SCALED_IMU
+        29,  # SCALED_PRESSURE
+        m.Attitude.id,
+        31,  # ATTITUDE_QUATERNION
+        m.LocalPositionNed.id,
+        m.GlobalPositionInt.id,
+        35,  # RC_CHANNELS_RAW
+        36,  # SERVO_OUTPUT_RAW
+        m.MissionCurrent.id,
+        62,  # NAV_CONTROLLER_OUTPUT
+        65,  # RC_CHANNELS
+        m.VfrHud.id,
+        m.PositionTargetLocalNed.id,
+        m.PositionTargetGlobalInt.id,
+        105,  # HIGHRES_IMU
+        116,  # SCALED_IMU2
+        129,  # SCALED_IMU3
+        132,  # DISTANCE_SENSOR
+        141,  # ALTITUDE
+        m.BatteryStatus.id,
+        230,  # ESTIMATOR_STATUS
+        241,  # VIBRATION
+        331,  # ODOMETRY
+    }
+)
+
+STOPPED = -1  # SET_MESSAGE_INTERVAL param2: send no more
+DEFAULT = 0  # SET_MESSAGE_INTERVAL param2: back to the default rate
+SLACK = 0.7  # of an interval: the jitter of a stream must not halve its rate
+
+
+class Thinner:
+    """Which of a vehicle's streamed messages one client gets."""
+
+    def __init__(self, *, default_interval: float) -> None:
+        self._default = default_interval
+        self._intervals: dict[tuple[int, int], float | None] = {}
+        self._last: dict[tuple[int, int, int], float] = {}
+
+    def set_interval(self, system_id: int, message_id: int, interval_us: float) -> None:
+        """Take a client's wish: microseconds, STOPPED or DEFAULT."""
+        key = (system_id, message_id)
+        if interval_us == DEFAULT:
+            self._intervals.pop(key, None)
+        elif interval_us < 0:
+            self._intervals[key] = None
+        else:
+            self._intervals[key] = interval_us / 1e6
+
+    def interval_us(self, system_id: int, message_id: int) -> int:
+        """Give the interval in force, in microseconds; STOPPED if none."""
+        interval = self._intervals.get((system_id, message_id), self._default)
+        return STOPPED if interval is None else round(interval * 1e6)
+
+    def wishes(self, system_id: int) -> dict[int, float]:
+        """Give the intervals, in seconds by message id, that the client asked for."""
+        return {
+            message_id: interval
+            for (system, message_id), interval in self._intervals.items()
+            if system == system_id and interval is not None
+        }
+
+    def passes(self, system_id: int, component_id: int, message_id: int, *, now: float) -> bool:
+        """Whether a message that just came is sent on to the client."""
+        if message_id not in STREAMED:
+            return True
+        interval = self._intervals.get((system_id, message_id), self._default)
+        if interval is None:
+            return False
+        key = (system_id, component_id, message_id)
+        last = self._last.get(key)
+        if last is not None and now - last < SLACK * interval:
+            return False
+        # keeping to the rhythm of the interval makes the long-run rate right in spite of SLACK
+        self._last[key] = now if last is None else max(last + interval, now - interval)
+        return True

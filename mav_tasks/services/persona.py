@@ -1,0 +1,49 @@
+"""How an autopilot wants to be spoken to: modes, setpoint masks. Recognised from its HEARTBEAT."""
+
+from dataclasses import dataclass
+
+from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, PositionTargetTypemask
+from mav_tasks.mavlink.messages import Heartbeat
+
+T = PositionTargetTypemask
+
+
+@dataclass(frozen=True, slots=True)
+class Persona:
+    """The conventions of one family of autopilots."""
+
+    name: str
+    control_mode: int  # custom_mode in which setpoints are followed
+    hold_mode: int  # custom_mode in which the vehicle stands
+    manual_mode: int
+    booting_mode: int  # left without anybody's doing
+    setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
+    setpoint_frame: int  # MAV_FRAME of our velocity setpoints
+
+
+#: ArduPilot Rover. With the yaw rate unmasked it turns on the spot, and vx < 0 reverses; a pure
+#: velocity would turn the vehicle round instead (observed on 4.6.3). Mask 0x05C7.
+ARDUPILOT = Persona(
+    name="ardupilot",
+    control_mode=15,  # GUIDED
+    hold_mode=4,
+    manual_mode=0,
+    booting_mode=16,  # INITIALISING
+    setpoint_mask=int(
+        T.X_IGNORE
+        | T.Y_IGNORE
+        | T.Z_IGNORE
+        | T.AX_IGNORE
+        | T.AY_IGNORE
+        | T.AZ_IGNORE
+        | T.YAW_IGNORE
+    ),
+    setpoint_frame=MavFrame.BODY_NED,
+)
+
+
+def persona_of(heartbeat: Heartbeat) -> Persona | None:
+    """Give the persona that a vehicle's heartbeat shows, or None if it is none that we drive."""
+    if heartbeat.autopilot == MavAutopilot.ARDUPILOTMEGA:
+        return ARDUPILOT
+    return None

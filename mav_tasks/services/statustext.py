@@ -1,0 +1,44 @@
+"""STATUSTEXT for people at ground stations. MAVLink common: STATUSTEXT, chunked by id."""
+
+from collections.abc import Iterator
+
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.messages import Statustext
+
+CHUNK = 50  # bytes of text a message
+BURST = 10  # texts, before the rate counts
+
+
+def chunks(severity: MavSeverity, text: str, *, text_id: int) -> Iterator[Statustext]:
+    """Give the messages that carry a text of any length.
+
+    ``text_id`` 1–65535 ties the chunks of a long text together; a short one is sent with id 0. A
+    tab at the end is cut: QGroundControl drops such texts of a PX4 vehicle.
+    """
+    data = text.rstrip().encode("ascii", errors="replace")
+    if len(data) <= CHUNK:
+        yield Statustext(severity, data)
+        return
+    for number, start in enumerate(range(0, len(data), CHUNK)):
+        yield Statustext(severity, data[start : start + CHUNK], text_id, number)
+    if len(data) % CHUNK == 0:  # a text ends with a chunk that is not full
+        yield Statustext(severity, b"", text_id, len(data) // CHUNK)
+
+
+class RateLimit:
+    """A token bucket: ``rate`` a second in the long run, ``burst`` at once."""
+
+    def __init__(self, *, rate: float, burst: float, now: float) -> None:
+        self._rate = rate
+        self._burst = burst
+        self._tokens = burst
+        self._at = now
+
+    def take(self, *, now: float) -> bool:
+        """Whether one more may pass now."""
+        self._tokens = min(self._burst, self._tokens + self._rate * (now - self._at))
+        self._at = now
+        if self._tokens < 1.0:
+            return False
+        self._tokens -= 1.0
+        return True

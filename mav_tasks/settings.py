@@ -1,0 +1,87 @@
+"""Every setting of the server, as frozen values with unit, default and effect. Pure."""
+
+from dataclasses import dataclass, field
+from math import radians
+
+#: who may arm a vehicle
+ARMING = ("auto", "server", "operator")
+
+
+@dataclass(frozen=True, slots=True)
+class Driving:
+    """How tasks are driven."""
+
+    speed: float = 0.5  # m/s, of a move that names none
+    max_speed: float = 2.0  # m/s, a faster wish is refused
+    turn_rate: float = radians(40)  # rad/s, of a rotation that names none
+    max_turn_rate: float = radians(90)  # rad/s, a faster wish is refused
+    max_distance: float = 10_000.0  # m, a longer move is refused
+    max_turn: float = radians(3600)  # rad, a longer rotation is refused
+    acceleration: float = 0.5  # m/s², of the setpoints; also the deceleration planned for
+    turn_acceleration: float = radians(90)  # rad/s², the same for turning
+    arrival_distance: float = 0.01  # m, a move is done within this of its end
+    arrival_angle: float = radians(0.5)  # rad, a rotation is done within this of its end
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """How long the server waits, and when it stops trusting; seconds unless said otherwise."""
+
+    setpoint_period: float = 0.05  # 20 Hz
+    motion_fresh: float = 0.3  # no motion on data older than this
+    position_lost: float = 1.0  # older data than this pauses the task, POSITION_LOST
+    heartbeat_lost: float = 3.0  # MAVLink guide, "Heartbeat": silent after some missed beats
+    late_tick: float = 0.5  # a setpoint tick later than this holds the task, LATE
+    start_timeout: float = 5.0  # from STARTING to in control
+    ask_vehicle: float = 1.0  # arm and mode requests are repeated for at most this long
+    lost_timeout: float = 30.0  # paused LINK_LOST or POSITION_LOST for longer than this fails
+    fresh_before_resume: float = 2.0  # of good data, before a lost task resumes by itself
+    stuck: float = 10.0  # commanded without progress for this long fails, STUCK
+    other_controller: float = 2.0  # since the last setpoint of somebody else
+    commit: float = 0.4  # a submission not durable by then is withdrawn
+    forward_answer: float = 0.4  # a forwarded command not answered by then is refused
+    shutdown: float = 0.8  # to stop the vehicles in an orderly end
+    still_speed: float = 0.03  # m/s, measured, below which a vehicle stands
+    still_turn_rate: float = radians(2)  # rad/s, the same
+    still_time: float = 0.3  # below both for this long: stands still
+
+
+@dataclass(frozen=True, slots=True)
+class Queueing:
+    """Bounds on what may wait."""
+
+    capacity: int = 1000  # waiting tasks for each vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Clients:
+    """What clients are served."""
+
+    max_clients: int = 64  # endpoints remembered on all client links; beyond: the longest silent
+    forget_after: float = 60.0  # s, a client silent for longer is forgotten
+    stream_interval: float = 0.1  # s, between telemetry messages of one id, unless asked otherwise
+    text_rate: float = 10.0  # STATUSTEXT per second to one client; beyond that they are dropped
+    status_rate: float = 50.0  # pushed TASK_STATUS per second to one client; beyond: coalesced
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """MAVLink addresses of the server."""
+
+    system_id: int = 250  # on vehicle links
+    component_id: int = 191  # on vehicle links, and inside each vehicle's system towards clients
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """All settings of one server."""
+
+    identity: Identity = field(default_factory=Identity)
+    driving: Driving = field(default_factory=Driving)
+    watch: Watch = field(default_factory=Watch)
+    queueing: Queueing = field(default_factory=Queueing)
+    clients: Clients = field(default_factory=Clients)
+    #: who arms: "server", "operator", or "auto" = server where the vehicle link is loopback
+    arming: str = "auto"
+    #: after a failed task that had moved: "pause" the queue or "continue"
+    on_failure: str = "pause"

@@ -1,0 +1,1 @@
+"""The task domain: goals, states, order, guidance. Pure; it knows nothing of MAVLink."""

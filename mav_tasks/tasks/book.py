@@ -1,0 +1,133 @@
+"""Every task of the server as its events have left it, and the events not yet taken.
+
+All state changes of tasks go through here, so that the journal and the tasks cannot disagree.
+Events are numbered from 1; the store reports back up to which number they are durable.
+"""
+
+from collections import deque
+from dataclasses import replace
+
+from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted, TaskWithdrawn
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
+from mav_tasks.tasks.task import Draft, Progress, Task, TaskId
+
+KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
+
+
+class TaskBook:
+    """Tasks by id, and the numbered journal of what happens to them."""
+
+    def __init__(self, *, next_id: int = 1) -> None:
+        self._next_id = next_id
+        self._tasks: dict[TaskId, Task] = {}
+        self._last_event: dict[TaskId, int] = {}
+        self._finished: deque[TaskId] = deque()
+        self._events: list[Event] = []
+        self.recorded = 0  # number of the last event recorded
+        self.durable = 0  # number of the last event known to be durable
+
+    def __repr__(self) -> str:
+        return f"TaskBook({len(self._tasks)} tasks, event {self.recorded}, durable {self.durable})"
+
+    def __getitem__(self, task_id: TaskId) -> Task:
+        return self._tasks[task_id]
+
+    def get(self, task_id: int) -> Task | None:
+        """Give a task, or None if there is none of that id (any more)."""
+        return self._tasks.get(TaskId(task_id))
+
+    def all(self) -> tuple[Task, ...]:
+        """Give every task that is kept, oldest first."""
+        return tuple(self._tasks.values())
+
+    def of_vehicle(self, vehicle: int) -> list[Task]:
+        """Give the tasks of one vehicle, oldest first."""
+        return [task for task in self._tasks.values() if task.vehicle == vehicle]
+
+    def submit(self, draft: Draft, *, now: float) -> Task:
+        """Turn a draft into a queued task with an id never used before."""
+        task = Task(
+            id=TaskId(self._next_id),
+            vehicle=draft.vehicle,
+            command=draft.command,
+            goal=draft.goal,
+            priority=draft.priority,
+            submitter=draft.submitter,
+            nonce=draft.nonce,
+            submitted_at=now,
+        )
+        self._next_id += 1
+        self._tasks[task.id] = task
+        self.record(TaskSubmitted(task, now))
+        self._last_event[task.id] = self.recorded
+        return task
+
+    def change(
+        self,
+        task_id: TaskId,
+        new: TaskState,
+        *,
+        reason: TaskReason,
+        actor: str,
+        now: float,
+        progress: Progress | None = None,
+    ) -> Task:
+        """Move a task along an edge of the lifecycle table; IllegalTransition if it has none."""
+        old = self._tasks[task_id]
+        check_transition(old.state, new)
+        task = replace(
+            old,
+            state=new,
+            reason=reason,
+            version=old.version + 1,
+            progress=old.progress if progress is None else progress,
+        )
+        self._tasks[task_id] = task
+        self.record(
+            TaskChanged(
+                task_id=task_id,
+                vehicle=task.vehicle,
+                version=task.version,
+                old=old.state,
+                new=new,
+                reason=reason,
+                actor=actor,
+                at=now,
+                progress=task.progress,
+            )
+        )
+        self._last_event[task_id] = self.recorded
+        if new in TERMINAL:
+            self._finish(task_id)
+        return task
+
+    def note_progress(self, task_id: TaskId, progress: Progress) -> None:
+        """Keep live progress, for status only: no event, no new version."""
+        self._tasks[task_id] = replace(self._tasks[task_id], progress=progress)
+
+    def withdraw(self, task_id: TaskId, *, now: float) -> None:
+        """Take back a submission that did not become durable in time."""
+        task = self._tasks.pop(task_id)
+        del self._last_event[task_id]
+        self.record(TaskWithdrawn(task_id, task.vehicle, now))
+
+    def record(self, event: Event) -> None:
+        """Append an event to the journal."""
+        self.recorded += 1
+        self._events.append(event)
+
+    def is_durable(self, task_id: TaskId) -> bool:
+        """Whether all that happened to the task so far is on the disk."""
+        return self._last_event[task_id] <= self.durable
+
+    def take_events(self) -> list[Event]:
+        """Give the events since the last call, in order of their numbers."""
+        events, self._events = self._events, []
+        return events
+
+    def _finish(self, task_id: TaskId) -> None:
+        self._finished.append(task_id)
+        if len(self._finished) > KEPT_FINISHED:
+            oldest = self._finished.popleft()
+            del self._tasks[oldest]
+            del self._last_event[oldest]

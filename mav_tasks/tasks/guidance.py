@@ -1,0 +1,138 @@
+"""(goal, where the vehicle is) → the velocity to ask for, or arrival. Closed loop, no memory.
+
+Measured pose in, body velocity out; nothing is integrated, so that a lost setpoint, a pause or a
+pre-emption leaves no error behind. ``limits`` has the last word on what comes out.
+"""
+
+from dataclasses import dataclass
+from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.task import Goal, Move, Pose, Rotate
+
+APPROACH_GAIN = 1.2  # 1/s, of the last centimetres: speed = gain * remaining
+CREEP_SPEED = 0.02  # m/s, the least that a skid-steered vehicle still moves at
+TURN_GAIN = 1.6  # 1/s, the same for turning
+CREEP_RATE = 0.03  # rad/s
+HEADING_GAIN = 1.5  # 1/s, heading error -> turn rate while moving
+CROSS_TRACK_GAIN = 1.2  # 1/m, sideways error -> approach angle
+MAX_APPROACH_ANGLE = pi / 6  # rad, towards the line
+MAX_STEER_RATE = 0.5  # rad/s, of corrections while moving
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What the vehicle measures of itself, and when (monotonic seconds).
+
+    ``forward`` and ``sideways`` in m/s along and across the body, ``yaw_rate`` in rad/s.
+    ``at`` is the older of the times of position and attitude.
+    """
+
+    pose: Pose
+    forward: float
+    sideways: float
+    yaw_rate: float
+    at: float
+
+    @property
+    def speed(self) -> float:
+        """Speed over ground, m/s."""
+        return hypot(self.forward, self.sideways)
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity:
+    """A setpoint in the body frame: m/s forward, rad/s clockwise."""
+
+    forward: float
+    yaw_rate: float
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether this asks to stand still."""
+        return self.forward == 0.0 and self.yaw_rate == 0.0
+
+
+ZERO = Velocity(0.0, 0.0)
+
+
+def wrap(angle: float) -> float:
+    """Give the same direction within ±pi."""
+    return atan2(sin(angle), cos(angle))
+
+
+def done_so_far(goal: Goal, anchor: Pose, pose: Pose, *, before: float) -> float:
+    """Give the metres along the line, or the radians turned, from the anchor towards the goal.
+
+    ``before`` is the last such value: of the turns that fit a measured heading, the nearest to it
+    is meant, which holds as long as the vehicle is seen at least twice in half a turn. Negative
+    when the vehicle is behind its anchor.
+    """
+    match goal:
+        case Move(distance=distance):
+            along = (pose.north - anchor.north) * cos(anchor.yaw) + (pose.east - anchor.east) * sin(
+                anchor.yaw
+            )
+            return copysign(1.0, distance) * along
+        case Rotate(angle=angle):
+            turned = copysign(1.0, angle) * (pose.yaw - anchor.yaw)
+            return before + wrap(turned - before)
+
+
+def cross_track(anchor: Pose, pose: Pose) -> float:
+    """Give the metres to the right of the line from the anchor along its yaw."""
+    return (pose.east - anchor.east) * cos(anchor.yaw) - (pose.north - anchor.north) * sin(
+        anchor.yaw
+    )
+
+
+def has_arrived(goal: Goal, remaining: float, *, driving: Driving) -> bool:
+    """Whether the measured place is the goal's end, within tolerance."""
+    match goal:
+        case Move():
+            return abs(remaining) <= driving.arrival_distance
+        case Rotate():
+            return abs(remaining) <= driving.arrival_angle
+
+
+def steer(goal: Goal, anchor: Pose, pose: Pose, *, remaining: float, driving: Driving) -> Velocity:
+    """Give the velocity that brings the vehicle nearer to the goal's end.
+
+    ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
+    """
+    match goal:
+        case Move(distance=distance, speed=speed):
+            towards_end = _approach(
+                remaining,
+                top=speed or driving.speed,
+                braking=driving.acceleration,
+                gain=APPROACH_GAIN,
+                creep=CREEP_SPEED,
+            )
+            forward = copysign(towards_end, distance * remaining)
+            return Velocity(forward, _steer_to_line(anchor, pose, forward=forward))
+        case Rotate(angle=angle, rate=rate):
+            towards_end = _approach(
+                remaining,
+                top=rate or driving.turn_rate,
+                braking=driving.turn_acceleration,
+                gain=TURN_GAIN,
+                creep=CREEP_RATE,
+            )
+            return Velocity(0.0, copysign(towards_end, angle * remaining))
+
+
+def _approach(remaining: float, *, top: float, braking: float, gain: float, creep: float) -> float:
+    """Give the speed at a distance: as fast as one may and can still brake, then gently."""
+    left = abs(remaining)
+    return max(creep, min(top, gain * left, sqrt(2 * 0.5 * braking * left)))
+
+
+def _steer_to_line(anchor: Pose, pose: Pose, *, forward: float) -> float:
+    """Turn rate that holds the line: point at it, less so the slower the vehicle goes."""
+    ahead = copysign(1.0, forward)
+    speed_share = min(1.0, abs(forward) / 0.2)  # below 0.2 m/s only the heading counts
+    approach = atan(CROSS_TRACK_GAIN * cross_track(anchor, pose)) * speed_share
+    approach = max(-MAX_APPROACH_ANGLE, min(MAX_APPROACH_ANGLE, approach))
+    heading_error = wrap(anchor.yaw - ahead * approach - pose.yaw)
+    return max(-MAX_STEER_RATE, min(MAX_STEER_RATE, HEADING_GAIN * heading_error))

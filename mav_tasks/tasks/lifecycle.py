@@ -1,0 +1,178 @@
+"""The states of a task and every move between them, as one table.
+
+A move that is not in TRANSITIONS is our own mistake and raises. States in TERMINAL are over for
+good. ``tools/state_diagram.py`` draws the README's picture from this table. Numbers are those of
+the dialect's TASK_STATE and TASK_REASON.
+"""
+
+from enum import IntEnum
+
+from mav_tasks.errors import IllegalTransition
+
+
+class TaskState(IntEnum):
+    """Where a task is in its life."""
+
+    #: asked about, but not known here
+    UNKNOWN = 0
+    #: start time not reached
+    SCHEDULED = 1
+    #: waits for another task, or for a start command
+    BLOCKED = 2
+    #: ready; waits for its turn and for the vehicle
+    QUEUED = 3
+    #: taking control of the vehicle: mode, zero setpoint, arm; nothing moves
+    STARTING = 4
+    #: the only state in which the vehicle is driven
+    EXECUTING = 5
+    #: interrupted with its exact remainder; resumes through STARTING
+    PAUSED = 6
+    #: zero velocity is out, standstill not yet measured
+    CANCELLING = 7
+    #: somebody must decide what becomes of it; blocks its vehicle's queue
+    HELD = 8
+    COMPLETED = 9
+    FAILED = 10
+    CANCELLED = 11
+    #: ended by STOP or by a kill
+    KILLED = 12
+    #: its deadline passed before it began
+    EXPIRED = 13
+
+
+class TaskReason(IntEnum):
+    """Why a task waits, is interrupted, ended, or was refused."""
+
+    NONE = 0
+    # waiting
+    START_TIME = 1
+    DEPENDENCY = 2
+    BEHIND_OTHERS = 3
+    QUEUE_PAUSED = 4
+    WAITING_FOR_START = 5
+    DISARMED = 6
+    WRONG_MODE = 7
+    NO_POSITION = 8
+    VEHICLE_SILENT = 9
+    OTHER_CONTROLLER = 10
+    HELD_AHEAD = 11
+    RESTARTED = 12
+    # paused
+    OPERATOR = 30
+    PREEMPTED = 31
+    TAKEOVER = 32
+    LINK_LOST = 33
+    POSITION_LOST = 34
+    STOPPED = 35
+    # held
+    OUTCOME_UNKNOWN = 50
+    FENCE = 51
+    LATE = 52
+    OFF_LINE = 53
+    FRAME_RESET = 54
+    STOP_UNCONFIRMED = 55
+    # ended
+    STUCK = 70
+    ARM_REFUSED = 71
+    MODE_REFUSED = 72
+    START_TIMEOUT = 73
+    LINK_TIMEOUT = 74
+    DEPENDENCY_FAILED = 75
+    DEADLINE = 76
+    CANCELLED = 77
+    CLEARED = 78
+    REPLACED = 79
+    STOP = 80
+    SKIPPED = 81
+    # refused
+    QUEUE_FULL = 100
+    QUOTA = 101
+    STORE_UNAVAILABLE = 102
+    BAD_PARAMETER = 103
+    BAD_FRAME = 104
+    OUTSIDE_FENCE = 105
+    NOT_SUPPORTED_BY_VEHICLE = 106
+    NOT_FOUND = 107
+    NOT_ALLOWED = 108
+    UNKNOWN_DEPENDENCY = 109
+    CYCLE = 110
+    NONCE_REUSED = 111
+    WRONG_STATE = 112
+    RATE_LIMITED = 113
+
+
+_S = TaskState
+
+#: from -> to -> who moves the task along this edge, and why
+TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
+    _S.SCHEDULED: {
+        _S.BLOCKED: "start time reached, waits for a task",
+        _S.QUEUED: "start time reached",
+        _S.CANCELLED: "client",
+        _S.EXPIRED: "deadline",
+        _S.FAILED: "dependency failed",
+        _S.KILLED: "kill",
+    },
+    _S.BLOCKED: {
+        _S.QUEUED: "dependency done, or start command",
+        _S.CANCELLED: "client",
+        _S.EXPIRED: "deadline",
+        _S.FAILED: "dependency failed",
+        _S.KILLED: "kill",
+    },
+    _S.QUEUED: {
+        _S.STARTING: "its turn",
+        _S.CANCELLED: "client",
+        _S.EXPIRED: "deadline",
+        _S.FAILED: "dependency failed",
+        _S.KILLED: "kill",
+    },
+    _S.STARTING: {
+        _S.EXECUTING: "in our mode and seen armed",
+        _S.PAUSED: "operator, takeover, link or position lost",
+        _S.CANCELLING: "client",
+        _S.FAILED: "mode or arm refused",
+        _S.HELD: "needs a decision",
+        _S.KILLED: "STOP or kill",
+    },
+    _S.EXECUTING: {
+        _S.COMPLETED: "arrived and standing still",
+        _S.PAUSED: "operator, pre-empted, takeover, link or position lost",
+        _S.CANCELLING: "client",
+        _S.FAILED: "stuck",
+        _S.HELD: "late, off its line, frame reset",
+        _S.KILLED: "STOP or kill",
+    },
+    _S.PAUSED: {
+        _S.STARTING: "continued",
+        _S.CANCELLING: "client",
+        _S.FAILED: "time-out",
+        _S.HELD: "off its line, frame reset",
+        _S.KILLED: "STOP or kill",
+    },
+    _S.CANCELLING: {
+        _S.CANCELLED: "standing still",
+        _S.HELD: "standstill not confirmed",
+        _S.KILLED: "STOP or kill",
+    },
+    _S.HELD: {
+        _S.STARTING: "released",
+        _S.CANCELLED: "skipped",
+        _S.KILLED: "STOP or kill",
+    },
+}
+
+#: a task begins its life in one of these
+INITIAL = frozenset({_S.SCHEDULED, _S.BLOCKED, _S.QUEUED})
+#: over for good; never changes again
+TERMINAL = frozenset({_S.COMPLETED, _S.FAILED, _S.CANCELLED, _S.KILLED, _S.EXPIRED})
+#: not begun
+WAITING = INITIAL
+#: begun and not over: at most one such task a vehicle, except for those pre-empted
+ACTIVE = frozenset({_S.STARTING, _S.EXECUTING, _S.PAUSED, _S.CANCELLING, _S.HELD})
+
+
+def check_transition(old: TaskState, new: TaskState) -> None:
+    """Raise IllegalTransition unless the table has the edge ``old`` → ``new``."""
+    if new not in TRANSITIONS.get(old, {}):
+        raise IllegalTransition(f"no transition {old.name} -> {new.name}")

@@ -1,0 +1,65 @@
+"""What the task domain sees of a vehicle, and what it asks of it. No MAVLink in either."""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
+from mav_tasks.tasks.lifecycle import TaskReason
+
+
+class ModeKind(Enum):
+    """A vehicle's mode, by what it means for taking control."""
+
+    #: takes our setpoints, and it was us (or a client through us) who set it
+    OURS = auto()
+    #: stands and waits
+    HOLD = auto()
+    #: a person drives
+    MANUAL = auto()
+    #: anything else: its own mission, return, or a mode that somebody else set
+    OTHER = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleView:
+    """One look at a vehicle."""
+
+    heard: bool  # heartbeats are coming
+    mode: ModeKind
+    armed: bool
+    may_arm: bool  # by setting, and not withdrawn by a disarm or mode change not ours
+    in_control: bool  # in our mode, seen armed, zero setpoint sent
+    refusal: TaskReason  # why control could not be taken, or NONE
+    motion: Motion | None  # the last measured, however old
+    still: bool  # measured to stand still
+    other_controller: bool  # somebody else's setpoints were seen just now
+
+
+class DemandKind(Enum):
+    """What a vehicle must be made to do now."""
+
+    #: get into control without moving
+    TAKE = auto()
+    #: this velocity (zero included)
+    DRIVE = auto()
+    #: zeros until it stands, then the mode HOLD, then silence
+    HOLD = auto()
+    #: as HOLD, and disarm it if it was us who armed it
+    HAND_BACK = auto()
+    #: zeros and the mode HOLD at once, both until confirmed
+    STOP = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """A demand; the velocity is meant for DRIVE only."""
+
+    kind: DemandKind
+    velocity: Velocity = ZERO
+
+
+STAND = Demand(DemandKind.DRIVE, ZERO)
+TAKE = Demand(DemandKind.TAKE)
+HOLD = Demand(DemandKind.HOLD)
+HAND_BACK = Demand(DemandKind.HAND_BACK)
+STOP = Demand(DemandKind.STOP)
