@@ -1,0 +1,216 @@
+"""``python -m rover_sim``: simulated rovers on one UDP socket, in real time or faster.
+
+The command line, the socket and the signals; the loop is in ``real_time``.
+"""
+
+import argparse
+import signal
+import socket
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from ipaddress import ip_address
+from pathlib import Path
+from typing import TextIO
+
+from rover_sim.body import Body, Pose
+from rover_sim.bullet import BulletBody
+from rover_sim.errors import MissingExtra, SimulatedCrash
+from rover_sim.kinematic import KinematicBody
+from rover_sim.real_time import Clock, drive
+from rover_sim.vehicle import make_vehicle
+
+DEFAULT_PORT = 14580
+SPACING = 3.0  # m between rovers, side by side
+KINEMATIC_SLIP = 0.3  # as the pybullet rover's
+TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
+USAGE_ERROR = 2  # exit status, as argparse's own
+ABORTED = 134  # as a shell reports SIGABRT, which is how a SITL goes
+
+
+class StartError(Exception):
+    """The simulator cannot start; the message is one line for the user."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """The command line, read."""
+
+    host: str
+    port: int
+    insecure: bool
+    count: int
+    body: str  # "bullet" or "kinematic"
+    system_id: int  # of the first rover
+    seed: int | None
+    friction: float
+    variation: float
+    gui: bool
+    speed: float  # simulated seconds per second
+    truth: str | None  # file name
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run until SIGINT or SIGTERM; give the exit status."""
+    options = read_options(arguments)
+    try:
+        with ExitStack() as stack:
+            run(options, stack)
+    except (StartError, MissingExtra) as error:
+        sys.stderr.write(f"rover_sim: {error}\n")
+        return USAGE_ERROR
+    except SimulatedCrash as error:
+        sys.stderr.write(f"rover_sim: aborted as the real one: {error}\n")
+        return ABORTED
+    return 0
+
+
+def read_options(arguments: Sequence[str] | None) -> Options:
+    """Read the command line; ends the process with status 2 on a bad one."""
+    parser = argparse.ArgumentParser(
+        prog="rover_sim", description="Simulated rovers that speak MAVLink over UDP."
+    )
+    add = parser.add_argument
+    add("--host", default="127.0.0.1", help="address to listen on (default %(default)s)")
+    add("--port", type=int, default=DEFAULT_PORT, help="0 for any (default %(default)s)")
+    add("--insecure", action="store_true", help="allow an address other than loopback")
+    add("--count", type=int, default=1, help="number of rovers, with ids in a row")
+    add("--system-id", type=int, default=1, help="MAVLink system id of the first rover")
+    bodies = ("auto", "bullet", "kinematic")
+    add("--body", choices=bodies, default="auto", help="physics; auto is bullet")
+    add("--seed", type=int, help="draw each rover's differences from this number")
+    add("--friction", type=float, default=0.8, help="tyres on ground (default %(default)s)")
+    add("--friction-variation", type=float, default=0.0, help="0.3 for 30 %% (needs --seed)")
+    add("--gui", action="store_true", help="open pybullet's window, of the first rover")
+    add("--speed", default="real", help="'real', or simulated seconds per second")
+    add("--truth", metavar="FILE", help="append the true poses at 10 Hz as CSV")
+    values = parser.parse_args(arguments)
+    if values.count < 1 or not 1 <= values.system_id <= 256 - values.count:
+        parser.error("system ids must lie within 1..255")
+    if not 0 <= values.port <= 65535:
+        parser.error("--port must lie within 0..65535")
+    try:
+        speed = 1.0 if values.speed == "real" else float(values.speed)
+    except ValueError:
+        speed = 0.0
+    if not 0.0 < speed <= 1000.0:
+        parser.error("--speed must be 'real' or a number above 0, at most 1000")
+    return Options(
+        host=values.host,
+        port=values.port,
+        insecure=values.insecure,
+        count=values.count,
+        body="bullet" if values.body == "auto" else values.body,
+        system_id=values.system_id,
+        seed=values.seed,
+        friction=values.friction,
+        variation=values.friction_variation,
+        gui=values.gui,
+        speed=speed,
+        truth=values.truth,
+    )
+
+
+def run(options: Options, stack: ExitStack) -> None:
+    """Set everything up, then drive the rovers until a signal."""
+    stop = _stop_signals(stack)
+    server = _open_socket(options, stack)
+    truth = _open_truth(options, stack)
+    clock = Clock(options.speed)
+    bodies = [_make_body(options, index, stack) for index in range(options.count)]
+    now = clock.now()  # one for all: they then wake up together
+    vehicles = [
+        make_vehicle(
+            body,
+            system_id=options.system_id + index,
+            now=now,
+            unix_offset=time.time() - now,
+        )
+        for index, body in enumerate(bodies)
+    ]
+    host, port = server.getsockname()[:2]
+    for vehicle in vehicles:
+        number = vehicle.autopilot.address.system_id
+        where = f"udp {host}:{port}"
+        sys.stdout.write(f"rover_sim: rover {number} (ardupilot, {options.body}) on {where}\n")
+    sys.stdout.flush()
+    drive(server, stop, vehicles, clock, truth)
+
+
+def _stop_signals(stack: ExitStack) -> socket.socket:
+    """Give a socket that turns readable on SIGINT and SIGTERM."""
+    stop, wake = socket.socketpair()
+    stack.enter_context(stop)
+    stack.enter_context(wake)
+    wake.setblocking(False)
+
+    def wake_up(_number: int, _frame: object) -> None:
+        try:
+            wake.send(b"\0")
+        except BlockingIOError:  # already woken, many times over
+            return
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        stack.callback(signal.signal, number, signal.signal(number, wake_up))
+    return stop
+
+
+def _open_socket(options: Options, stack: ExitStack) -> socket.socket:
+    try:
+        address = ip_address("127.0.0.1" if options.host == "localhost" else options.host)
+    except ValueError as error:
+        raise StartError(f"not an IP address: {options.host}") from error
+    if not address.is_loopback and not options.insecure:
+        raise StartError(
+            f"{address} is not a loopback address and MAVLink here is not signed:"
+            " say --insecure if you mean it"
+        )
+    family = socket.AF_INET if address.version == 4 else socket.AF_INET6
+    server = stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))
+    server.setblocking(False)
+    try:
+        server.bind((str(address), options.port))
+    except OSError as error:
+        raise StartError(f"udp {address}:{options.port}: {error.strerror}") from error
+    return server
+
+
+def _open_truth(options: Options, stack: ExitStack) -> TextIO | None:
+    if options.truth is None:
+        return None
+    try:
+        truth = stack.enter_context(Path(options.truth).open("a", encoding="ascii"))  # noqa: SIM115
+    except OSError as error:
+        raise StartError(f"{options.truth}: {error.strerror}") from error
+    if truth.tell() == 0:
+        truth.write(TRUTH_HEADER)
+    return truth
+
+
+def _make_body(options: Options, index: int, stack: ExitStack) -> Body:
+    body = _new_body(options, index)
+    stack.callback(body.close)
+    return body
+
+
+def _new_body(options: Options, index: int) -> Body:
+    start = Pose(east=SPACING * index)
+    seed = None if options.seed is None else options.seed + index
+    if options.body == "kinematic":
+        return KinematicBody(start=start, slip=KINEMATIC_SLIP, seed=seed)
+    try:
+        return BulletBody(
+            start=start,
+            friction=options.friction,
+            variation=options.variation,
+            seed=seed,
+            gui=options.gui and index == 0,
+        )
+    except MissingExtra as error:
+        raise MissingExtra(f"{error}; or run with --body kinematic") from error
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,230 @@
+"""The simulated flight stack: messages in, messages and wheel demands out. Pure, no clock, no I/O.
+
+It behaves as ArduPilot Rover 4.6.3 was observed to. This file joins the parts and directs each
+message to one of them; the rules are in the parts.
+"""
+
+from collections.abc import Mapping
+
+from mav_tasks.mavlink import messages
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
+from mav_tasks.mavlink.messages import Message
+from rover_sim.body import BodyState
+from rover_sim.commands import CommandReceiver
+from rover_sim.dispatch import Handler
+from rover_sim.estimate import Estimate, estimate_from
+from rover_sim.faults import NO_FAULTS, Faults
+from rover_sim.file_transfer import refusal_of
+from rover_sim.flight import FlightControl
+from rover_sim.geo import Origin
+from rover_sim.guided import Guided
+from rover_sim.mission_storage import MissionStorage
+from rover_sim.motion import MotionControl
+from rover_sim.outbox import Outbox
+from rover_sim.parameters import Parameters
+from rover_sim.personas import Mode, Persona
+from rover_sim.setpoints import Destination
+from rover_sim.streams import Streams
+from rover_sim.telemetry import Telemetry
+
+REBOOT_TIME = 1.0  # s in which a restarting autopilot neither hears nor says anything
+
+
+class Autopilot:
+    """One rover's autopilot, address (system_id, 1).
+
+    ``handle`` a message when it comes, ``step`` once per control period, ``take_messages`` after
+    either. ``unix_offset`` is Unix time minus ``now``; 0 for none (SYSTEM_TIME then says unknown).
+    """
+
+    def __init__(
+        self,
+        *,
+        system_id: int,
+        persona: Persona,
+        origin: Origin,
+        unix_offset: float,
+        truth: BodyState,
+        now: float,
+    ) -> None:
+        self.address = Address(system_id, AUTOPILOT)
+        self._persona = persona
+        self._origin = origin
+        self._unix_offset = unix_offset
+        self._outbox = Outbox()
+        self._parameters = Parameters(persona.parameters, self._outbox)
+        self._parameters["SYSID_THISMAV"] = system_id
+        self._missions = MissionStorage(origin=origin, outbox=self._outbox)
+        self._estimate: Estimate = estimate_from(truth, NO_FAULTS, None)
+        self._faults = NO_FAULTS
+        self._start(now)
+
+    def __repr__(self) -> str:
+        return f"Autopilot({self.address}, {self._flight!r})"
+
+    def handle(self, message: Message, sender: Address, *, now: float) -> None:
+        """Take one message; those addressed to other systems are passed over.
+
+        The target component is not looked at: the real one acts on any. Raises SimulatedCrash for
+        what makes the real one abort.
+        """
+        if self._faults.deaf or now < self._up_at:
+            return
+        if getattr(message, "target_system", BROADCAST) not in (BROADCAST, self.address.system_id):
+            return
+        if (handler := self._handlers.get(message.get_msgId())) is not None:
+            handler(message, sender, now)
+            self._announce(now)
+
+    def step(self, truth: BodyState, *, now: float) -> tuple[float, float]:
+        """Live through one control period; give forward speed and yaw rate for the wheels."""
+        self._estimate = estimate_from(truth, self._faults, self._estimate)
+        if now < self._up_at:
+            return 0.0, 0.0
+        demand = self._flight.demand(self._estimate, now=now)
+        self._missions.step(now=now)
+        self._announce(now)
+        for message_id in self._streams.take_due(now=now):
+            self._send(message_id, now)
+        return self._motion.step(demand, truth)
+
+    def take_messages(self) -> list[Message]:
+        """Hand over what there is to say, to everybody on the link."""
+        return self._outbox.take()
+
+    @property
+    def armed(self) -> bool:
+        """Whether the motors are live."""
+        return self._flight.armed
+
+    @property
+    def mode(self) -> Mode:
+        """The present mode."""
+        return self._flight.mode
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameters, to read or to set beforehand."""
+        return self._parameters
+
+    def set_faults(self, faults: Faults) -> None:
+        """Break something, or with ``Faults()`` mend it all."""
+        self._faults = self._outbox.faults = self._flight.faults = faults
+
+    def operator_mode(self, mode: Mode, *, now: float) -> None:
+        """Change the mode at the vehicle, as an RC switch would."""
+        self._flight.enter(mode)
+        self._announce(now)
+
+    def operator_arm(self, armed: bool, *, now: float) -> None:
+        """Arm or disarm at the vehicle."""
+        self._flight.set_armed(armed)
+        self._announce(now)
+
+    def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
+        """Hold the sticks so (m/s, rad/s); has an effect in MANUAL, until the mode changes."""
+        self._flight.set_sticks(forward_speed, yaw_rate)
+
+    def reboot(self, *, now: float) -> None:
+        """Restart: time and state begin anew; parameters and missions are kept."""
+        self._start(now + REBOOT_TIME)
+
+    def _start(self, up_at: float) -> None:
+        outbox, missions = self._outbox, self._missions
+        self._up_at = up_at
+        self._streams = Streams(now=up_at)
+        self._motion = MotionControl()
+        guided = Guided(origin=self._origin, parameters=self._parameters, outbox=outbox)
+        self._flight = FlightControl(
+            persona=self._persona,
+            parameters=self._parameters,
+            guided=guided,
+            missions=missions,
+            outbox=outbox,
+            home=Destination(self._estimate.north, self._estimate.east),
+            now=up_at,
+        )
+        self._flight.faults = self._faults
+        self._telemetry = Telemetry(
+            persona=self._persona,
+            system_id=self.address.system_id,
+            origin=self._origin,
+            flight=self._flight,
+            missions=missions,
+            unix_offset=self._unix_offset,
+            started=up_at,
+        )
+        self._commands = CommandReceiver(
+            persona=self._persona,
+            origin=self._origin,
+            flight=self._flight,
+            streams=self._streams,
+            outbox=outbox,
+            send_now=self._send,
+            reboot=lambda now: self.reboot(now=now),
+        )
+        self._handlers = self._make_handlers()
+
+    def _make_handlers(self) -> Mapping[int, Handler]:
+        return {
+            **self._missions.handlers,
+            **self._parameters.handlers,
+            **self._commands.handlers,
+            messages.Heartbeat.id: self._handle_heartbeat,
+            messages.SetPositionTargetLocalNed.id: self._handle_local_target,
+            messages.SetPositionTargetGlobalInt.id: self._handle_global_target,
+            messages.RequestDataStream.id: self._handle_request_data_stream,
+            messages.MissionSetCurrent.id: self._handle_mission_set_current,
+            messages.Timesync.id: self._handle_timesync,
+            messages.FileTransferProtocol.id: self._handle_file_transfer,
+        }
+
+    def _send(self, message_id: int, now: float) -> bool:
+        if not self._telemetry.knows(message_id):
+            return False
+        message = self._telemetry.build(message_id, self._estimate, now=now)
+        if message is not None:
+            self._outbox.send(message)
+        return True
+
+    def _announce(self, now: float) -> None:
+        """A heartbeat at once when mode or arming changed: clients wait for it."""
+        if self._flight.announce():
+            self._send(messages.Heartbeat.id, now)
+
+    def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:
+        self._flight.failsafe.hear_heartbeat(sender.system_id, now=now)
+
+    def _handle_local_target(
+        self, message: messages.SetPositionTargetLocalNed, _sender: Address, now: float
+    ) -> None:
+        if self._flight.mode is Mode.GUIDED:
+            self._flight.guided.take_local(message, self._estimate, now=now)
+
+    def _handle_global_target(
+        self, message: messages.SetPositionTargetGlobalInt, _sender: Address, now: float
+    ) -> None:
+        if self._flight.mode is Mode.GUIDED:
+            self._flight.guided.take_global(message, now=now)
+
+    def _handle_request_data_stream(
+        self, message: messages.RequestDataStream, _sender: Address, now: float
+    ) -> None:
+        rate = message.req_message_rate if message.start_stop else 0
+        self._streams.set_group(message.req_stream_id, rate, now=now)
+
+    def _handle_mission_set_current(
+        self, message: messages.MissionSetCurrent, _sender: Address, now: float
+    ) -> None:
+        self._flight.skip_to_item(message.seq)
+        self._send(messages.MissionCurrent.id, now)
+
+    def _handle_timesync(self, message: messages.Timesync, _sender: Address, now: float) -> None:
+        if message.tc1 == 0:  # a question; anything else is somebody's answer
+            boot_ns = int((now - self._up_at) * 1e9)
+            self._outbox.send(messages.Timesync(boot_ns, message.ts1))
+
+    def _handle_file_transfer(
+        self, message: messages.FileTransferProtocol, sender: Address, _now: float
+    ) -> None:
+        self._outbox.send(messages.FileTransferProtocol(0, *sender, refusal_of(message.payload)))

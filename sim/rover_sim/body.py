@@ -1,0 +1,65 @@
+"""What an autopilot drives: the seam between the flight stack and the physics.
+
+A body knows wheels and ground, and nothing of MAVLink, modes or origins.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class BodyState:
+    """Where a body is and how it moves: the truth, not an estimate. SI units, NED axes.
+
+    Positions are from the ground frame's zero point, on the ground; ``down`` is 0 at rest on it.
+    """
+
+    time: float  # s of simulated time since the body was made
+    north: float
+    east: float
+    down: float
+    yaw: float  # rad, clockwise from north, -pi..pi
+    pitch: float  # rad, nose up is positive
+    roll: float  # rad, right side down is positive
+    forward_speed: float  # m/s along the heading
+    lateral_speed: float  # m/s to the right
+    yaw_rate: float  # rad/s, clockwise
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a body starts: on the ground, at rest."""
+
+    north: float = 0.0
+    east: float = 0.0
+    yaw: float = 0.0  # rad, clockwise from north
+
+
+class Body(Protocol):
+    """A skid-steered rover. One process may hold many; each is stepped on its own."""
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last ``advance``."""
+        ...
+
+    def drive(self, forward_speed: float, yaw_rate: float) -> None:
+        """Demand wheel speeds for this motion (m/s, rad/s clockwise), kept until the next call.
+
+        It is what the wheels would do without slip; closing the loop is the autopilot's part.
+        """
+        ...
+
+    def advance(self, duration: float) -> None:
+        """Step the physics by ``duration`` seconds."""
+        ...
+
+    def close(self) -> None:
+        """Release what the body holds; it cannot be used afterwards."""
+        ...
+
+
+def wrap_angle(angle: float) -> float:
+    """Give the same angle within -pi..pi."""
+    return math.remainder(angle, math.tau)

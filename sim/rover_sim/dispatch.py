@@ -1,0 +1,9 @@
+"""How a message finds the part of the autopilot that takes it: a table by message id."""
+
+from collections.abc import Callable
+from typing import Any
+
+from mav_tasks.mavlink.address import Address
+
+Handler = Callable[[Any, Address, float], None]
+"""Takes a message of the one kind that it stands under in its table, its sender, and now."""

@@ -1,0 +1,56 @@
+"""Where the autopilot believes it is: the truth, seen through its faults."""
+
+import math
+from dataclasses import dataclass
+
+from rover_sim.body import BodyState
+from rover_sim.faults import Faults
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Position and motion as the autopilot reports and uses them. SI, NED, from its origin."""
+
+    north: float
+    east: float
+    down: float
+    vn: float
+    ve: float
+    roll: float
+    pitch: float
+    yaw: float
+    forward_speed: float
+    yaw_rate: float
+
+    @property
+    def ground_speed(self) -> float:
+        """Speed over ground, m/s, never negative."""
+        return math.hypot(self.vn, self.ve)
+
+
+def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Estimate:
+    """Give the estimate of this moment.
+
+    A frozen position still has live attitude, rates and wheel speed: gyros and encoders go on.
+    """
+    if faults.position_frozen and last is not None:
+        north, east, down, vn, ve = last.north, last.east, last.down, last.vn, last.ve
+    else:
+        cos, sin = math.cos(truth.yaw), math.sin(truth.yaw)
+        north = truth.north + faults.position_jump[0]
+        east = truth.east + faults.position_jump[1]
+        down = truth.down
+        vn = truth.forward_speed * cos - truth.lateral_speed * sin
+        ve = truth.forward_speed * sin + truth.lateral_speed * cos
+    return Estimate(
+        north=north,
+        east=east,
+        down=down,
+        vn=vn,
+        ve=ve,
+        roll=truth.roll,
+        pitch=truth.pitch,
+        yaw=truth.yaw,
+        forward_speed=truth.forward_speed,
+        yaw_rate=truth.yaw_rate,
+    )

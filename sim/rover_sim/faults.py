@@ -1,0 +1,19 @@
+"""The things a test can break in a simulated rover, as one value."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """Each fault lasts until another value replaces this one."""
+
+    silent: bool = False  # goes on as before, but sends nothing
+    deaf: bool = False  # receives nothing; with silent: a dead link
+    position_frozen: bool = False  # position and velocity estimates repeat their last value
+    position_jump: tuple[float, float] = (0.0, 0.0)  # m north, east, added to the estimate
+    refuse_arm: bool = False  # even a forced one
+    refuse_mode: bool = False  # of clients; the operator's switch works
+    withheld: frozenset[int] = frozenset()  # ids of messages that are not sent
+
+
+NO_FAULTS = Faults()

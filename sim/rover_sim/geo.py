@@ -1,0 +1,46 @@
+"""Local metres to global degrees and back, flat around an origin, as ArduPilot computes it."""
+
+import math
+from dataclasses import dataclass
+
+METRES_PER_DEGREE = 111_318.84502145034  # ArduPilot's LOCATION_SCALING_FACTOR
+LATITUDE_LIMIT_DEGE7 = 900_000_000
+LONGITUDE_LIMIT_DEGE7 = 1_800_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where the local frame's zero point is. Degrees, and metres above mean sea level."""
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+    @property
+    def latitude_degE7(self) -> int:
+        """The latitude as MAVLink has it."""
+        return round(self.latitude * 1e7)
+
+    @property
+    def longitude_degE7(self) -> int:
+        """The longitude as MAVLink has it."""
+        return round(self.longitude * 1e7)
+
+    def to_global(self, north: float, east: float) -> tuple[int, int]:
+        """Give latitude and longitude in degE7."""
+        east_scale = METRES_PER_DEGREE * math.cos(math.radians(self.latitude))
+        return (
+            round((self.latitude + north / METRES_PER_DEGREE) * 1e7),
+            round((self.longitude + east / east_scale) * 1e7),
+        )
+
+    def to_local(self, latitude_degE7: int, longitude_degE7: int) -> tuple[float, float]:
+        """Give north and east in metres."""
+        east_scale = METRES_PER_DEGREE * math.cos(math.radians(self.latitude))
+        return (
+            (latitude_degE7 * 1e-7 - self.latitude) * METRES_PER_DEGREE,
+            (longitude_degE7 * 1e-7 - self.longitude) * east_scale,
+        )
+
+
+DEFAULT_ORIGIN = Origin(-35.363262, 149.165237, 584.0)  # where ArduPilot's SITL starts

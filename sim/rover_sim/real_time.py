@@ -1,0 +1,92 @@
+"""Vehicles in real time on one UDP socket: the simulator's only clock and its only loop."""
+
+import selectors
+import socket
+import time
+from typing import Any, TextIO, cast
+
+from rover_sim.vehicle import Vehicle
+
+MAX_DATAGRAM = 65535
+DATAGRAMS_PER_TURN = 64  # read at most so many before the rovers get their turn
+TRUTH_INTERVAL = 0.1  # s
+
+
+class Clock:
+    """Simulated time: the monotonic clock, run faster or slower from the start on."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._start = time.monotonic()
+
+    def now(self) -> float:
+        """Simulated seconds; at real speed equal to the monotonic clock."""
+        return self._start + (time.monotonic() - self._start) * self._speed
+
+    def elapsed(self, now: float) -> float:
+        """Simulated seconds since the start."""
+        return now - self._start
+
+    def real(self, duration: float) -> float:
+        """How long a simulated duration takes, s."""
+        return duration / self._speed
+
+
+def drive(
+    server: socket.socket,
+    stop: socket.socket,
+    vehicles: list[Vehicle],
+    clock: Clock,
+    truth: TextIO | None,
+) -> None:
+    """Run the vehicles on the (non-blocking) server socket until ``stop`` is readable."""
+    selector = selectors.DefaultSelector()
+    selector.register(server, selectors.EVENT_READ)
+    selector.register(stop, selectors.EVENT_READ)
+    truth_due = clock.now()
+    with selector:
+        while True:
+            deadline = min(vehicle.next_deadline() for vehicle in vehicles)
+            ready = selector.select(max(0.0, clock.real(deadline - clock.now())))
+            if any(key.fileobj is stop for key, _ in ready):
+                return
+            if ready:
+                _read(server, vehicles, clock)
+            now = clock.now()
+            for vehicle in vehicles:
+                vehicle.handle_deadline(now=now)
+                _send(server, vehicle)
+            if truth is not None and now >= truth_due:
+                _write_truth(truth, vehicles, clock.elapsed(now))
+                truth_due = max(truth_due + TRUTH_INTERVAL, now)
+
+
+def _read(server: socket.socket, vehicles: list[Vehicle], clock: Clock) -> None:
+    for _ in range(DATAGRAMS_PER_TURN):
+        try:
+            data, peer = server.recvfrom(MAX_DATAGRAM)
+        except BlockingIOError:
+            return
+        except OSError:  # an earlier datagram met a closed port: its peer will fall silent
+            continue
+        now = clock.now()
+        for vehicle in vehicles:
+            vehicle.receive(data, peer, now=now)
+
+
+def _send(server: socket.socket, vehicle: Vehicle) -> None:
+    for peer, packet in vehicle.take_packets():
+        try:
+            server.sendto(packet, cast(tuple[Any, ...], peer))  # as recvfrom gave it
+        except OSError:  # full buffer or unreachable peer: a datagram link may lose packets
+            continue
+
+
+def _write_truth(truth: TextIO, vehicles: list[Vehicle], elapsed: float) -> None:
+    for vehicle in vehicles:
+        s = vehicle.truth
+        truth.write(
+            f"{elapsed:.3f},{vehicle.autopilot.address.system_id},{s.north:.4f},{s.east:.4f},"
+            f"{s.yaw:.5f},{s.forward_speed:.4f},{s.yaw_rate:.4f}\n"
+        )
+    truth.flush()

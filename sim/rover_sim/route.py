@@ -1,0 +1,62 @@
+"""Places to drive to, one after the other: AUTO's mission or built-in track, RTL's home."""
+
+from typing import NamedTuple
+
+from rover_sim.estimate import Estimate
+from rover_sim.setpoints import Destination
+from rover_sim.steering import STOP, Demand, steer_to_point
+
+REACHED_RADIUS = 0.3  # m
+TRACK_SIDE = 4.0  # m, of the square that AUTO drives when no mission is stored
+
+
+class Waypoint(NamedTuple):
+    """A place, and the sequence number of the mission item that it comes from."""
+
+    seq: int
+    place: Destination
+
+
+class Route:
+    """Progress along waypoints. ``loop`` begins again after the last one."""
+
+    def __init__(self, waypoints: tuple[Waypoint, ...], *, loop: bool) -> None:
+        self._waypoints = waypoints
+        self._loop = loop
+        self._index = 0
+
+    def __repr__(self) -> str:
+        return f"Route({self._index} of {len(self._waypoints)})"
+
+    @property
+    def next(self) -> Waypoint | None:
+        """The waypoint it drives to; None when done."""
+        return self._waypoints[self._index] if self._index < len(self._waypoints) else None
+
+    def skip_to(self, seq: int) -> None:
+        """Go on from the first waypoint at or after a mission item."""
+        numbers = [waypoint.seq for waypoint in self._waypoints]
+        self._index = next((i for i, n in enumerate(numbers) if n >= seq), len(numbers))
+
+    def demand(self, estimate: Estimate, speed_limit: float) -> tuple[Demand, Waypoint | None]:
+        """Say how to move now, and which waypoint has just been reached."""
+        waypoint = self.next
+        if waypoint is None:
+            return STOP, None
+        demand = steer_to_point(estimate, *waypoint.place, speed_limit, radius=REACHED_RADIUS)
+        if demand is not None:
+            return demand, None
+        self._index += 1
+        if self._loop:
+            self._index %= len(self._waypoints)
+        return STOP, waypoint
+
+
+def square_around(home: Destination) -> Route:
+    """Give the built-in track: a square with one corner at home, for ever."""
+    north, east = home
+    side = TRACK_SIDE
+    corners = ((side, 0.0), (side, side), (0.0, side), (0.0, 0.0))
+    return Route(
+        tuple(Waypoint(0, Destination(north + dn, east + de)) for dn, de in corners), loop=True
+    )

@@ -1,0 +1,57 @@
+"""From where to go to how to move: pure functions, no state.
+
+The rover is skid-steered, and can turn on the spot when asked for a turn rate. Towards a heading it
+steers as a car, as the real one was seen to: no speed, no turn.
+"""
+
+import math
+from dataclasses import dataclass
+
+from rover_sim.body import wrap_angle
+from rover_sim.estimate import Estimate
+
+MAX_YAW_RATE = 1.6  # rad/s
+HEADING_GAIN = 1.2  # 1/s, yaw rate per heading error
+TURN_RADIUS = 1.5  # m, tightest arc while steering to a heading
+BRAKING = 0.9  # m/s²; 2 m/s to a stand in 2.2 s and 2.2 m
+HOLD_BRAKING = 0.75  # m/s²; in HOLD it takes 3 s from 2.1 m/s
+COASTING = 0.5  # m/s², disarmed: rolling resistance and geared motors
+PIVOT_ERROR = math.radians(60)  # beyond it a rover turns on the spot towards a waypoint
+APPROACH_GAIN = 1.0  # 1/s, speed per metre left, over the last metre
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What the rover shall do now, before acceleration limits."""
+
+    speed: float  # m/s, negative is backwards
+    yaw_rate: float  # rad/s, clockwise
+    braking: float = BRAKING  # m/s², how fast speed may fall
+
+
+STOP = Demand(0.0, 0.0)
+HOLD = Demand(0.0, 0.0, HOLD_BRAKING)
+COAST = Demand(0.0, 0.0, COASTING)
+
+
+def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:
+    """Drive at ``speed`` while turning to ``yaw`` on an arc."""
+    limit = min(MAX_YAW_RATE, abs(estimate.forward_speed) / TURN_RADIUS)
+    wanted = HEADING_GAIN * wrap_angle(yaw - estimate.yaw)
+    return Demand(speed, max(-limit, min(limit, wanted)))
+
+
+def steer_to_point(
+    estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
+) -> Demand | None:
+    """Drive to a point and be slow there; None once within ``radius``."""
+    dn, de = north - estimate.north, east - estimate.east
+    distance = math.hypot(dn, de)
+    if distance < radius:
+        return None
+    error = wrap_angle(math.atan2(de, dn) - estimate.yaw)
+    yaw_rate = max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
+    if abs(error) > PIVOT_ERROR:
+        return Demand(0.0, yaw_rate)
+    slowest_stop = min(math.sqrt(2.0 * 0.6 * BRAKING * distance), APPROACH_GAIN * distance)
+    return Demand(min(speed_limit, slowest_stop) * math.cos(error), yaw_rate)

@@ -1,0 +1,107 @@
+"""When each telemetry message is due: one interval a message, as SET_MESSAGE_INTERVAL has it.
+
+MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals by group.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from mav_tasks.mavlink import messages as m
+
+DEFAULT_INTERVAL = 1.0  # s; a SITL streams at 1 Hz unasked
+SHORTEST_INTERVAL = 0.02  # s, the real one's main loop; below it is refused
+OFF = 0.0
+NEVER = float("inf")
+JITTER = 1e-6  # s; clock readings are not exact multiples of anything
+
+STREAMED: tuple[int, ...] = (
+    m.Heartbeat.id,
+    m.SysStatus.id,
+    m.ExtendedSysState.id,  # the real one sends this and HOME_POSITION on request only; streaming
+    m.HomePosition.id,  # both lets a MAVSDK or QGroundControl without the server see them
+    m.Attitude.id,
+    m.LocalPositionNed.id,
+    m.GlobalPositionInt.id,
+    m.GpsRawInt.id,
+    m.VfrHud.id,
+    m.BatteryStatus.id,
+    m.SystemTime.id,
+    m.MissionCurrent.id,
+    m.PositionTargetGlobalInt.id,
+)
+
+ALL_STREAMS = 0
+GROUPS: Mapping[int, tuple[int, ...]] = {  # MAV_DATA_STREAM, as Rover fills them
+    1: (),  # RAW_SENSORS
+    2: (  # EXTENDED_STATUS
+        m.SysStatus.id,
+        m.MissionCurrent.id,
+        m.GpsRawInt.id,
+        m.PositionTargetGlobalInt.id,
+    ),
+    3: (),  # RC_CHANNELS
+    6: (m.GlobalPositionInt.id, m.LocalPositionNed.id),  # POSITION
+    10: (m.Attitude.id,),  # EXTRA1
+    11: (m.VfrHud.id,),  # EXTRA2
+    12: (m.SystemTime.id, m.BatteryStatus.id),  # EXTRA3
+}
+
+
+class Streams:
+    """The interval of each message and when it is due next. One set for the whole link."""
+
+    def __init__(self, *, now: float) -> None:
+        self._intervals = dict.fromkeys(STREAMED, DEFAULT_INTERVAL)
+        self._due = dict.fromkeys(STREAMED, now)
+        self._next = now  # least of _due: most control steps look at nothing else
+
+    def __repr__(self) -> str:
+        return f"Streams(next={self._next:.3f})"
+
+    def interval_us(self, message_id: int) -> int:
+        """Give the interval as MESSAGE_INTERVAL has it: -1 off, 0 not available."""
+        interval = self._intervals.get(message_id)
+        if interval is None:
+            return 0
+        return -1 if interval == OFF else round(interval * 1e6)
+
+    def set_interval(self, message_id: int, interval_us: float, *, now: float) -> bool:
+        """Set microseconds between two messages; 0 is the default, -1 off. False: refused."""
+        if message_id not in self._intervals:
+            return False
+        if interval_us == 0:
+            self._set(message_id, DEFAULT_INTERVAL, now)
+        elif interval_us == -1:
+            self._set(message_id, OFF, now)
+        elif interval_us * 1e-6 < SHORTEST_INTERVAL:
+            return False
+        else:
+            self._set(message_id, interval_us * 1e-6, now)
+        return True
+
+    def set_group(self, group: int, rate: float, *, now: float) -> None:
+        """Set a whole group's rate in Hz; 0 switches it off."""
+        members: Iterable[int] = GROUPS.get(group, ())
+        if group == ALL_STREAMS:
+            members = (message_id for ids in GROUPS.values() for message_id in ids)
+        interval = max(1.0 / rate, SHORTEST_INTERVAL) if rate > 0 else OFF
+        for message_id in members:
+            self._set(message_id, interval, now)
+
+    def take_due(self, *, now: float) -> list[int]:
+        """Give the ids that are due, and plan each one's next time."""
+        horizon = now + JITTER
+        if horizon < self._next:
+            return []
+        due = [message_id for message_id, at in self._due.items() if at <= horizon]
+        for message_id in due:
+            following = self._due[message_id] + self._intervals[message_id]
+            # Late by more than an interval: go on from now rather than send a burst.
+            late = following <= now
+            self._due[message_id] = now + self._intervals[message_id] if late else following
+        self._next = min(self._due.values())
+        return due
+
+    def _set(self, message_id: int, interval: float, now: float) -> None:
+        self._intervals[message_id] = interval
+        self._due[message_id] = NEVER if interval == OFF else now
+        self._next = min(self._due.values())

@@ -1,0 +1,219 @@
+"""What each telemetry message says: from the flight stack's state to MAVLink fields and units."""
+
+import math
+from collections.abc import Callable, Mapping
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavLandedState, MavModeFlag, MavType
+from mav_tasks.mavlink.messages import Message
+from rover_sim.estimate import Estimate
+from rover_sim.flight import FlightControl
+from rover_sim.geo import Origin
+from rover_sim.mission_storage import MissionStorage
+from rover_sim.personas import Mode, Persona
+
+MAVLINK_VERSION = 3
+UNKNOWN_U16 = 65535
+# MAV_SYS_STATUS_SENSOR: gyro, accelerometer, compass, GPS, yaw and position control, motors, AHRS,
+# pre-arm check. MAVSDK takes "healthy" from these.
+SENSORS = 0x1 | 0x2 | 0x4 | 0x20 | 0x1000 | 0x4000 | 0x8000 | 0x200000 | 0x10000000
+CELL_VOLTAGES = (12600,) + (UNKNOWN_U16,) * 9  # mV; ArduPilot puts a pack's total into the first
+GPS_FIX_3D = 3
+TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_GLOBAL_INT
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+MISSION_STATES = {"none": 1, "not started": 2, "active": 3, "paused": 4, "complete": 5}
+
+
+class Telemetry:
+    """Builds any message that the rover can send about itself, by message id."""
+
+    def __init__(
+        self,
+        *,
+        persona: Persona,
+        system_id: int,
+        origin: Origin,
+        flight: FlightControl,
+        missions: MissionStorage,
+        unix_offset: float,
+        started: float,
+    ) -> None:
+        self._persona = persona
+        self._system_id = system_id
+        self._origin = origin
+        self._flight = flight
+        self._missions = missions
+        self._unix_offset = unix_offset
+        self._started = started
+        self._builders: Mapping[int, Callable[[Estimate, int], Message | None]] = {
+            m.Heartbeat.id: self._heartbeat,
+            m.SysStatus.id: self._sys_status,
+            m.SystemTime.id: self._system_time,
+            m.GpsRawInt.id: self._gps_raw_int,
+            m.Attitude.id: self._attitude,
+            m.LocalPositionNed.id: self._local_position_ned,
+            m.GlobalPositionInt.id: self._global_position_int,
+            m.MissionCurrent.id: self._mission_current,
+            m.GpsGlobalOrigin.id: self._gps_global_origin,
+            m.VfrHud.id: self._vfr_hud,
+            m.PositionTargetGlobalInt.id: self._position_target_global_int,
+            m.BatteryStatus.id: self._battery_status,
+            m.AutopilotVersion.id: self._autopilot_version,
+            m.HomePosition.id: self._home_position,
+            m.ExtendedSysState.id: self._extended_sys_state,
+        }
+
+    def __repr__(self) -> str:
+        return f"Telemetry({self._persona.name}, system {self._system_id})"
+
+    def knows(self, message_id: int) -> bool:
+        """Whether there is such a message here."""
+        return message_id in self._builders
+
+    def build(self, message_id: int, estimate: Estimate, *, now: float) -> Message | None:
+        """Give the message of this moment; None if there is nothing to say."""
+        return self._builders[message_id](estimate, self.boot_ms(now))
+
+    def boot_ms(self, now: float) -> int:
+        """Milliseconds since this autopilot started."""
+        return int((now - self._started) * 1000.0 + 0.5)
+
+    def _heartbeat(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        flight = self._flight
+        flags = MavModeFlag.CUSTOM_MODE_ENABLED
+        if flight.mode is Mode.MANUAL:
+            flags |= MavModeFlag.MANUAL_INPUT_ENABLED
+        elif flight.mode in (Mode.GUIDED, Mode.AUTO, Mode.RTL):
+            flags |= MavModeFlag.GUIDED_ENABLED
+        if flight.armed:
+            flags |= MavModeFlag.SAFETY_ARMED
+        return m.Heartbeat(
+            MavType.GROUND_ROVER,
+            self._persona.autopilot,
+            flags,
+            flight.custom_mode,
+            flight.system_status,
+            MAVLINK_VERSION,
+        )
+
+    def _sys_status(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        return m.SysStatus(
+            SENSORS, SENSORS, SENSORS, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
+        )  # load 10 %, 12.6 V, 5 A, 100 %
+
+    def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        return m.ExtendedSysState(0, MavLandedState.ON_GROUND)
+
+    def _system_time(self, _estimate: Estimate, boot_ms: int) -> Message:
+        unix = self._unix_offset + self._started + boot_ms * 1e-3 if self._unix_offset else 0.0
+        return m.SystemTime(int(unix * 1e6), boot_ms)
+
+    def _attitude(self, estimate: Estimate, boot_ms: int) -> Message:
+        return m.Attitude(
+            boot_ms, estimate.roll, estimate.pitch, estimate.yaw, 0.0, 0.0, estimate.yaw_rate
+        )
+
+    def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Message:
+        e = estimate
+        return m.LocalPositionNed(boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0)
+
+    def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Message:
+        latitude, longitude = self._origin.to_global(estimate.north, estimate.east)
+        return m.GlobalPositionInt(
+            boot_ms,
+            latitude,
+            longitude,
+            round((self._origin.altitude - estimate.down) * 1e3),
+            round(-estimate.down * 1e3),
+            _cm(estimate.vn),
+            _cm(estimate.ve),
+            0,
+            _centidegrees(estimate.yaw),
+        )
+
+    def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Message:
+        latitude, longitude = self._origin.to_global(estimate.north, estimate.east)
+        return m.GpsRawInt(
+            boot_ms * 1000,
+            GPS_FIX_3D,
+            latitude,
+            longitude,
+            round((self._origin.altitude - estimate.down) * 1e3),
+            121,  # HDOP and VDOP, hundredths
+            200,
+            _cm(estimate.ground_speed),
+            _centidegrees(math.atan2(estimate.ve, estimate.vn)),
+            10,  # satellites
+        )
+
+    def _vfr_hud(self, estimate: Estimate, _boot_ms: int) -> Message:
+        speed = estimate.ground_speed
+        throttle = min(100, round(abs(estimate.forward_speed) * 20)) if self._flight.armed else 0
+        heading = _centidegrees(estimate.yaw) // 100
+        altitude = self._origin.altitude - estimate.down
+        return m.VfrHud(speed, speed, heading, throttle, altitude, 0.0)
+
+    def _home_position(self, _estimate: Estimate, boot_ms: int) -> Message:
+        north, east = self._flight.home
+        latitude, longitude = self._origin.to_global(north, east)
+        altitude = round(self._origin.altitude * 1e3)
+        return m.HomePosition(
+            latitude, longitude, altitude, north, east, 0.0, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
+        )
+
+    def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Message:
+        origin = self._origin
+        altitude = round(origin.altitude * 1e3)
+        return m.GpsGlobalOrigin(
+            origin.latitude_degE7, origin.longitude_degE7, altitude, boot_ms * 1000
+        )
+
+    def _battery_status(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        return m.BatteryStatus(0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100)
+
+    def _autopilot_version(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        persona = self._persona
+        none = (0,) * 8
+        return m.AutopilotVersion(
+            persona.capabilities,
+            persona.flight_sw_version,
+            0,
+            0,
+            0,
+            tuple(persona.firmware_hash),
+            none,
+            none,
+            0,
+            0,
+            self._system_id,  # uid: tells one simulated rover from another
+        )
+
+    def _mission_current(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        flight, total = self._flight, self._missions.item_count
+        if total == 0:
+            state = "none"
+        elif flight.mission_complete:
+            state = "complete"
+        else:
+            state = "active" if flight.mode is Mode.AUTO and flight.armed else "not started"
+        in_mission_mode = 1 if flight.mode is Mode.AUTO else 2
+        return m.MissionCurrent(flight.current_item, total, MISSION_STATES[state], in_mission_mode)
+
+    def _position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+        destination = self._flight.destination
+        if destination is None:
+            return None
+        latitude, longitude = self._origin.to_global(*destination)
+        nothing = (0.0,) * 8
+        return m.PositionTargetGlobalInt(
+            boot_ms, 5, TARGET_POSITION_ONLY, latitude, longitude, self._origin.altitude, *nothing
+        )
+
+
+def _cm(metres: float) -> int:
+    return round(metres * 100)
+
+
+def _centidegrees(angle: float) -> int:
+    """0 to 35999."""
+    return round(math.degrees(angle) * 100) % 36000

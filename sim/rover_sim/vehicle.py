@@ -1,0 +1,109 @@
+"""A rover as its links see it: datagrams in, datagrams out; inside, an autopilot drives a body.
+
+It pushes nowhere by itself: it talks to the peers from which it has heard valid MAVLink lately,
+and, as the real one does on a link, tells every one of them everything.
+"""
+
+from collections.abc import Hashable
+
+from mav_tasks.mavlink.codec import Decoder, Encoder
+from mav_tasks.mavlink.packet import split_datagram
+from rover_sim.autopilot import Autopilot
+from rover_sim.body import Body, BodyState
+from rover_sim.geo import DEFAULT_ORIGIN, Origin
+from rover_sim.motion import CONTROL_PERIOD
+from rover_sim.personas import ARDUPILOT, Persona
+
+PEER_TIMEOUT = 10.0  # s of silence after which a peer is no longer talked to
+MAX_CATCH_UP = 0.5  # s; a vehicle held up for longer loses the time, as a stalled machine does
+
+
+class Vehicle:
+    """One rover. Time is the caller's, in seconds, and starts with ``now`` of the constructor."""
+
+    def __init__(self, *, body: Body, autopilot: Autopilot, now: float) -> None:
+        self.body = body
+        self.autopilot = autopilot
+        self._decoder = Decoder()
+        self._encoder = Encoder(autopilot.address)
+        self._peers: dict[Hashable, float] = {}
+        self._outgoing: list[tuple[Hashable, bytes]] = []
+        self._next_step = now
+
+    def __repr__(self) -> str:
+        return f"Vehicle({self.autopilot!r}, {len(self._peers)} peers)"
+
+    @property
+    def truth(self) -> BodyState:
+        """Where the rover really is."""
+        return self.body.state
+
+    def receive(self, data: bytes, peer: Hashable, *, now: float) -> None:
+        """Take a datagram, any bytes. Raises only SimulatedCrash."""
+        for packet in split_datagram(data):
+            message = self._decoder.decode(packet)
+            if message is not None:
+                self._peers[peer] = now
+                self.autopilot.handle(message, packet.source, now=now)
+        self._collect()
+
+    def next_deadline(self) -> float:
+        """When the next control step is due."""
+        return self._next_step
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Live through every control step that is due by ``now``; early or twice does nothing."""
+        if now - self._next_step > MAX_CATCH_UP:
+            self._next_step = now - MAX_CATCH_UP
+        while self._next_step <= now:
+            at = self._next_step
+            forward_speed, yaw_rate = self.autopilot.step(self.body.state, now=at)
+            self._collect()
+            self.body.drive(forward_speed, yaw_rate)
+            self.body.advance(CONTROL_PERIOD)
+            self._next_step = at + CONTROL_PERIOD
+
+    def take_packets(self) -> list[tuple[Hashable, bytes]]:
+        """Hand over what is to be sent: one datagram each, in order."""
+        taken, self._outgoing = self._outgoing, []
+        return taken
+
+    def _collect(self) -> None:
+        messages = self.autopilot.take_messages()
+        if not messages:
+            return
+        self._forget_silent_peers()
+        for message in messages:
+            packet = self._encoder.encode(message)
+            self._outgoing.extend((peer, packet) for peer in self._peers)
+
+    def _forget_silent_peers(self) -> None:
+        oldest = self._next_step - PEER_TIMEOUT
+        silent = [peer for peer, heard in self._peers.items() if heard < oldest]
+        for peer in silent:
+            del self._peers[peer]
+
+
+def make_vehicle(
+    body: Body,
+    *,
+    system_id: int,
+    now: float,
+    persona: Persona = ARDUPILOT,
+    origin: Origin = DEFAULT_ORIGIN,
+    unix_offset: float = 0.0,
+) -> Vehicle:
+    """Put an autopilot that has just been switched on into a body.
+
+    ``unix_offset`` is Unix time minus ``now``; 0 where there is no wall clock (SYSTEM_TIME then
+    says unknown).
+    """
+    autopilot = Autopilot(
+        system_id=system_id,
+        persona=persona,
+        origin=origin,
+        unix_offset=unix_offset,
+        truth=body.state,
+        now=now,
+    )
+    return Vehicle(body=body, autopilot=autopilot, now=now)

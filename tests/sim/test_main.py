@@ -1,0 +1,244 @@
+"""``python -m rover_sim`` as a process, met over real UDP by plain pymavlink."""
+
+import csv
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.interop
+
+ROOT = Path(__file__).parents[2]
+LIMIT = 15.0  # s for anything that a test waits for
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "rover_sim", *arguments]
+
+
+def environment(**extra: str) -> dict[str, str]:
+    path = os.pathsep.join((str(ROOT), str(ROOT / "sim")))
+    return {**os.environ, "PYTHONPATH": path, **extra}
+
+
+@contextmanager
+def simulator(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+    """Run it on a free port; give the process and the port."""
+    process = subprocess.Popen(
+        command("--port", "0", *arguments),
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    try:
+        line = process.stdout.readline()
+        started = re.fullmatch(
+            r"rover_sim: rover \d+ \(ardupilot, \w+\) on udp 127\.0\.0\.1:(\d+)\n", line
+        )
+        assert started, line
+        yield process, int(started[1])
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def refused(*arguments: str, **extra: str) -> str:
+    """Run it where it cannot start; give its one line on stderr."""
+    result = subprocess.run(
+        command(*arguments),
+        env=environment(**extra),
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert result.stderr.count("\n") == 1
+    return result.stderr
+
+
+class Client:
+    """A pymavlink ground station; independent of our codec."""
+
+    def __init__(self, port: int) -> None:
+        from pymavlink import mavutil
+        from pymavlink.dialects.v20 import ardupilotmega
+
+        self.dialect: Any = ardupilotmega
+        self.link: Any = mavutil.mavlink_connection(
+            f"udpout:127.0.0.1:{port}", source_system=255, dialect="ardupilotmega"
+        )
+        self.next_heartbeat = 0.0
+        self.beat()
+
+    def beat(self) -> None:
+        if time.monotonic() >= self.next_heartbeat:
+            self.next_heartbeat = time.monotonic() + 1.0
+            self.link.mav.heartbeat_send(6, 8, 0, 0, 4)
+
+    def wait(self, kind: str, condition: Callable[[Any], bool] = lambda _: True) -> Any:
+        limit = time.monotonic() + LIMIT
+        while time.monotonic() < limit:
+            self.beat()
+            message = self.link.recv_match(type=kind, blocking=True, timeout=0.2)
+            if message is not None and condition(message):
+                return message
+        raise AssertionError(f"no such {kind} within {LIMIT} s")
+
+    def ask(self, number: int, *params: float, system_id: int = 1) -> int:
+        padded = (*params, *(0.0,) * (7 - len(params)))
+        self.link.mav.command_long_send(system_id, 1, number, 0, *padded)
+        ack = self.wait("COMMAND_ACK", lambda a: a.command == number)
+        assert (ack.progress, ack.result_param2, ack.target_system) == (0, 0, 255)
+        return int(ack.result)
+
+    def forward(self, speed: float) -> None:
+        self.link.mav.set_position_target_local_ned_send(
+            0, 1, 1, 8, 0x05C7, 0, 0, 0, speed, 0, 0, 0, 0, 0, 0, 0
+        )
+
+    def close(self) -> None:
+        self.link.close()
+
+
+def is_from(system_id: int) -> Callable[[Any], bool]:
+    return lambda message: bool(message.get_srcSystem() == system_id)
+
+
+def shows(system_id: int, custom_mode: int) -> Callable[[Any], bool]:
+    return lambda beat: bool((beat.get_srcSystem(), beat.custom_mode) == (system_id, custom_mode))
+
+
+@contextmanager
+def client(port: int) -> Iterator[Client]:
+    connected = Client(port)
+    try:
+        yield connected
+    finally:
+        connected.close()
+
+
+BODIES = [
+    "kinematic",
+    pytest.param(
+        "bullet",
+        marks=[
+            pytest.mark.pybullet,
+            pytest.mark.skipif(find_spec("pybullet") is None, reason="no pybullet"),
+        ],
+    ),
+]
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_pymavlink_client_arms_drives_and_stops_a_rover(body: str, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+    with simulator("--body", body, "--truth", str(truth)) as (process, port), client(port) as c:
+        beat = c.wait("HEARTBEAT")
+        assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
+        assert (beat.type, beat.autopilot) == (10, 3)
+        c.wait("HEARTBEAT", lambda h: h.custom_mode == 0)
+        for message_id in (30, 32):
+            assert c.ask(511, message_id, 50_000) == 0
+        assert c.ask(176, 1, 15) == 0
+        while c.ask(400, 1) != 0:  # refused until its estimate has settled
+            c.wait("ATTITUDE")
+        start = c.wait("LOCAL_POSITION_NED")
+        limit = time.monotonic() + LIMIT
+        while (now := c.wait("LOCAL_POSITION_NED")).x - start.x < 1.0:
+            assert time.monotonic() < limit
+            c.forward(1.0)
+        for _ in range(3):
+            c.forward(0.0)
+        c.wait("LOCAL_POSITION_NED", lambda p: abs(p.vx) < 0.01)
+        assert abs(now.y - start.y) < 0.05
+        assert c.ask(176, 1, 4) == 0
+        assert c.ask(400, 0) == 0
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=LIMIT) == 0
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    with truth.open(encoding="ascii") as file:
+        rows = list(csv.DictReader(file))
+    assert set(rows[0]) == {
+        "time", "system_id", "north", "east", "yaw", "forward_speed", "yaw_rate"
+    }  # fmt: skip
+    assert float(rows[-1]["north"]) > 1.0
+    assert len(rows) == pytest.approx(10 * float(rows[-1]["time"]), rel=0.2, abs=3)
+
+
+def test_several_rovers_share_the_socket_and_are_told_apart() -> None:
+    three = ("--body", "kinematic", "--count", "3", "--system-id", "5")
+    with simulator(*three) as (_, port), client(port) as c:
+        for system_id in (5, 6, 7):
+            c.wait("HEARTBEAT", shows(system_id, 0))
+        assert c.ask(176, 1, 4, system_id=6) == 0
+        c.wait("HEARTBEAT", shows(6, 4))
+        c.wait("HEARTBEAT", shows(5, 0))
+        assert c.wait("LOCAL_POSITION_NED", is_from(7)).y == pytest.approx(6.0, abs=0.01)
+
+
+def test_interrupt_ends_it_orderly() -> None:
+    with simulator("--body", "kinematic") as (process, _):
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=LIMIT) == 0
+
+
+def test_faster_than_real_time() -> None:
+    with simulator("--body", "kinematic", "--speed", "10") as (_, port), client(port) as c:
+        first = c.wait("ATTITUDE").time_boot_ms
+        began = time.monotonic()
+        c.wait("ATTITUDE", lambda a: a.time_boot_ms - first >= 5000)
+        assert time.monotonic() - began < 4.0  # 0.5 on an idle machine
+
+
+def test_a_nan_setpoint_takes_it_down_as_it_does_the_real_one() -> None:
+    with simulator("--body", "kinematic") as (process, port), client(port) as c:
+        c.wait("HEARTBEAT", lambda h: h.custom_mode == 0)
+        assert c.ask(176, 1, 15) == 0
+        c.forward(float("nan"))
+        assert process.wait(timeout=LIMIT) == 134
+        assert process.stderr is not None
+        assert "NaN" in process.stderr.read()
+
+
+def test_a_port_in_use_is_one_clear_line() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = str(taken.getsockname()[1])
+        assert (
+            refused("--port", port) == f"rover_sim: udp 127.0.0.1:{port}: Address already in use\n"
+        )
+
+
+def test_an_open_address_needs_to_be_asked_for() -> None:
+    assert "--insecure" in refused("--host", "0.0.0.0")
+
+
+def test_missing_pybullet_is_one_clear_line(tmp_path: Path) -> None:
+    (tmp_path / "pybullet.py").write_text('raise ImportError("not installed")\n')
+    path = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "sim")))
+    line = refused("--port", "0", PYTHONPATH=path)
+    assert 'pip install "mav-tasks[sim]"' in line
+    assert "--body kinematic" in line
+
+
+def test_bad_options_are_refused() -> None:
+    for bad in (("--count", "0"), ("--system-id", "255", "--count", "2"), ("--speed", "never")):
+        result = subprocess.run(
+            command(*bad), env=environment(), capture_output=True, timeout=LIMIT, check=False
+        )
+        assert result.returncode == 2

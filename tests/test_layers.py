@@ -1,0 +1,179 @@
+"""Who may import whom, and what pure packages may not touch: the rules of the architecture."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+#: package or module -> what else of ours it may import
+MAY_IMPORT: dict[str, frozenset[str]] = {
+    "mav_tasks.errors": frozenset(),
+    "mav_tasks.settings": frozenset(),
+    "mav_tasks.mavlink": frozenset({"mav_tasks.errors"}),
+    "mav_tasks.services": frozenset(
+        {"mav_tasks.mavlink", "mav_tasks.settings", "mav_tasks.errors"}
+    ),
+    "mav_tasks.tasks": frozenset({"mav_tasks.errors", "mav_tasks.settings"}),
+    "mav_tasks.engine": frozenset(
+        {
+            "mav_tasks.tasks",
+            "mav_tasks.services",
+            "mav_tasks.mavlink",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.links": frozenset({"mav_tasks.errors"}),
+    "mav_tasks.store": frozenset({"mav_tasks.tasks", "mav_tasks.errors"}),
+    "mav_tasks.runner": frozenset(
+        {
+            "mav_tasks.engine",
+            "mav_tasks.links",
+            "mav_tasks.store",
+            "mav_tasks.settings",
+            "mav_tasks.tasks",
+        }
+    ),
+    "mav_tasks.in_memory": frozenset(
+        {
+            "mav_tasks.engine",
+            "mav_tasks.links",
+            "mav_tasks.store",
+            "mav_tasks.settings",
+            "mav_tasks.runner",
+        }
+    ),
+    "mav_tasks.serve": frozenset(
+        {
+            "mav_tasks.engine",
+            "mav_tasks.links",
+            "mav_tasks.store",
+            "mav_tasks.settings",
+            "mav_tasks.runner",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.cli": frozenset({"mav_tasks.serve", "mav_tasks.errors"}),
+    "rover_sim": frozenset({"mav_tasks.mavlink", "mav_tasks.links"}),
+}
+
+#: pure: no I/O, no clock, no chance
+PURE = (
+    "mav_tasks.errors",
+    "mav_tasks.settings",
+    "mav_tasks.mavlink",
+    "mav_tasks.services",
+    "mav_tasks.tasks",
+    "mav_tasks.engine",
+    "rover_sim.autopilot",
+)
+BANNED_IN_PURE = frozenset(
+    {
+        "asyncio",
+        "socket",
+        "threading",
+        "time",
+        "datetime",
+        "random",
+        "secrets",
+        "uuid",
+        "os",
+        "sqlite3",
+        "logging",
+    }
+)
+GENERATED = "mav_tasks.mavlink._dialect"
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    """Every hand-written module of the two packages, by its full name."""
+    for base in (ROOT, ROOT / "sim"):
+        for package in ("mav_tasks", "rover_sim"):
+            for path in sorted((base / package).rglob("*.py")):
+                name = ".".join(path.relative_to(base).with_suffix("").parts)
+                name = name.removesuffix(".__init__")
+                if name != GENERATED:
+                    yield name, path
+
+
+MODULES = dict(modules())
+
+
+def imports_of(path: Path) -> Iterator[str]:
+    """Every module that a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            assert node.module is not None
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def layer_of(module: str) -> str | None:
+    """The rule that a module falls under, or None for what is not ours."""
+    parts = module.split(".")
+    if parts[0] == "rover_sim":
+        return "rover_sim"
+    return ".".join(parts[:2]) if parts[0] == "mav_tasks" and len(parts) > 1 else None
+
+
+def violations(module: str, path: Path) -> list[str]:
+    """What a module imports and may not."""
+    layer = layer_of(module)
+    if layer is None:
+        return []
+    allowed = MAY_IMPORT[layer] | {layer}
+    return [
+        imported
+        for imported in imports_of(path)
+        if (target := layer_of(imported)) in MAY_IMPORT and target not in allowed
+    ]
+
+
+def test_every_module_has_a_rule() -> None:
+    assert {layer_of(module) for module in MODULES} - {None} == set(MAY_IMPORT)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_stay_within_the_layers(module: str) -> None:
+    assert violations(module, MODULES[module]) == []
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_pure_modules_touch_no_clock_and_no_world(module: str) -> None:
+    if module.startswith(PURE):
+        roots = {imported.partition(".")[0] for imported in imports_of(MODULES[module])}
+        assert roots & BANNED_IN_PURE == set()
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_the_generated_dialect_is_seen_by_its_package_only(module: str) -> None:
+    if not module.startswith("mav_tasks.mavlink"):
+        assert not any(name.startswith(GENERATED) for name in imports_of(MODULES[module]))
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_clients_and_vehicles_do_not_know_each_other(module: str) -> None:
+    other = {"gcs_side": "vehicle_side", "vehicle_side": "gcs_side"}.get(module.rpartition(".")[2])
+    assert not any(name.endswith(f".{other}") for name in imports_of(MODULES[module]))
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_only_bullet_imports_pybullet(module: str) -> None:
+    if module != "rover_sim.bullet":
+        assert "pybullet" not in set(imports_of(MODULES[module]))
+
+
+def test_the_rules_are_able_to_fail(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.py"
+    bad.write_text("import time\nfrom mav_tasks.engine import engine\n", encoding="utf-8")
+    assert violations("mav_tasks.tasks.bad", bad) == [
+        "mav_tasks.engine",
+        "mav_tasks.engine.engine",
+    ]
+    assert "time" in set(imports_of(bad))

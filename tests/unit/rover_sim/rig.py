@@ -1,0 +1,167 @@
+"""A simulated rover in virtual time with clients on its link; no socket, no sleep."""
+
+from collections.abc import Callable, Hashable
+from typing import TypeVar
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Decoder, Encoder
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.messages import Message
+from mav_tasks.mavlink.packet import split_datagram
+from rover_sim.body import BodyState, Pose
+from rover_sim.kinematic import KinematicBody
+from rover_sim.vehicle import make_vehicle
+
+CLIENT = Address(250, 191)
+ROVER = Address(1, 1)
+ORIGIN = Pose()
+PEER = "client"
+VELOCITY = 0x0DC7  # type masks: velocity only
+VELOCITY_AND_RATE = 0x05C7
+VELOCITY_AND_YAW = 0x09C7
+POSITION = 0x0DF8
+LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED = 1, 7, 8, 9
+MANUAL, HOLD, AUTO, RTL, GUIDED, INITIALISING = 0, 4, 10, 11, 15, 16
+READY = 1.0  # s after which a rover has started and can be armed
+
+M = TypeVar("M", bound=Message)
+
+
+class Rig:
+    """One rover with system id 1, and what its client hears."""
+
+    def __init__(self, *, start: Pose = ORIGIN, slip: float = 0.3, wait: float = READY) -> None:
+        self.now = 1000.0
+        body = KinematicBody(start=start, slip=slip, seed=None)
+        self.vehicle = make_vehicle(body, system_id=1, now=self.now)
+        self.autopilot = self.vehicle.autopilot
+        self.heard: list[Message] = []
+        self._decoder = Decoder()
+        self._encoder = Encoder(CLIENT)
+        self.send(heartbeat())
+        self.run(wait)
+
+    @property
+    def truth(self) -> BodyState:
+        return self.vehicle.truth
+
+    def send(self, *outgoing: Message, peer: Hashable = PEER) -> None:
+        for message in outgoing:
+            self.vehicle.receive(self._encoder.encode(message), peer, now=self.now)
+        self._listen()
+
+    def send_from(self, sender: Address, message: Message) -> None:
+        self.vehicle.receive(Encoder(sender).encode(message), PEER, now=self.now)
+        self._listen()
+
+    def run(self, seconds: float, stream: Message | None = None, *, rate: float = 20.0) -> None:
+        """Let time pass; a stream is sent at its rate all the while."""
+        end = self.now + seconds
+        next_send = self.now
+        next_heartbeat = self.now + 1.0
+        while True:
+            at = min(self.vehicle.next_deadline(), next_heartbeat)
+            if stream is not None:
+                at = min(at, next_send)
+            if at > end - 1e-9:
+                break
+            self.now = at
+            if stream is not None and at == next_send:
+                next_send += 1.0 / rate
+                self.send(stream)
+            elif at == next_heartbeat:
+                next_heartbeat += 1.0
+                self.send(heartbeat())
+            self.vehicle.handle_deadline(now=at)
+            self._listen()
+        self.now = end
+
+    def until(self, condition: Callable[[], bool], *, limit: float) -> float:
+        """Run until something holds; give how long it took."""
+        began = self.now
+        while not condition():
+            assert self.now - began < limit, f"not within {limit} s"
+            self.run(0.025)
+        return self.now - began
+
+    def command(self, command: int, *params: float) -> MavResult:
+        """Send a COMMAND_LONG and give the result of its one and only answer."""
+        padded = (*params, *(0.0,) * (7 - len(params)))
+        return self._answer_to(m.CommandLong(1, 1, command, 0, *padded))
+
+    def command_int(self, command: int, *, frame: int, x: int, y: int, param2: float) -> MavResult:
+        return self._answer_to(
+            m.CommandInt(1, 1, frame, command, 0, 0, -1.0, param2, 0.0, float("nan"), x, y, 0.0)
+        )
+
+    def set_mode(self, custom_mode: int) -> MavResult:
+        return self.command(MavCmd.DO_SET_MODE, 1, custom_mode)
+
+    def arm(self) -> MavResult:
+        return self.command(MavCmd.COMPONENT_ARM_DISARM, 1)
+
+    def ready_to_drive(self) -> None:
+        """GUIDED and armed."""
+        assert self.set_mode(GUIDED) == MavResult.ACCEPTED
+        assert self.arm() == MavResult.ACCEPTED
+
+    def take(self, kind: type[M]) -> list[M]:
+        """Give what was heard of a kind, and forget everything heard."""
+        taken = [message for message in self.heard if isinstance(message, kind)]
+        self.heard.clear()
+        return taken
+
+    def last(self, kind: type[M]) -> M:
+        return [message for message in self.heard if isinstance(message, kind)][-1]
+
+    def texts(self) -> list[str]:
+        """Every STATUSTEXT since the last ``take``."""
+        return [t.text.rstrip("\0") for t in self.heard if isinstance(t, m.Statustext)]
+
+    def _answer_to(self, message: m.CommandLong | m.CommandInt) -> MavResult:
+        before = len(self.heard)
+        self.send(message)
+        acks = [a for a in self.heard[before:] if isinstance(a, m.CommandAck)]
+        assert [a.command for a in acks] == [message.command]
+        assert (acks[0].progress, acks[0].result_param2) == (0, 0)
+        assert Address(acks[0].target_system, acks[0].target_component) == CLIENT
+        return MavResult(acks[0].result)
+
+    def _listen(self) -> None:
+        for peer, data in self.vehicle.take_packets():
+            if peer == PEER:
+                (packet,) = split_datagram(data)
+                assert packet.source == ROVER
+                message = self._decoder.decode(packet)
+                assert message is not None
+                self.heard.append(message)
+
+
+def heartbeat() -> m.Heartbeat:
+    return m.Heartbeat(6, 8, 0, 0, 4, 3)
+
+
+def local_target(
+    mask: int,
+    *,
+    frame: int = LOCAL_NED,
+    position: tuple[float, float] = (0.0, 0.0),
+    velocity: tuple[float, float] = (0.0, 0.0),
+    yaw: float = 0.0,
+    yaw_rate: float = 0.0,
+    target: Address = ROVER,
+) -> m.SetPositionTargetLocalNed:
+    return m.SetPositionTargetLocalNed(
+        0, *target, frame, mask, *position, 0.0, *velocity, 0.0, 0.0, 0.0, 0.0, yaw, yaw_rate
+    )
+
+
+def velocity(north: float, east: float = 0.0) -> m.SetPositionTargetLocalNed:
+    return local_target(VELOCITY, velocity=(north, east))
+
+
+def body_velocity(forward: float, yaw_rate: float = 0.0) -> m.SetPositionTargetLocalNed:
+    return local_target(
+        VELOCITY_AND_RATE, frame=BODY_NED, velocity=(forward, 0.0), yaw_rate=yaw_rate
+    )

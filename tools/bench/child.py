@@ -1,0 +1,48 @@
+"""Processes that a measurement talks to: started, waited for, ended by their own id."""
+
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+HOST = "127.0.0.1"
+READY = "ready"  # what a child prints once its sockets are open
+END_WITHIN = 10.0  # s
+
+
+@contextmanager
+def child(module: str, *arguments: str) -> Iterator[None]:
+    """Run a module of this package as a process of its own while the block runs."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", f"tools.bench.{module}", *arguments],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        if process.stdout.readline().strip() != READY:
+            raise RuntimeError(f"{module} did not start")
+        yield
+    finally:
+        process.terminate()
+        process.wait(END_WITHIN)
+
+
+def free_port() -> int:
+    """Give a UDP port of the loopback interface that nobody has at the moment."""
+    with udp_socket() as probe:
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def udp_socket(port: int = 0) -> socket.socket:
+    """Give a bound loopback UDP socket that waits at most a second."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+    sock.bind((HOST, port))
+    sock.settimeout(1.0)
+    return sock

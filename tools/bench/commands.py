@@ -1,0 +1,145 @@
+"""COMMAND_LONG (TASK_MOVE, each its own nonce) → COMMAND_ACK, beside a bare echo.
+
+The client is one process with blocking sockets; it packs everything beforehand and looks at
+nothing of an answer but its message id.
+"""
+
+import socket
+from itertools import islice
+from statistics import quantiles
+from time import monotonic, perf_counter
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.codec import Encoder
+from mav_tasks.mavlink.enums import MavCmd
+
+from .child import child, free_port, udp_socket
+from .scripted import CLIENT, ScriptedVehicle, loopback, meet
+from .table import Row
+
+WARM_UP = 2_000
+ONE_BY_ONE = 5_000
+OUTSTANDING = 64
+MANY = 60_000
+PATIENCE = 0.3  # s without an answer: what was under way is lost
+BEAT = 0.5  # s, between the vehicle's heartbeats
+
+GOAL_RATIO = 4.0
+GOAL_RATE = 20_000
+
+
+def measure(profile: str | None = None) -> list[Row]:
+    """Give the rows of latency and of rate."""
+    packets = _packets()
+    port = free_port()
+    with child("bare", "echo", str(port)), udp_socket() as client:
+        client.connect(loopback(port))
+        echo = _run(client, packets, answer_id=m.CommandLong.id, vehicle=None)
+    port = free_port()
+    extra = () if profile is None else (profile,)
+    with udp_socket() as client, udp_socket() as vehicle_socket:
+        vehicle_port: int = vehicle_socket.getsockname()[1]
+        with child("server", str(port), str(vehicle_port), *extra):
+            vehicle = ScriptedVehicle(vehicle_socket)
+            meet(vehicle, client, loopback(port))
+            client.connect(loopback(port))
+            ours = _run(client, packets, answer_id=m.CommandAck.id, vehicle=vehicle)
+    return [
+        _latency("command → ack, p50", ours[0], echo[0], goal=GOAL_RATIO),
+        _latency("command → ack, p99", ours[1], echo[1], goal=None),
+        Row(
+            f"acks, {OUTSTANDING} outstanding",
+            f"{ours[2]:,.0f} /s",
+            f"{echo[2]:,.0f} /s echo",
+            f"{ours[2] / echo[2]:.0%}",
+            f"≥ {GOAL_RATE:,} /s",
+            ours[2] >= GOAL_RATE,
+        ),
+    ]
+
+
+def _latency(what: str, ours: float, echo: float, *, goal: float | None) -> Row:
+    return Row(
+        what,
+        f"{ours * 1e6:.0f} µs",
+        f"{echo * 1e6:.0f} µs echo",
+        f"{ours / echo:.1f}×",
+        "" if goal is None else f"≤ {goal:.0f}×",
+        None if goal is None else ours <= goal * echo,
+    )
+
+
+def _run(
+    client: socket.socket,
+    packets: list[bytes],
+    *,
+    answer_id: int,
+    vehicle: ScriptedVehicle | None,
+) -> tuple[float, float, float]:
+    """Give p50 and p99 in seconds with one outstanding, and answers a second with many."""
+    supply = iter(packets)
+    _one_by_one(client, list(islice(supply, WARM_UP)), answer_id, vehicle)
+    times = _one_by_one(client, list(islice(supply, ONE_BY_ONE)), answer_id, vehicle)
+    cuts = quantiles(times, n=100)
+    return cuts[49], cuts[98], _many(client, list(supply), answer_id, vehicle)
+
+
+def _one_by_one(
+    client: socket.socket, packets: list[bytes], answer_id: int, vehicle: ScriptedVehicle | None
+) -> list[float]:
+    times: list[float] = []
+    next_beat = monotonic()
+    for packet in packets:
+        if vehicle is not None and monotonic() >= next_beat:
+            vehicle.beat()
+            next_beat += BEAT
+        start = perf_counter()
+        client.send(packet)
+        while client.recv(512)[7] != answer_id:
+            pass
+        times.append(perf_counter() - start)
+    return times
+
+
+def _many(
+    client: socket.socket, packets: list[bytes], answer_id: int, vehicle: ScriptedVehicle | None
+) -> float:
+    """Give the answers a second while OUTSTANDING commands are under way."""
+    client.settimeout(PATIENCE)
+    supply = iter(packets)
+    answered = lost = under_way = 0
+    next_beat = start = monotonic()
+    for packet in islice(supply, OUTSTANDING):
+        client.send(packet)
+        under_way += 1
+    while under_way:
+        try:
+            answer = client.recv(512)
+        except TimeoutError:
+            lost += under_way
+            under_way = 0
+            start += PATIENCE
+        else:
+            if answer[7] != answer_id:
+                continue
+            answered += 1
+            under_way -= 1
+        if vehicle is not None and answered % 512 == 0 and monotonic() >= next_beat:
+            vehicle.beat()
+            next_beat += BEAT
+        for packet in islice(supply, OUTSTANDING - under_way):
+            client.send(packet)
+            under_way += 1
+    rate = answered / (monotonic() - start)
+    if lost:
+        print(f"commands: {lost} of {len(packets)} were not answered")
+    return rate
+
+
+def _packets() -> list[bytes]:
+    encoder = Encoder(CLIENT)
+    total = WARM_UP + ONE_BY_ONE + MANY
+    return [
+        encoder.encode(m.CommandLong(1, 191, MavCmd.TASK_MOVE, 0, 1.0, 0, 0, nonce, 0, 0, 5))
+        for nonce in range(1, total + 1)
+    ]

@@ -1,0 +1,83 @@
+"""The demonstration in virtual time: one process, the same server, rover and third party."""
+
+from pymavlink.dialects.v20 import common
+
+from demo_lib.screen import Screen
+from demo_lib.third_party import Place, ThirdParty
+from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
+from mav_tasks.links.memory import MemoryLink, MemoryNet
+from rover_sim.body import Body, Pose
+from rover_sim.bullet import BulletBody
+from rover_sim.kinematic import KinematicBody
+from rover_sim.vehicle import Vehicle, make_vehicle
+from rover_sim.virtual import RoverParty, VirtualWorld
+
+TIME_LIMIT = 85.0  # virtual s
+TRACK_INTERVAL = 0.1  # virtual s
+START = Pose()
+
+
+def drive(screen: Screen, *, body: str, seed: int) -> tuple[ThirdParty, list[Place]]:
+    """Run server, rover and third party; gives what the latter saw, and the true track."""
+    net = MemoryNet()
+    vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0)
+    world = VirtualWorld(net)
+    member = _Member(net.link("third party"), vehicle, screen)
+    rover = RoverParty(vehicle, net.link("rover"))
+    world.join(rover, InMemoryServer(net, vehicles=("rover",)), member)
+    track: list[Place] = []
+
+    def follow(now: float) -> None:
+        if now >= TRACK_INTERVAL * len(track):
+            track.append(member.truth())
+
+    world.watch(follow)
+    if not world.run_until(lambda: member.party.is_over, within=TIME_LIMIT):
+        screen.say(f"gave up after {TIME_LIMIT:.0f} s of virtual time")
+    vehicle.body.close()
+    return member.party, track
+
+
+class _Member:
+    """The third party as one who takes part in the virtual world."""
+
+    def __init__(self, link: MemoryLink, vehicle: Vehicle, screen: Screen) -> None:
+        self._link = link
+        self._vehicle = vehicle
+        self._screen = screen
+        self._mav = common.MAVLink(self, srcSystem=255, srcComponent=190)
+        self._mav.robust_parsing = True
+        self._now = 0.0
+        self.party = ThirdParty(self._mav, self.truth, self._say)
+
+    def write(self, data: bytes) -> None:
+        """Send: what pymavlink calls on its file."""
+        self._link.send(CLIENT_LINK, bytes(data))
+
+    def truth(self) -> Place:
+        """Give where the rover really is."""
+        state = self._vehicle.truth
+        return Place(state.north, state.east, state.yaw)
+
+    def next_deadline(self) -> float:
+        """Look around ten times a second."""
+        return self._now + 0.1
+
+    def turn(self, *, now: float) -> None:
+        """Read, then send what is due."""
+        for _, data in self._link.receive(len(self._link.arrived)):
+            for message in self._mav.parse_buffer(data) or ():
+                self.party.take(message)
+        if now >= self.next_deadline() or self._now == 0.0:
+            self._now = now
+            self.party.step(now)
+            self._screen.update(self.party)
+
+    def _say(self, text: str) -> None:
+        self._screen.say(f"{self._now:6.1f} s  {text}")
+
+
+def _body(kind: str, seed: int) -> Body:
+    if kind == "kinematic":
+        return KinematicBody(start=START, slip=0.3, seed=seed or None)
+    return BulletBody(start=START, variation=0.3 if seed else 0.0, seed=seed)

@@ -1,0 +1,116 @@
+"""The demonstration in real time: server and rover are processes of their own, joined by UDP."""
+
+import csv
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+os.environ["MAVLINK20"] = "1"  # pymavlink's switch, read when it is imported
+
+from pymavlink import mavutil
+
+from demo_lib.screen import Screen
+from demo_lib.third_party import Place, ThirdParty
+
+TIME_LIMIT = 85.0  # s, for everything
+STOP_LIMIT = 5.0  # s, for a process to end when asked to
+REFRESH = 0.2  # s
+
+
+class DemoError(Exception):
+    """The demonstration could not be run; the text says why."""
+
+
+def drive(screen: Screen, *, body: str, gui: bool, seed: int) -> tuple[ThirdParty, list[Place]]:
+    """Run server, rover and third party; gives what the latter saw, and the true track."""
+    with tempfile.TemporaryDirectory(prefix="mav-tasks-demo-") as folder:
+        truth_file = Path(folder) / "truth.csv"
+        rover_port, client_port = free_ports(2)
+        rover = [sys.executable, "-m", "rover_sim", "--port", str(rover_port), "--body", body]
+        rover += ["--truth", str(truth_file)]
+        rover += ["--seed", str(seed), "--friction-variation", "0.3"] if seed else []
+        rover += ["--gui"] if gui else []
+        server = [sys.executable, "-m", "mav_tasks.cli", "serve"]
+        server += ["--client", f"udpin:127.0.0.1:{client_port}"]
+        server += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
+        with process(rover, Path(folder) / "rover.log"), process(server, Path(folder) / "log"):
+            screen.say(f"rover: {body} body on UDP {rover_port}; server on UDP {client_port}")
+            screen.say("a QGroundControl on this machine sees the rover now")
+            party = _watch(screen, client_port, truth_file)
+        return party, read_track(truth_file)
+
+
+def _watch(screen: Screen, port: int, truth_file: Path) -> ThirdParty:
+    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=255)
+    try:
+        party = ThirdParty(link.mav, lambda: read_track(truth_file)[-1], screen.say)
+        end = time.monotonic() + TIME_LIMIT
+        next_refresh = 0.0
+        while not party.is_over:
+            now = time.monotonic()
+            if now > end:
+                screen.say(f"gave up after {TIME_LIMIT:.0f} s")
+                break
+            party.step(now)
+            message = link.recv_match(blocking=True, timeout=0.1)
+            if message is not None:
+                party.take(message)
+            if now >= next_refresh:
+                next_refresh = now + REFRESH
+                screen.update(party)
+        screen.update(party)
+        return party
+    finally:
+        link.close()
+
+
+@contextmanager
+def process(command: list[str], log: Path) -> Iterator[None]:
+    """Run a process while the block runs; afterwards ask it to end, and see that it did."""
+    with log.open("wb") as output:
+        running = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
+    try:
+        yield
+        if running.poll() is not None:
+            raise DemoError(f"{' '.join(command[1:3])} ended early: {_last_line(log)}")
+    finally:
+        if running.poll() is None:
+            running.send_signal(signal.SIGTERM)
+            try:
+                running.wait(STOP_LIMIT)
+            except subprocess.TimeoutExpired:
+                running.kill()
+                running.wait()
+    if running.returncode != 0:
+        raise DemoError(f"{' '.join(command[1:3])} ended with {running.returncode}")
+
+
+def read_track(truth_file: Path) -> list[Place]:
+    """Give the true poses that the rover has written so far; a last half line is left out."""
+    text = truth_file.read_text(encoding="ascii") if truth_file.exists() else ""
+    rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
+    return [Place(float(r["north"]), float(r["east"]), float(r["yaw"])) for r in rows]
+
+
+def free_ports(count: int) -> list[int]:
+    """Give UDP ports of the loopback that nobody uses at this moment."""
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    try:
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [int(each.getsockname()[1]) for each in sockets]
+    finally:
+        for each in sockets:
+            each.close()
+
+
+def _last_line(log: Path) -> str:
+    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1] if lines else "without a word"
