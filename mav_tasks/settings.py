@@ -59,6 +59,7 @@ class Clients:
 
     max_clients: int = 64  # endpoints remembered on all client links; beyond: the longest silent
     forget_after: float = 60.0  # s, a client silent for longer is forgotten
+    push_lost: float = 5.0  # s, an address pushed to that is silent for longer gets heartbeats only
     stream_interval: float = 0.1  # s, between telemetry messages of one id, unless asked otherwise
     text_rate: float = 10.0  # STATUSTEXT per second to one client; beyond that they are dropped
     status_rate: float = 50.0  # pushed TASK_STATUS per second to one client; beyond: coalesced

@@ -492,5 +492,5 @@ class Commands:
 
 
 def _answering(vehicle: Vehicle, command: Command) -> Address:
-    """Give the address that a command's answer comes from: the one addressed, 0 meaning 1."""
-    return Address(vehicle.system_id, command.target.component_id or AUTOPILOT)
+    """Give the address that a command's answer comes from: the one addressed; of all, our own."""
+    return Address(vehicle.system_id, command.target.component_id or vehicle.server_component)

@@ -105,13 +105,13 @@ class GcsSide:
 
     def forget_silent(self, *, now: float) -> None:
         """Drop clients that have been silent for long; configured ones become unheard again."""
-        limit = self._settings.clients.forget_after
+        limits = self._settings.clients
         for key, client in list(self._clients.items()):
-            if now - client.heard_at > limit:
-                if client.is_configured:
-                    client.is_heard = False
-                else:
-                    del self._clients[key]
+            silence = now - client.heard_at
+            if client.is_configured and silence > limits.push_lost:
+                client.is_heard = False
+            elif not client.is_configured and silence > limits.forget_after:
+                del self._clients[key]
 
     def _add(self, link: str, peer: Peer, *, is_configured: bool, now: float) -> GcsClient:
         self._make_room()

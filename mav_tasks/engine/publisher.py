@@ -87,7 +87,10 @@ class Publisher:
                 self._commands.send_status(client, task_id, with_position=False, now=now)
 
     def _send_heartbeats(self, *, now: float) -> None:
-        """One from inside each vehicle that is heard.
+        """One from inside each vehicle that is heard, to each client that is.
+
+        To an address that is only pushed to, nobody may be listening yet; and whoever begins to
+        must hear the autopilot first, because an older MAVSDK otherwise never connects.
 
         DEVIATION: the task server's component falls silent with its vehicle; its heartbeats would
         otherwise hide from a ground station that the vehicle is lost.
@@ -98,5 +101,5 @@ class Publisher:
             begun = vehicle.tasks.begun is not None
             heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
             for client in self._gcs:
-                if client.knows(vehicle.system_id):
+                if client.is_heard and client.knows(vehicle.system_id):
                     client.outlet.send(heartbeat, vehicle.server_address)

@@ -1,7 +1,8 @@
 """The only re-export of the generated classes, under readable names.
 
-Constructor arguments and attributes are the field names of the MAVLink definitions; a class's ``id``
-is its message id (an instance's may be a field: ask ``get_msgId()``). What is not listed here is forwarded raw and never decoded.
+Constructor arguments and attributes are the field names of the MAVLink definitions. A class's
+``id`` is its message id (an instance's may be a field: ask ``get_msgId()``). What is not listed
+here is forwarded raw and never decoded.
 """
 
 from mav_tasks.mavlink import _dialect as d

@@ -22,6 +22,8 @@ OFF_LINE = 1.0  # m, lifecycle: further off its line than this is no resumption
 JUMP = 2.0  # m, a position that moved further than the vehicle can have driven
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
 
+MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
+
 #: interruptions that end by themselves when the vehicle is back
 LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST})
 
@@ -38,6 +40,7 @@ class Executor:
         self._last_motion: Motion | None = None
         self._last_velocity = ZERO
         self._last_tick = 0.0
+        self._moved_at = 0.0  # when a velocity other than zero was last asked for
         self._best_remaining = inf
         self._progress_at = 0.0
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
@@ -115,6 +118,8 @@ class Executor:
             driving=self._settings.driving,
             elapsed=min(elapsed, 2 * self._settings.watch.setpoint_period),
         )
+        if not self._last_velocity.is_zero:
+            self._moved_at = now
         return Demand(DemandKind.DRIVE, self._last_velocity)
 
     def _step(self, task: Task, seen: VehicleView, now: float) -> Demand:
@@ -169,8 +174,9 @@ class Executor:
         self._last_motion = motion
         task = self._note_progress(task, motion.pose, now)
         signed_remaining = task.length - task.progress.done
-        if guidance.has_arrived(task.goal, signed_remaining, driving=self._settings.driving):
-            if seen.still:
+        stands = seen.still and self._has_asked_to_stand(now)
+        if self._has_arrived(task, signed_remaining, stands=stands):
+            if stands:
                 self._finish(TaskState.COMPLETED, TaskReason.NONE, actor=SERVER, now=now)
             return view.STAND
         if self._is_stuck(signed_remaining, now):
@@ -179,6 +185,17 @@ class Executor:
         if not self._book.is_durable(task.id):
             return view.STAND
         return Demand(DemandKind.DRIVE, self._steer(task, motion, signed_remaining))
+
+    def _has_arrived(self, task: Task, signed_remaining: float, *, stands: bool) -> bool:
+        """Whether to stand here: near the end while moving; anywhere within tolerance at rest."""
+        within = 1.0 if stands else MOVING_TOLERANCE
+        return guidance.has_arrived(
+            task.goal, signed_remaining, within=within, driving=self._settings.driving
+        )
+
+    def _has_asked_to_stand(self, now: float) -> bool:
+        """Whether zeros have been asked for long enough to call slowness a standstill."""
+        return now - self._moved_at >= self._settings.watch.still_time
 
     def _steer(self, task: Task, motion: Motion, signed_remaining: float) -> Velocity:
         anchor = task.progress.anchor

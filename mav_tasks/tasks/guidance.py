@@ -86,13 +86,13 @@ def cross_track(anchor: Pose, pose: Pose) -> float:
     )
 
 
-def has_arrived(goal: Goal, remaining: float, *, driving: Driving) -> bool:
-    """Whether the measured place is the goal's end, within tolerance."""
+def has_arrived(goal: Goal, remaining: float, *, within: float, driving: Driving) -> bool:
+    """Whether the measured place is the goal's end; ``within`` is a factor on the tolerance."""
     match goal:
         case Move():
-            return abs(remaining) <= driving.arrival_distance
+            return abs(remaining) <= within * driving.arrival_distance
         case Rotate():
-            return abs(remaining) <= driving.arrival_angle
+            return abs(remaining) <= within * driving.arrival_angle
 
 
 def steer(goal: Goal, anchor: Pose, pose: Pose, *, remaining: float, driving: Driving) -> Velocity:

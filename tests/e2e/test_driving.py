@@ -1,0 +1,136 @@
+"""Real processes on loopback UDP, stock pymavlink as the client: a rover drives, and stops."""
+
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import monotonic
+
+import pytest
+from pymavlink.dialects.v20.common import MAVLink, MAVLink_heartbeat_message
+
+from tests.kit.processes import Stand, command_long, stand, submit, wait_for, wait_until
+
+HOLD, GUIDED = 4, 15
+SETPOINT_TIMEOUT = 3.0  # s, ArduPilot's, after which the rover stops by itself
+BRAKING = 2.0  # s, from driving to standing
+SAMPLE = 0.1  # s, of the truth file
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[Stand]:
+    with stand(tmp_path) as it:
+        yield it
+
+
+def test_a_command_of_stock_pymavlink_drives_the_rover_and_is_told_the_end(running: Stand) -> None:
+    link = running.connect()
+    start = running.truth()[-1]
+
+    task_id = submit(link, 54000, 1.0, 0, 0, 0, 0, 0, 9)
+
+    assert task_id == 1
+    wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=30)
+    end = running.truth()[-1]
+    assert end["north"] - start["north"] == pytest.approx(1.0, abs=0.02)
+    assert abs(end["forward_speed"]) < 0.01
+    wait_for(link, "HEARTBEAT", f"HEARTBEAT.type==10 and HEARTBEAT.custom_mode=={HOLD}")
+    wait_for(link, "HEARTBEAT", "HEARTBEAT.type==10 and not HEARTBEAT.base_mode & 128")
+
+
+def test_the_rover_stops_by_itself_when_the_server_is_killed(running: Stand) -> None:
+    running.drive(running.connect(), 50.0)
+
+    running.server.end(signal.SIGKILL)
+
+    killed_at = running.truth()[-1]["time"]
+    wait_until(lambda: running.speed() < 0.01, within=10, what="the rover to stand")
+    stood_at = running.truth()[-1]["time"]
+    assert SETPOINT_TIMEOUT - 0.5 < stood_at - killed_at < SETPOINT_TIMEOUT + BRAKING
+    _stays_put(running)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_orderly_end_stops_the_rover_at_once(running: Stand, number: int) -> None:
+    running.drive(running.connect(), 50.0)
+    asked_at = running.truth()[-1]["time"]
+
+    took = running.server.end(number)
+
+    assert running.server.popen.returncode == 0
+    assert took < 1.0
+    wait_until(lambda: running.speed() < 0.01, within=10, what="the rover to stand")
+    assert running.truth()[-1]["time"] - asked_at < SETPOINT_TIMEOUT  # not by the time-out
+    heartbeat = wait_for(running.connect_to_rover(), "HEARTBEAT", "HEARTBEAT.type==10")
+    assert heartbeat.custom_mode == HOLD
+    assert "Traceback" not in running.server.text
+
+
+def test_stop_halts_a_driving_rover_and_latches(running: Stand) -> None:
+    link = running.connect()
+    task_id = running.drive(link, 50.0)
+    asked_at = running.truth()[-1]["time"]
+
+    assert submit(link, 54003) == task_id
+
+    wait_until(lambda: running.speed() < 0.01, within=5, what="the rover to stand")
+    assert running.truth()[-1]["time"] - asked_at < BRAKING
+    waiting = submit(link, 54001, 45.0)
+    _stays_put(running)
+    submit(link, 193, 1.0)
+    text = f"'Task {waiting} done' in STATUSTEXT.text"
+    wait_for(link, "STATUSTEXT", text, within=30)
+
+
+def test_a_refusal_names_the_parameter(running: Stand) -> None:
+    link = running.connect()
+
+    ack = command_long(link, 54000, float("inf"))
+
+    assert (ack.result, ack.result_param2) == (2, 103)  # DENIED, BAD_PARAMETER
+    wait_for(link, "STATUSTEXT", "'param1 distance' in STATUSTEXT.text")
+
+
+def test_a_client_that_only_listens_hears_the_autopilot_first(running: Stand) -> None:
+    """As QGroundControl on 14550 and MAVSDK scripts on 14540: bound, and silent at first."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", running.push_port))
+        listener.settimeout(5)
+        heard, server = _hear(listener, until=lambda all_: len(all_) >= 3)
+        assert set(heard) == {("HEARTBEAT", 1)}
+
+        listener.sendto(
+            MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(MAVLink(None, 255)), server
+        )
+
+        heard, _ = _hear(listener, until=lambda all_: ("HEARTBEAT", 191) in all_)
+        assert ("ATTITUDE", 1) in heard
+
+
+Heard = list[tuple[str, int]]
+
+
+def _hear(
+    listener: socket.socket, *, until: Callable[[Heard], bool]
+) -> tuple[Heard, tuple[str, int]]:
+    """Listen until the condition holds; gives (message, component) in order, and the sender."""
+    parser = MAVLink(None)
+    parser.robust_parsing = True
+    heard: Heard = []
+    end = monotonic() + 10
+    while True:
+        assert monotonic() < end, heard
+        data, sender = listener.recvfrom(2048)
+        heard += [(m.get_type(), m.get_srcComponent()) for m in parser.parse_buffer(data) or ()]
+        if until(heard):
+            return heard, sender
+
+
+def _stays_put(running: Stand) -> None:
+    """Watch for a second that nothing moves."""
+    before = running.truth()[-1]
+    wait_until(lambda: running.truth()[-1]["time"] > before["time"] + 1.0, within=5)
+    after = running.truth()[-1]
+    assert abs(after["north"] - before["north"]) < 0.005
+    assert abs(after["east"] - before["east"]) < 0.005
+    assert abs(after["yaw"] - before["yaw"]) < 0.01

@@ -1,0 +1,108 @@
+"""What the operator can mend is said in one clear line, exit code 2, never a traceback."""
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.kit.processes import free_udp_ports, process
+
+
+def run(*arguments: str, environment: dict[str, str] | None = None) -> tuple[int, str, str]:
+    """Run ``mav-tasks`` to its end; gives exit code, standard output and error."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env={**os.environ, **(environment or {})},
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def assert_one_clear_line(result: tuple[int, str, str], *words: str) -> None:
+    code, _, error = result
+    assert code == 2, error
+    assert len(error.strip().splitlines()) == 1, error
+    for word in words:
+        assert word in error
+
+
+def test_a_port_in_use_is_named() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        result = run("serve", "--client", f"udpin:127.0.0.1:{port}", "--no-push")
+        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use")
+        assert_one_clear_line(
+            run("sim", "--port", str(port), "--body", "kinematic"), str(port), "in use"
+        )
+
+
+@pytest.mark.parametrize(
+    ("url", "word"),
+    [
+        ("carrier-pigeon:127.0.0.1:1", "udpin:host:port"),
+        ("udpin:127.0.0.1", "host:port"),
+        ("udpin:127.0.0.1:99999", "65535"),
+        ("udpin::14560", "host:port"),
+        ("tcp:127.0.0.1:5760", "not supported in this version"),
+        ("udpin:no.such.host.invalid:14560", "no.such.host.invalid"),
+        ("", "udpin:host:port"),
+    ],
+)
+@pytest.mark.parametrize("option", ["--client", "--vehicle"])
+def test_a_link_that_says_nothing_is_named(option: str, url: str, word: str) -> None:
+    assert_one_clear_line(run("serve", "--no-push", option, url), word)
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--client", "udpin:0.0.0.0:14560"),
+        ("--vehicle", "udpout:192.0.2.1:14580"),
+        ("--push", "192.0.2.1:14550"),
+    ],
+)
+def test_a_link_beyond_this_machine_needs_a_key(option: tuple[str, str]) -> None:
+    assert_one_clear_line(run("serve", *option), "--insecure", "signing key")
+
+
+def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
+    (port,) = free_udp_ports(1)
+    with process(
+        *("-m", "mav_tasks.cli", "serve", "--insecure", "--no-push"),
+        *("--client", f"udpin:0.0.0.0:{port}", "--vehicle", "udpout:127.0.0.1:9"),
+        folder=tmp_path,
+        name="server",
+    ) as server:
+        server.wait_for(f"clients on udpin:0.0.0.0:{port}")
+        server.end()
+    assert server.popen.returncode == 0
+
+
+def test_who_arms_must_be_known() -> None:
+    assert_one_clear_line(run("serve", "--arming", "anybody"), "anybody", "operator")
+
+
+def test_a_missing_pybullet_is_named_with_the_extra(tmp_path: Path) -> None:
+    (tmp_path / "pybullet.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
+    result = run("sim", "--port", "0", environment={"PYTHONPATH": str(tmp_path)})
+    assert_one_clear_line(result, "mav-tasks[sim]", "--body kinematic")
+
+
+def test_help_names_the_commands() -> None:
+    code, output, _ = run("--help")
+    assert code == 0
+    assert "serve" in output
+    assert "sim" in output
+
+
+def test_the_rovers_own_help_is_shown() -> None:
+    code, output, _ = run("sim", "--help")
+    assert code == 0
+    assert "--count" in output

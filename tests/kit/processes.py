@@ -1,0 +1,193 @@
+"""Real processes on loopback: the server, the simulated rover, and where the rover truly is."""
+
+import csv
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+os.environ.setdefault("MAVLINK20", "1")
+
+from pymavlink import mavutil
+
+T = TypeVar("T")
+
+START_LIMIT = 20.0  # s, for a process to say that it is there (cold caches, busy machine)
+STOP_LIMIT = 10.0  # s
+
+
+@dataclass
+class Process:
+    """A process that we started, and what it says."""
+
+    popen: subprocess.Popen[bytes]
+    output: Path
+
+    @property
+    def text(self) -> str:
+        """Give all that it has written so far."""
+        return self.output.read_text(encoding="utf-8", errors="replace")
+
+    def wait_for(self, pattern: str, *, within: float = START_LIMIT) -> re.Match[str]:
+        """Wait until it writes something that matches."""
+        return wait_until(
+            lambda: re.search(pattern, self.text),
+            within=within,
+            what=lambda: f"{pattern!r} in:\n{self.text}",
+        )
+
+    def end(self, number: int = signal.SIGTERM) -> float:
+        """Send a signal and wait for the end; gives the seconds that it took."""
+        began = time.monotonic()
+        self.popen.send_signal(number)
+        self.popen.wait(STOP_LIMIT)
+        return time.monotonic() - began
+
+
+def wait_until(
+    condition: Callable[[], T | None], *, within: float, what: Callable[[], str] | str = "condition"
+) -> T:
+    """Ask until the answer is true; AssertionError names what did not come in time."""
+    end = time.monotonic() + within
+    while not (answer := condition()):
+        if time.monotonic() > end:
+            raise AssertionError(f"not in {within} s: {what() if callable(what) else what}")
+        time.sleep(0.02)
+    return answer
+
+
+@contextmanager
+def process(*arguments: str, folder: Path, name: str) -> Iterator[Process]:
+    """Run a Python process while the block runs; it is killed if it is still there after it."""
+    output = folder / f"{name}.log"
+    with output.open("wb") as sink:
+        popen = subprocess.Popen(
+            [sys.executable, *arguments], stdout=sink, stderr=subprocess.STDOUT, cwd=folder
+        )
+    running = Process(popen, output)
+    try:
+        yield running
+    finally:
+        if popen.poll() is None:
+            popen.kill()
+        popen.wait(STOP_LIMIT)
+
+
+@dataclass
+class Stand:
+    """A server and a rover, running."""
+
+    server: Process
+    rover: Process
+    client_port: int
+    rover_port: int
+    push_port: int
+    truth_file: Path
+    _links: list[Any] = field(default_factory=list)
+
+    def truth(self) -> list[dict[str, float]]:
+        """Give the true poses so far, ten a second; a last half line is left out."""
+        text = self.truth_file.read_text(encoding="ascii")
+        rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
+        return [{key: float(value) for key, value in row.items()} for row in rows]
+
+    def speed(self) -> float:
+        """Give the rover's true speed, m/s."""
+        return abs(self.truth()[-1]["forward_speed"])
+
+    def connect(self, *, source_system: int = 255) -> Any:
+        """Give a stock pymavlink connection to the server that has heard the rover."""
+        return self._heard(f"udpout:127.0.0.1:{self.client_port}", source_system)
+
+    def connect_to_rover(self) -> Any:
+        """Give one to the rover itself, past the server."""
+        return self._heard(f"udpout:127.0.0.1:{self.rover_port}", 254)
+
+    def close(self) -> None:
+        """Close every connection given."""
+        for link in self._links:
+            link.close()
+
+    def _heard(self, url: str, source_system: int) -> Any:
+        link = mavutil.mavlink_connection(url, source_system=source_system)
+        self._links.append(link)
+        link.mav.heartbeat_send(6, 8, 0, 0, 4)
+        assert link.wait_heartbeat(timeout=10) is not None, "no heartbeat"
+        wait_for(link, "LOCAL_POSITION_NED")
+        wait_for(link, "ATTITUDE")
+        return link
+
+    def drive(self, link: Any, distance: float) -> int:
+        """Submit a move, wait until the rover is at speed; gives the task's id."""
+        task_id = submit(link, 54000, distance)
+        wait_until(lambda: self.speed() > 0.3, within=15, what="the rover at speed")
+        return task_id
+
+
+@contextmanager
+def stand(folder: Path, *serve_options: str, body: str = "kinematic") -> Iterator[Stand]:
+    """Run a server and a rover on ports of their own."""
+    client_port, rover_port, push_port = free_udp_ports(3)
+    truth = folder / "truth.csv"
+    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", body, "--truth", str(truth))
+    serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client_port}"]
+    serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
+    serve += ["--push", f"127.0.0.1:{push_port}", *serve_options]
+    with (
+        process(*rover, folder=folder, name="rover") as rover_process,
+        process(*serve, folder=folder, name="server") as server_process,
+    ):
+        server_process.wait_for("vehicle 1: found")
+        wait_until(truth.exists, within=START_LIMIT, what="the truth file")
+        it = Stand(server_process, rover_process, client_port, rover_port, push_port, truth)
+        try:
+            yield it
+        finally:
+            it.close()
+
+
+def submit(link: Any, command: int, *params: float, target: tuple[int, int] = (1, 191)) -> int:
+    """Send a COMMAND_LONG, wait for its acceptance; gives result_param2, the task's id."""
+    ack = command_long(link, command, *params, target=target)
+    assert ack.result == 0, ack
+    return int(ack.result_param2)
+
+
+def command_long(
+    link: Any, command: int, *params: float, target: tuple[int, int] = (1, 191)
+) -> Any:
+    """Send a COMMAND_LONG and give its COMMAND_ACK."""
+    filled = (*params, *(0.0,) * (7 - len(params)))
+    link.mav.command_long_send(*target, command, 0, *filled)
+    ack = link.recv_match(
+        type="COMMAND_ACK", condition=f"COMMAND_ACK.command=={command}", blocking=True, timeout=5
+    )
+    assert ack is not None, f"no ack for {command}"
+    return ack
+
+
+def free_udp_ports(count: int) -> list[int]:
+    """Give UDP ports of the loopback that nobody uses at this moment."""
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    try:
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [int(each.getsockname()[1]) for each in sockets]
+    finally:
+        for each in sockets:
+            each.close()
+
+
+def wait_for(link: Any, kind: str, condition: str | None = None, *, within: float = 10) -> Any:
+    """Wait for a message of a kind."""
+    message = link.recv_match(type=kind, condition=condition, blocking=True, timeout=within)
+    assert message is not None, f"no {kind} ({condition}) in {within} s"
+    return message
