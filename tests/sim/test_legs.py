@@ -1,0 +1,52 @@
+"""The server drives the pybullet rover: each leg measured from its own start, by the true pose."""
+
+import math
+
+import pytest
+
+from rover_sim.body import Body, BodyState, Pose
+from rover_sim.bullet import BulletBody
+from tests.kit.world import World
+
+pytestmark = pytest.mark.pybullet
+
+FRICTION_VARIATION = 0.3  # either way
+MOVE_TOLERANCE = 0.02  # m
+TURN_TOLERANCE = 1.0  # deg
+
+
+def slippery(seed: int, start: Pose) -> Body:
+    return BulletBody(start=start, variation=FRICTION_VARIATION, seed=seed)
+
+
+@pytest.mark.parametrize("seed", range(1, 11))
+def test_forward_and_rotate_end_where_they_should(seed: int) -> None:
+    world = World(body=lambda start: slippery(seed, start)).ready()
+    start = world.rover.truth
+
+    world.client.move(2.0)
+    assert world.run_until(lambda: world.is_idle(tasks=1), within=30)
+    after_move = world.rover.truth
+    assert along(start, after_move) == pytest.approx(2.0, abs=MOVE_TOLERANCE)
+    assert abs(across(start, after_move)) < MOVE_TOLERANCE
+
+    world.client.rotate(90)
+    assert world.run_until(lambda: world.is_idle(tasks=2), within=30)
+    assert turned(after_move, world.rover.truth) == pytest.approx(90, abs=TURN_TOLERANCE)
+
+    world.rover.body.close()
+    world.check()
+
+
+def along(start: BodyState, end: BodyState) -> float:
+    north, east = end.north - start.north, end.east - start.east
+    return north * math.cos(start.yaw) + east * math.sin(start.yaw)
+
+
+def across(start: BodyState, end: BodyState) -> float:
+    north, east = end.north - start.north, end.east - start.east
+    return east * math.cos(start.yaw) - north * math.sin(start.yaw)
+
+
+def turned(start: BodyState, end: BodyState) -> float:
+    return math.degrees(math.remainder(end.yaw - start.yaw, math.tau))

@@ -1,0 +1,53 @@
+"""README.md does not promise what is not there: its examples run, its commands are run by tests."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.kit.processes import stand
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+#: each command of the README, and what runs it
+COMMANDS = {
+    "./tools/demo": "tests/e2e/test_demo.py",
+    "./tools/test": ".ci/run",
+    "mav-tasks sim": "tests/e2e/test_by_hand.py",
+    "mav-tasks serve": "tests/e2e/test_by_hand.py",
+}
+
+
+def blocks(language: str) -> list[str]:
+    """Give the fenced blocks of one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_every_command_is_run_somewhere() -> None:
+    shown = re.findall(r"^\$ (.*)$", "".join(blocks("console")), flags=re.MULTILINE)
+    assert set(shown) == set(COMMANDS)
+    for command, where in COMMANDS.items():
+        assert command.removeprefix("mav-tasks ").strip("./") in (ROOT / where).read_text()
+
+
+@pytest.mark.parametrize("example", blocks("python"), ids=lambda text: text.split("\n")[0])
+def test_example_runs(example: str, tmp_path: Path) -> None:
+    with stand(tmp_path) as it:
+        example = example.replace("14560", str(it.client_port))
+        example = example.replace("14540", str(it.push_port))
+        done = subprocess.run(
+            [sys.executable, "-c", example], capture_output=True, text=True, timeout=50, check=False
+        )
+    assert done.returncode == 0, done.stderr
+    assert "task 1" in done.stdout.lower()
+
+
+def test_every_path_named_exists() -> None:
+    named = re.findall(r"`(?:\./)?((?:tools|tests|dialects|sim)/[\w./]*)`", README)
+    named += re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
+    assert named
+    for path in named:
+        assert (ROOT / path).exists(), path
