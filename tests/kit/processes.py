@@ -65,12 +65,14 @@ def wait_until(
 
 
 @contextmanager
-def process(*arguments: str, folder: Path, name: str) -> Iterator[Process]:
+def process(
+    *arguments: str, folder: Path, name: str, python: str = sys.executable
+) -> Iterator[Process]:
     """Run a Python process while the block runs; it is killed if it is still there after it."""
     output = folder / f"{name}.log"
     with output.open("wb") as sink:
         popen = subprocess.Popen(
-            [sys.executable, *arguments], stdout=sink, stderr=subprocess.STDOUT, cwd=folder
+            [python, *arguments], stdout=sink, stderr=subprocess.STDOUT, cwd=folder
         )
     running = Process(popen, output)
     try:
