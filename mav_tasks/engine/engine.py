@@ -27,6 +27,7 @@ from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer, target_of
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.services.command_receiver import command_of
@@ -34,6 +35,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, ServerStopped
 
+EVERYBODY = Address(0, 0)
 #: the server decides what vehicles send, and how often each client gets it
 CLAIMED_STREAMS = frozenset({m.RequestDataStream.id})
 
@@ -175,11 +177,14 @@ class Engine:
             self._forward(client, received, now=now)
 
     def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
-        """Pass a client's packet to the vehicles that it is for."""
-        target = 0 if received.message is None else target_of(received.message).system_id
+        """Pass a client's packet to the vehicles that it is for; what is for us ends here."""
+        message = received.message
+        target = EVERYBODY if message is None else target_of(message)
         for vehicle in self._vehicles:
-            if target in (0, vehicle.system_id) and may_pass(
-                vehicle, client.key, received.message, now=now
+            if (
+                target.system_id in (0, vehicle.system_id)
+                and target != vehicle.server_address
+                and may_pass(vehicle, client.key, message, now=now)
             ):
                 vehicle.forward(received.packet)
 

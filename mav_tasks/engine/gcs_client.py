@@ -32,7 +32,7 @@ class GcsClient:
         #: spoken to before it was heard: gets heartbeats until it answers
         self.is_configured = is_configured
         self.is_heard = False
-        self.address = Address(0, 0)
+        self._addresses: dict[Address, None] = {}  # seen here, the latest last
         #: has used our dialect: gets TASK_STATUS
         self.uses_dialect = False
         self.thinner = Thinner(default_interval=settings.stream_interval)
@@ -44,7 +44,8 @@ class GcsClient:
         self._receivers: dict[Address, CommandReceiver] = {}
 
     def __repr__(self) -> str:
-        return f"GcsClient({self.address} at {self.key})"
+        names = " ".join(map(str, self._addresses)) or "unheard"
+        return f"GcsClient({names} at {self.endpoint})"
 
     @property
     def key(self) -> tuple[str, Peer]:
@@ -75,6 +76,19 @@ class GcsClient:
             nonces = self._nonces.setdefault(source, OrderedDict())
             receiver = self._receivers[source] = CommandReceiver(nonces)
         return receiver
+
+    def heard(self, source: Address, *, now: float) -> None:
+        """Note that a packet of this address came from here."""
+        self.heard_at = now
+        self.is_heard = True
+        if source not in self._addresses:
+            if len(self._addresses) >= MAX_ADDRESSES:
+                del self._addresses[next(iter(self._addresses))]
+            self._addresses[source] = None
+
+    def is_reached_by(self, target: Address) -> bool:
+        """Whether a message for this target is for somebody here."""
+        return any(target.reaches(address) for address in self._addresses)
 
     def knows(self, system_id: int) -> bool:
         """Whether the client has seen a heartbeat of this vehicle's autopilot."""

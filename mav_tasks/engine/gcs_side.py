@@ -12,7 +12,7 @@ from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.codec import Decoder, Packer
+from mav_tasks.mavlink.codec import Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatSender
@@ -88,15 +88,28 @@ class GcsSide:
             if message is None:  # unverified bytes make nobody a client
                 return None
             client = self._add(link, peer, is_configured=False, now=now)
-        client.heard_at = now
-        client.is_heard = True
-        client.address = packet.source
+        client.heard(packet.source, now=now)
         return Received(client, packet, message)
 
     def forward(self, packet: Packet, *, now: float) -> None:
-        """Show a vehicle's packet to every client that is to have it."""
+        """Show a vehicle's packet to every client that is to have it.
+
+        One that names whom it is for goes to nobody else: clients take an answer to another's
+        question for their own.
+        """
+        if packet.message_id not in m.TARGETED:
+            for client in self._clients.values():
+                client.forward(packet, now=now)
+            return
+        message = self._decoder.decode(packet)
+        if message is None:
+            return
+        target = target_of(message)
         for client in self._clients.values():
-            client.forward(packet, now=now)
+            if client.is_reached_by(target):
+                client.forward(packet, now=now)
+            else:
+                client.outlet.withhold(packet.source)
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT to every client."""

@@ -13,6 +13,7 @@ from mav_tasks.tasks.events import (
     QueuePaused,
     TaskChanged,
     VehicleNoted,
+    VehicleSeen,
 )
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import (
@@ -147,6 +148,8 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             return event.vehicle, MavSeverity.NOTICE, f"Queue paused: {_lower(event.reason)}"
         case QueueContinued():
             return event.vehicle, MavSeverity.INFO, "Queue continued"
+        case VehicleSeen(text=text):
+            return event.vehicle, MavSeverity.INFO, f"Vehicle {event.vehicle} {text}"
         case VehicleNoted(text=text):
             return event.vehicle, MavSeverity.WARNING, f"Vehicle {event.vehicle} {text}"
     return None

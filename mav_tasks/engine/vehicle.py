@@ -21,7 +21,7 @@ from mav_tasks.services.offboard import OffboardControl, Phase, Refused, is_requ
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import SERVER, VehicleNoted
+from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
@@ -131,7 +131,7 @@ class Vehicle:
         self.control.heard(armed=armed, mode=mode)
         if not self._was_heard:
             self._was_heard = True
-            self._note("heard again", now=now)
+            self._book.record(VehicleSeen(self.system_id, "heard again", now))
         if mode != was_mode:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:

@@ -20,7 +20,7 @@ from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
 from mav_tasks.services.persona import persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 
 MAX_PEERS = 256  # endpoints on one vehicle link
 
@@ -176,7 +176,7 @@ class VehicleSide:
             now=now,
         )
         self.vehicles[packet.system_id] = vehicle
-        self._book.record(VehicleNoted(packet.system_id, f"found ({persona.name})", now))
+        self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         vehicle.step(now=now)
         return vehicle
 

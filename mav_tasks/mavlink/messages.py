@@ -68,3 +68,6 @@ VfrHud = d.MAVLink_vfr_hud_message
 
 ALL: dict[int, type[Message]] = d.mavlink_map
 """Every message that the dialect defines, by id."""
+
+TARGETED = frozenset(id_ for id_, kind in ALL.items() if "target_system" in kind.fieldnames)
+"""The ids of those that name whom they are for."""

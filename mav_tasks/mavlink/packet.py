@@ -15,9 +15,9 @@ SIGNED = 0x01  # the only incompat flag there is
 SIGNATURE_LENGTH = 13
 MAX_PACKET = 280  # 10 header + 255 payload + 2 CRC + 13 signature
 
-_HEADER_V1 = 6
-_HEADER_V2 = 10
-_CRC = 2
+HEADER_V1 = 6
+HEADER_V2 = 10
+CRC = 2
 
 
 class Packet(NamedTuple):
@@ -47,7 +47,7 @@ class Packet(NamedTuple):
     @property
     def payload(self) -> bytes:
         """The payload as sent: MAVLink 2 cuts trailing zeros off."""
-        start = _HEADER_V2 if self.is_v2 else _HEADER_V1
+        start = HEADER_V2 if self.is_v2 else HEADER_V1
         return self.raw[start : start + self.raw[1]]
 
 
@@ -59,10 +59,10 @@ def split_datagram(data: bytes) -> list[Packet]:
     """
     packets: list[Packet] = []
     start, end = 0, len(data)
-    while end - start >= _HEADER_V1 + _CRC:
+    while end - start >= HEADER_V1 + CRC:
         magic = data[start]
-        if magic == MAGIC_V2 and end - start >= _HEADER_V2 + _CRC:
-            stop = start + _HEADER_V2 + data[start + 1] + _CRC
+        if magic == MAGIC_V2 and end - start >= HEADER_V2 + CRC:
+            stop = start + HEADER_V2 + data[start + 1] + CRC
             if data[start + 2] & SIGNED:
                 stop += SIGNATURE_LENGTH
             if stop <= end and data[start + 2] & ~SIGNED == 0:
@@ -78,7 +78,7 @@ def split_datagram(data: bytes) -> list[Packet]:
                 start = stop
                 continue
         elif magic == MAGIC_V1:
-            stop = start + _HEADER_V1 + data[start + 1] + _CRC
+            stop = start + HEADER_V1 + data[start + 1] + CRC
             if stop <= end:
                 packets.append(
                     Packet(
@@ -117,7 +117,7 @@ def _patched(raw: bytes, index: int, value: int) -> bytes:
     changed byte and as many zeros as follow it up to and with CRC_EXTRA (1 in place of 2 CRC
     bytes: ``len(raw) - index - 2``).
     """
-    crc = _tail_crcs(len(raw) - index - _CRC)[raw[index] ^ value]
+    crc = _tail_crcs(len(raw) - index - CRC)[raw[index] ^ value]
     patched = bytearray(raw)
     patched[index] = value
     patched[-2] ^= crc & 0xFF

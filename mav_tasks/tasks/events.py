@@ -99,8 +99,20 @@ class QueueContinued:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleSeen:
+    """A vehicle was found, or is heard again."""
+
+    vehicle: int
+    text: str
+    at: float
+
+    def __str__(self) -> str:
+        return f"vehicle {self.vehicle}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleNoted:
-    """Something about a vehicle that its operator should read: seen, silent, taken over."""
+    """Something about a vehicle that its operator should read: silent, taken over, restarted."""
 
     vehicle: int
     text: str
@@ -127,6 +139,7 @@ Event = (
     | SubmissionRefused
     | QueuePaused
     | QueueContinued
+    | VehicleSeen
     | VehicleNoted
     | ServerStopped
 )

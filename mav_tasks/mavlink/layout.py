@@ -1,0 +1,89 @@
+"""How one kind of message lies on the wire: payload bytes ↔ field values.
+
+It uses the generated class's own ``struct`` and field order, and leaves out what pymavlink's
+``decode`` and ``pack`` do around them (copies, header objects, sums over arrays for each field):
+those took a quarter of the server's time under load. Tested equal to pymavlink's for every message.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from operator import attrgetter, itemgetter
+from typing import Any
+
+from mav_tasks.mavlink.messages import Message
+
+_Values = Sequence[Any]
+
+
+class Layout:
+    """The wire layout of one message class."""
+
+    __slots__ = ("_get", "_message", "_order", "_struct", "crc_extra")
+
+    def __init__(self, message: type[Message]) -> None:
+        self._message = message
+        self._struct = message.unpacker
+        self.crc_extra = bytes((message.crc_extra,))
+        is_plain = sum(message.lengths) == len(message.lengths)
+        has_text = "char" in message.fieldtypes
+        self._order = _orderly(message, is_plain=is_plain, has_text=has_text)
+        self._get = _getter(message, is_plain=is_plain)
+
+    def message(self, payload: bytes) -> Message:
+        """Give the message; a payload too short is filled with zeros, what is too much cut off."""
+        size = self._struct.size
+        if len(payload) != size:
+            payload = payload[:size].ljust(size, b"\0")
+        return self._message(*self._order(self._struct.unpack(payload)))
+
+    def payload(self, message: Message) -> bytes:
+        """Give the payload, trailing zeros cut off but for the first byte (MAVLink 2)."""
+        packed = self._struct.pack(*self._get(message))
+        return packed.rstrip(b"\0") or packed[:1]
+
+
+def _orderly(
+    message: type[Message], *, is_plain: bool, has_text: bool
+) -> Callable[[_Values], _Values]:
+    """Give what turns values in wire order into values in the order of definition."""
+    if is_plain and not has_text and len(message.orders) > 1:
+        if message.orders == sorted(message.orders):
+            return lambda values: values
+        return itemgetter(*message.orders)
+    if is_plain and not has_text:
+        return lambda values: values
+    starts = [sum(message.lengths[:order]) for order in message.orders]
+    lengths = [message.lengths[order] for order in message.orders]
+
+    def ordered(values: _Values) -> _Values:
+        fields: list[Any] = []
+        for start, length in zip(starts, lengths, strict=True):
+            value = values[start]
+            if isinstance(value, bytes):
+                value = value.rstrip(b"\0")
+            elif length > 1:
+                value = list(values[start : start + length])
+            fields.append(value)
+        return fields
+
+    return ordered
+
+
+def _getter(message: type[Message], *, is_plain: bool) -> Callable[[Message], Iterable[Any]]:
+    """Give what takes a message's values in wire order, arrays flattened."""
+    types = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
+    # under its own name a text is a str: its bytes, which need not be UTF-8, are kept beside it
+    names = [f"_{n}_raw" if types[n] == "char" else n for n in message.ordered_fieldnames]
+    get = attrgetter(*names)
+    if is_plain and len(names) > 1:
+        return get
+    if len(names) == 1:
+        return lambda message: (get(message),)
+    return lambda message: _flat(get(message))
+
+
+def _flat(values: Iterable[Any]) -> Iterable[Any]:
+    for value in values:
+        if isinstance(value, (list, tuple)):
+            yield from value
+        else:
+            yield value
