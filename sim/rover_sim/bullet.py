@@ -31,6 +31,7 @@ RIDE_HEIGHT = 0.15  # m, ground to the base's origin
 MAX_TORQUE = 20.0  # N·m a wheel; a turn on the spot takes 9 at friction 1.1, and 6 stall there
 SETTLING = 0.5  # s, from the drop onto the wheels to rest
 WHEEL_SPREAD = 0.05  # of the friction; how far one wheel may be off the ground's value
+VIEW_DISTANCE = 4.0  # m, of the window's camera
 LEFT_RIGHT = (0, 1, 2, 3)  # joints: front left, front right, rear left, rear right
 
 
@@ -53,6 +54,8 @@ class BulletBody:
     ) -> None:
         self._p = _pybullet()
         self._client: int = self._p.connect(self._p.GUI if gui else self._p.DIRECT)
+        if gui:
+            self._show_ground(start)
         self._steps = 1  # physics steps to one stepSimulation
         self._demand = (0.0, 0.0)
         self._time = 0.0
@@ -124,6 +127,18 @@ class BulletBody:
             physicsClientId=self._client,
         )
         self._demand = (forward_speed, yaw_rate)
+
+    def _show_ground(self, start: Pose) -> None:
+        """Show the ground from above and behind the start, north up, without any panels."""
+        p, client = self._p, self._client
+        p.configureDebugVisualizer(p.COV_ENABLE_GUI, 0, physicsClientId=client)
+        p.resetDebugVisualizerCamera(
+            cameraDistance=VIEW_DISTANCE,
+            cameraYaw=-90,
+            cameraPitch=-50,
+            cameraTargetPosition=(start.north + 1.0, -start.east, 0.0),
+            physicsClientId=client,
+        )
 
     def _build(self, start: Pose, frictions: list[float]) -> int:
         p, client = self._p, self._client
