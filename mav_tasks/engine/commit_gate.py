@@ -1,15 +1,20 @@
 """What waits until an event is durable: acknowledgements, each with its time limit."""
 
 from collections import deque
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
+
+
+class Effect(Protocol):
+    """What is done when it is known."""
+
+    def __call__(self, *, now: float) -> None: ...
 
 
 class _Held(NamedTuple):
     number: int  # of the event that must be durable first
     give_up_at: float
-    release: Callable[[], None]
-    give_up: Callable[[], None]
+    release: Effect
+    give_up: Effect
 
 
 class CommitGate:
@@ -26,16 +31,16 @@ class CommitGate:
         number: int,
         *,
         give_up_at: float,
-        release: Callable[[], None],
-        give_up: Callable[[], None],
+        release: Effect,
+        give_up: Effect,
     ) -> None:
         """Call ``release`` once event ``number`` is durable, or ``give_up`` if too late."""
         self._held.append(_Held(number, give_up_at, release, give_up))
 
-    def committed(self, through: int) -> None:
+    def committed(self, through: int, *, now: float) -> None:
         """Release all that waited for events up to ``through``."""
         while self._held and self._held[0].number <= through:
-            self._held.popleft().release()
+            self._held.popleft().release(now=now)
 
     def next_deadline(self) -> float | None:
         """Give when the oldest has waited too long."""
@@ -44,4 +49,4 @@ class CommitGate:
     def handle_deadline(self, *, now: float) -> None:
         """Give up what has waited too long."""
         while self._held and self._held[0].give_up_at <= now:
-            self._held.popleft().give_up()
+            self._held.popleft().give_up(now=now)

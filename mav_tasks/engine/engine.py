@@ -8,6 +8,7 @@ monotonic seconds, never going back.
 from typing import assert_never
 
 from mav_tasks.engine.commands import Commands
+from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import (
@@ -25,6 +26,7 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.engine.motion_gate import may_pass
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
+from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -36,8 +38,10 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, ServerStopped
 
 EVERYBODY = Address(0, 0)
-#: the server decides what vehicles send, and how often each client gets it
-CLAIMED_STREAMS = frozenset({m.RequestDataStream.id})
+SETUP_SIGNING = 256
+#: never forwarded: the server decides what vehicles send and how often each client gets it, and
+#: no client may change a vehicle's keys
+CLAIMED = frozenset({m.RequestDataStream.id, SETUP_SIGNING})
 
 
 class Engine:
@@ -53,8 +57,12 @@ class Engine:
         self._vehicles = VehicleSide(
             queue=self._packets, packer=packer, book=self._book, settings=settings
         )
-        self._commands = Commands(self._gcs, self._vehicles, self._book, settings)
-        self._publisher = Publisher(self._gcs, self._vehicles, self._book, self._commands)
+        self._submissions = Submissions(self._gcs, self._book, settings)
+        displays = Displays(self._vehicles, self._book)
+        self._commands = Commands(
+            self._gcs, self._vehicles, self._book, self._submissions, displays
+        )
+        self._publisher = Publisher(self._gcs, self._vehicles, self._book, displays)
         self._stop_by: float | None = None
         self._stopped = False
         self._wall_offset = 0.0
@@ -67,6 +75,7 @@ class Engine:
 
     def handle(self, item: Input, *, now: float) -> None:
         """Take one input in."""
+        self._vehicles.check_late(now=now)
         match item:
             case Packets():
                 self._receive(item, now=now)
@@ -76,10 +85,10 @@ class Engine:
                 self._vehicles.change_link(item, now=now)
             case Committed(through=through):
                 self._book.durable = through
-                self._commands.committed(through)
+                self._submissions.committed(through, now=now)
                 self._step_vehicles(now=now)
             case StoreFailed():
-                self._commands.store_failed()
+                self._submissions.store_failed()
             case SettingsChanged(settings=settings):
                 self._apply(settings)
             case WallClock(offset=offset):
@@ -95,15 +104,16 @@ class Engine:
         deadlines = [
             self._publisher.next_deadline(),
             self._vehicles.next_deadline(),
-            self._commands.next_deadline(),
+            self._submissions.next_deadline(),
             None if self._stopped else self._stop_by,
         ]
         return min((d for d in deadlines if d is not None), default=None)
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due by now; may come late, or for nothing."""
+        self._vehicles.check_late(now=now)
         self._vehicles.handle_deadline(now=now)
-        self._commands.handle_deadline(now=now)
+        self._submissions.handle_deadline(now=now)
         self._settle(now=now)
         self._publisher.handle_deadline(now=now)
 
@@ -168,18 +178,18 @@ class Engine:
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
-        self._publisher.welcome(client)
+        self._publisher.welcome(client, now=now)
         if isinstance(message, m.CommandLong | m.CommandInt):
             self._commands.receive(client, packet, command_of(message), now=now)
         elif isinstance(message, m.SetMode):
             self._commands.set_mode(client, packet, message, now=now)
-        elif packet.message_id not in CLAIMED_STREAMS:
+        elif packet.message_id not in CLAIMED:
             self._forward(client, received, now=now)
 
     def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
         """Pass a client's packet to the vehicles that it is for; what is for us ends here."""
         message = received.message
-        target = EVERYBODY if message is None else target_of(message)
+        target = EVERYBODY if message is None else _target(message)
         for vehicle in self._vehicles:
             if (
                 target.system_id in (0, vehicle.system_id)
@@ -211,10 +221,10 @@ class Engine:
         self._settings = settings
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
-        self._commands.apply(settings)
+        self._submissions.apply(settings)
 
     def _shut_down(self, *, now: float) -> None:
-        self._commands.close()
+        self._submissions.close()
         self._stop_by = now + self._settings.watch.shutdown
         for vehicle in self._vehicles:
             vehicle.shut_down(now=now)
@@ -225,3 +235,10 @@ class Engine:
         if not self._stopped and (stands or now >= self._stop_by):
             self._stopped = True
             self._book.record(ServerStopped(now))
+
+
+def _target(message: m.Message) -> Address:
+    """Give whom a message is for, 0 for all."""
+    if isinstance(message, m.ManualControl):  # its field has a name of its own
+        return Address(message.target, 0)
+    return target_of(message)

@@ -9,7 +9,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
-from mav_tasks.services.command_receiver import CommandReceiver, Pending
+from mav_tasks.services.command_receiver import Answer, CommandReceiver, Pending
 from mav_tasks.services.message_interval import Thinner
 from mav_tasks.services.statustext import RateLimit
 from mav_tasks.services.task_status import TaskStatusSender
@@ -89,6 +89,10 @@ class GcsClient:
     def is_reached_by(self, target: Address) -> bool:
         """Whether a message for this target is for somebody here."""
         return any(target.reaches(address) for address in self._addresses)
+
+    def answer(self, answer: Answer, to: Address) -> None:
+        """Send the COMMAND_ACK of a command that ``to`` at this endpoint sent."""
+        self.outlet.send(answer.ack(to), answer.source)
 
     def knows(self, system_id: int) -> bool:
         """Whether the client has seen a heartbeat of this vehicle's autopilot."""

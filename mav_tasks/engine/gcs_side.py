@@ -88,7 +88,8 @@ class GcsSide:
             if message is None:  # unverified bytes make nobody a client
                 return None
             client = self._add(link, peer, is_configured=False, now=now)
-        client.heard(packet.source, now=now)
+        if message is not None:
+            client.heard(packet.source, now=now)
         return Received(client, packet, message)
 
     def forward(self, packet: Packet, *, now: float) -> None:

@@ -5,6 +5,7 @@ the sticks moves a vehicle that a task is driving.
 """
 
 from collections.abc import Hashable
+from math import isfinite
 
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
@@ -17,6 +18,7 @@ MOTION = (
     m.SetActuatorControlTarget,
     m.FollowTarget,
     m.MissionItem,  # with current = 2 it is ArduPilot's "go to"
+    m.MissionItemInt,
 )
 GO_TO = (2, 3)  # MISSION_ITEM.current: go there now, at once or to this altitude
 STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
@@ -26,9 +28,11 @@ RC_IGNORED = (0, 65535)
 
 def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, now: float) -> bool:
     """Whether a client's message is passed on to the vehicle."""
-    if isinstance(message, m.MissionItem) and message.current not in GO_TO:
+    if isinstance(message, m.MissionItem | m.MissionItemInt) and message.current not in GO_TO:
         return True  # part of an upload
     if isinstance(message, MOTION):
+        if not _is_finite(message):
+            return False
         return vehicle.may_move(client, now=now)
     if isinstance(message, m.ManualControl | m.RcChannelsOverride):
         if vehicle.tasks.is_stopped:
@@ -38,10 +42,16 @@ def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, n
     return True
 
 
+def _is_finite(message: m.Message) -> bool:
+    """Whether no number in it would make an autopilot abort, even in a field that is ignored."""
+    values = message.to_dict().values()
+    return all(isfinite(value) for value in values if isinstance(value, float))
+
+
 def _off_centre(message: m.ManualControl | m.RcChannelsOverride) -> bool:
     """Whether a person moves the sticks, rather than resting at them."""
     if isinstance(message, m.ManualControl):
-        sticks = (message.x, message.y, message.r)
+        sticks = (message.x, message.y, message.z, message.r)  # z is a rover's throttle
         return any(abs(s) > STICKS_CENTRED for s in sticks if s != 0x7FFF)
     channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
     return any(abs(c - RC_CENTRE) > STICKS_CENTRED for c in channels if c not in RC_IGNORED)

@@ -28,7 +28,9 @@ class MotionMonitor:
         if not _is_finite(message) or not self._is_newer(message):
             return
         if isinstance(message, LocalPositionNed):
-            self._position, self._position_at = message, now
+            if not self._is_frozen(message):
+                self._position_at = now
+            self._position = message
         else:
             self._attitude, self._attitude_at = message, now
         if self._moved_at is None or not self._is_slow():
@@ -66,13 +68,26 @@ class MotionMonitor:
         self.rebooted = False
 
     def _is_newer(self, message: Attitude | LocalPositionNed) -> bool:
-        last = self._last_boot_ms.get(message.id)
-        if last is not None and message.time_boot_ms < last:
-            if last - message.time_boot_ms < REBOOT:
+        last = self._last_boot_ms.get(message.id, message.time_boot_ms)
+        back = (last - message.time_boot_ms) & 0xFFFFFFFF  # the field overflows after 49 days
+        if 0 < back < 0x80000000:
+            if back < REBOOT:
                 return False
             self.rebooted = True
         self._last_boot_ms[message.id] = message.time_boot_ms
         return True
+
+    def _is_frozen(self, message: LocalPositionNed) -> bool:
+        """Whether it says that it moves, and yet is where it was: an estimator that stands still.
+
+        Such a position is as old as the first of its kind.
+        """
+        last = self._position
+        return (
+            last is not None
+            and (message.x, message.y) == (last.x, last.y)
+            and hypot(message.vx, message.vy) >= self._watch.still_speed
+        )
 
     def _is_slow(self) -> bool:
         position, attitude = self._position, self._attitude

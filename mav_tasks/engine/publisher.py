@@ -1,7 +1,7 @@
 """Tells clients what happened, and keeps them supplied: heartbeats, statuses, introductions."""
 
 from mav_tasks.engine import translate
-from mav_tasks.engine.commands import Commands
+from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.vehicle_side import VehicleSide
@@ -17,17 +17,19 @@ class Publisher:
     """What goes to clients without their asking each time."""
 
     def __init__(
-        self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook, commands: Commands
+        self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook, displays: Displays
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
-        self._commands = commands
+        self._displays = displays
 
-    def welcome(self, client: GcsClient) -> None:
+    def welcome(self, client: GcsClient, *, now: float) -> None:
         """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
         for vehicle in self._vehicles:
-            if vehicle.last_heartbeat is not None and not client.knows(vehicle.system_id):
+            if client.knows(vehicle.system_id) or not vehicle.is_heard(now=now):
+                continue  # a silent one must not look alive
+            if vehicle.last_heartbeat is not None:
                 client.introduce(vehicle.last_heartbeat, last_seq=vehicle.last_seq)
 
     def withhold(self, packet: Packet) -> None:
@@ -84,7 +86,7 @@ class Publisher:
                 if vehicle.tasks.begun is not None
             ]
             for task_id in client.statuses.due(active, now=now):
-                self._commands.send_status(client, task_id, with_position=False, now=now)
+                self._displays.push_status(client, task_id, now=now)
 
     def _send_heartbeats(self, *, now: float) -> None:
         """One from inside each vehicle that is heard, to each client that is.

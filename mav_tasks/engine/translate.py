@@ -4,6 +4,7 @@ from math import degrees, isfinite, isnan, nan, radians
 
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavResult, MavSeverity
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Driving
@@ -15,7 +16,7 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import (
     DEFAULT_PRIORITY,
     MAX_PRIORITY,
@@ -39,6 +40,9 @@ RESULT_OF: dict[int, MavResult] = {
     R.RATE_LIMITED: MavResult.TEMPORARILY_REJECTED,
     R.STOPPED: MavResult.TEMPORARILY_REJECTED,
     R.OTHER_CONTROLLER: MavResult.TEMPORARILY_REJECTED,
+    R.WRONG_MODE: MavResult.TEMPORARILY_REJECTED,
+    R.NO_POSITION: MavResult.TEMPORARILY_REJECTED,
+    R.DISARMED: MavResult.TEMPORARILY_REJECTED,
     R.VEHICLE_SILENT: MavResult.FAILED,
     R.NOT_SUPPORTED_BY_VEHICLE: MavResult.UNSUPPORTED,
 }
@@ -78,9 +82,15 @@ def nonce_of(command: Command) -> int:
 
 
 def task_status(
-    task: Task, tasks: VehicleTasks, *, link_number: int, with_position: bool, now: float
+    task: Task,
+    tasks: VehicleTasks,
+    *,
+    reader: Address,
+    link_number: int,
+    with_position: bool,
+    now: float,
 ) -> m.TaskStatus:
-    """Give the TASK_STATUS of a task of this vehicle."""
+    """Give the TASK_STATUS of a task of this vehicle, for the client at ``reader``."""
     reason = tasks.wait_reason(task)
     position = tasks.position(task) if with_position else None
     return m.TaskStatus(
@@ -97,8 +107,8 @@ def task_status(
         queue_position=UNKNOWN_POSITION if position is None else position,
         step=0,
         step_count=1,
-        target_system=task.submitter.system_id,
-        target_component=task.submitter.component_id,
+        target_system=reader.system_id,
+        target_component=reader.component_id,
         state=task.state,
         reason=reason,
         priority=task.priority,
@@ -137,15 +147,15 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         case TaskChanged(new=TaskState.COMPLETED):
             return event.vehicle, MavSeverity.NOTICE, f"Task {event.task_id} done"
         case TaskChanged(new=TaskState.FAILED | TaskState.HELD as new, reason=reason):
-            text = f"Task {event.task_id} {new.name.lower()}: {_lower(reason)}"
+            text = f"Task {event.task_id} {new.name.lower()}: {words_of(reason)}"
             return event.vehicle, MavSeverity.ERROR, text
         case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
-            text = f"Task {event.task_id} {new.name.lower()}: {_lower(event.reason)}"
+            text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
             return event.vehicle, MavSeverity.NOTICE, text
         case QueuePaused(reason=TaskReason.STOPPED):
             return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"
         case QueuePaused():
-            return event.vehicle, MavSeverity.NOTICE, f"Queue paused: {_lower(event.reason)}"
+            return event.vehicle, MavSeverity.NOTICE, f"Queue paused: {words_of(event.reason)}"
         case QueueContinued():
             return event.vehicle, MavSeverity.INFO, "Queue continued"
         case VehicleSeen(text=text):
@@ -172,6 +182,11 @@ def message_id_of(command: Command) -> int:
 def task_id_of(command: Command) -> int:
     """Give the task id in param2 of REQUEST_MESSAGE(TASK_STATUS); -1 for nonsense."""
     return _whole(command.params[1])
+
+
+def first_index_of(command: Command) -> int:
+    """Give the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 for nonsense."""
+    return _whole(command.params[2])
 
 
 def _whole(value: float) -> int:
@@ -253,8 +268,4 @@ def _progress(task: Task) -> int:
 
 def _words(task: Task, reason: TaskReason) -> str:
     state = task.state.name.lower()
-    return f"{describe(task.goal)}: {state}" + (f" ({_lower(reason)})" if reason else "")
-
-
-def _lower(reason: TaskReason) -> str:
-    return reason.name.lower().replace("_", " ")
+    return f"{describe(task.goal)}: {state}" + (f" ({words_of(reason)})" if reason else "")

@@ -5,6 +5,7 @@ want; and no setpoint at all to a vehicle that is not ours.
 """
 
 from collections.abc import Hashable
+from dataclasses import replace
 from math import inf
 
 from mav_tasks.engine.inputs import Outgoing
@@ -23,12 +24,12 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.guidance import Motion
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
-from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
+from mav_tasks.tasks.view import STOP, Demand, DemandKind, ModeKind, VehicleView
 
-OUR_HOLD = 1.5  # s after we asked for HOLD, in which a change to it is our own doing
+LATE_REQUESTS = 1.5  # s after a STOP, in which requests that left before it may still arrive
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -56,7 +57,6 @@ class Vehicle:
         self.outlet = outlet
         self.tasks = VehicleTasks(system_id, book, settings)
         self.motion = MotionMonitor(settings.watch)
-        self.sender = CommandSender()
         self.intervals = IntervalRequester(now=now)
         self.last_heartbeat: Packet | None = None
         self.last_seq = 0  # of the autopilot's packets
@@ -64,6 +64,7 @@ class Vehicle:
         self._settings = settings
         self._source = Address(settings.identity.system_id, settings.identity.component_id)
         self._target = Address(system_id, AUTOPILOT)
+        self.sender = CommandSender(self._source)
         self.control = OffboardControl(self._target, persona, self.sender, settings.watch)
         self._monitor = HeartbeatMonitor(
             heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
@@ -75,6 +76,8 @@ class Vehicle:
         self._mode_is_ours = False
         self._next_tick = inf
         self._was_heard = True
+        self._is_closing = False
+        self.stopped_at = -inf  # the last STOP
         self._other_controller_at = -inf
         self._granted: set[Hashable] = set()
         self._own_components: set[int] = set()
@@ -112,13 +115,15 @@ class Vehicle:
         if isinstance(message, m.CommandAck):
             self.sender.receive(message, component=component_id, now=now)
             self._flush(now=now)
+            self._ask_for_rates(now=now)
         elif component_id != AUTOPILOT:
             if isinstance(message, m.Heartbeat):
                 self._note_component(component_id, now=now)
         elif isinstance(message, m.Heartbeat):
             self._receive_heartbeat(message, now=now)
         elif isinstance(message, m.Attitude | m.LocalPositionNed):
-            self.motion.receive(message, now=now)
+            # read after a delay, it may have come at any time since
+            self.motion.receive(message, now=min(now, self._next_tick))
             if self.motion.rebooted:
                 self._rebooted(now=now)
             if not self._is_ticking and not self.tasks.is_idle:
@@ -130,48 +135,68 @@ class Vehicle:
         armed, mode = self._monitor.armed, self._monitor.custom_mode
         self.control.heard(armed=armed, mode=mode)
         if not self._was_heard:
-            self._was_heard = True
-            self._book.record(VehicleSeen(self.system_id, "heard again", now))
+            self._heard_again(now=now)
         if mode != was_mode:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
             self._disarmed(now=now)
+        if armed and mode == self.persona.manual_mode and self.control.phase is Phase.ASKING_MODE:
+            self._take_over("armed to be driven by hand", now=now)
         if not self._is_ticking:
             self.step(now=now)
+        self._ask_for_rates(now=now)
+
+    def _heard_again(self, *, now: float) -> None:
+        self._was_heard = True
+        self._book.record(VehicleSeen(self.system_id, "heard again", now))
+        if self.control.phase is Phase.STOPPING:
+            self._begin_stop(now=now)
 
     def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
-        asking = self.control.phase in (Phase.ASKING_MODE, Phase.RELEASING, Phase.STOPPING)
-        by_client = mode == self._asked_mode
-        ours = mode in (self.persona.control_mode, self.persona.hold_mode) and (asking or by_client)
-        if mode == self.persona.hold_mode and self.control.asked_for_hold_since(now - OUR_HOLD):
-            ours = True
+        persona = self.persona
+        by_client = mode == self._asked_mode and mode == persona.control_mode
+        ours = by_client or self.control.may_have_set(mode, now=now)
         self._mode_is_ours = ours
         self._asked_mode = None
-        if ours or was_mode == self.persona.booting_mode:
-            return
-        self._may_arm = False
-        if self.control.phase is not Phase.STOPPING:
+        if self.tasks.is_stopped:
+            self._mode_changed_in_spite_of_stop(mode, now=now)
+        elif mode == persona.booting_mode:
+            self._rebooted(now=now)
+        elif not ours and was_mode != persona.booting_mode:
+            self._may_arm = False
             self._take_over(f"mode changed to {mode}", now=now)
 
+    def _mode_changed_in_spite_of_stop(self, mode: int, *, now: float) -> None:
+        """A request from before the STOP was late. Later, it is a person at the vehicle."""
+        if mode == self.persona.hold_mode:
+            return
+        self._may_arm = False
+        if now - self.stopped_at <= LATE_REQUESTS and not self.control.is_engaged:
+            self._begin_stop(now=now)
+
     def _disarmed(self, *, now: float) -> None:
-        if self.control.phase in (Phase.DISARMING, Phase.STOPPING):
+        if self.control.phase is Phase.STOPPING or self.control.may_have_disarmed(now=now):
             return
         self._may_arm = False
         self._take_over("disarmed", now=now)
 
     def _rebooted(self, *, now: float) -> None:
+        """Its frame may be another one now, and nothing of ours is in force there."""
         self.motion.forget()
         self.intervals.ask_all_again()
-        self._note("restarted: its clock went back", now=now)
-        self.tasks.hold(TaskReason.FRAME_RESET, now=now)
+        self._note("restarted", now=now)
+        if not self.tasks.is_stopped:
+            if self.control.is_engaged:
+                self._may_arm = False
+            self.control.lose()
+            self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
     def _take_over(self, what: str, *, now: float) -> None:
-        """Somebody else has the vehicle: let go, and let the queue stand if it was ours."""
+        """Somebody else has the vehicle: let go, and let the queue stand if a task has begun."""
         if self.tasks.is_stopped:
             return
-        engaged = self.control.is_engaged
         self.control.lose()
-        if engaged and self.tasks.begun is not None:
+        if self.tasks.begun is not None and self.tasks.paused is not TaskReason.TAKEOVER:
             self._note(f"taken over: {what}", now=now)
             self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
 
@@ -196,8 +221,13 @@ class Vehicle:
         self, packet: Packet, message: m.Message, origin: Hashable, *, command: int, now: float
     ) -> None:
         """Forward a client's command; its answer comes from ``take_answers``."""
-        target = getattr(message, "target_component", 0) or AUTOPILOT
+        asked = getattr(message, "target_component", 0)
+        # an autopilot answers for every component that is not there, and does as it was told
+        target = asked if asked in self._own_components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
+        if disarms and self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
+            self._may_arm = False
+            self._take_over("disarmed by a client", now=now)
         self.sender.relay(
             packet,
             message,
@@ -252,28 +282,39 @@ class Vehicle:
         if now - self._other_controller_at > self._settings.watch.other_controller:
             self._note(f"second controller {who}", now=now)
         self._other_controller_at = now
-        if self.control.is_engaged and self.control.phase is not Phase.STOPPING:
+        if self.control.phase is Phase.STOPPING:
+            return
+        if self.control.is_engaged:
             self.outlet.send(self.control.zero_setpoint(), self._source)
             self.outlet.send(self.control.hold_request(), self._source)
+        if self.tasks.begun is not None or self.control.is_engaged:
             self._take_over(f"second controller {who}", now=now)
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: zero and HOLD leave in this very step."""
         self._asked_mode = None
         self._granted.clear()
+        self.stopped_at = now
         killed = self.tasks.stop(clear=clear, actor=actor, now=now)
+        self._begin_stop(now=now)
+        return killed
+
+    def _begin_stop(self, *, now: float) -> None:
         self.control.begin_stop(now=now)
         self._next_tick = now + self._settings.watch.setpoint_period
         self._flush(now=now)
-        return killed
 
     def hold(self, *, actor: str, now: float) -> TaskId | None:
         """A client wants HOLD: zeros and the mode at once; a task and its queue pause."""
+        if self.tasks.is_stopped:
+            self._begin_stop(now=now)
+            return None
         paused = None
         if not self.tasks.is_idle:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.control.begin_release(now=now)
-        self.step(now=now)
+        self._flush(now=now)
+        self._next_tick = now + self._settings.watch.setpoint_period
         return paused
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
@@ -283,19 +324,24 @@ class Vehicle:
         return paused
 
     def proceed(self, *, actor: str, now: float) -> TaskId | None:
-        """Release STOP, takeover and pause; arming is allowed again."""
+        """Release STOP, takeover and pause; arming is allowed again.
+
+        Raises Rejection, and changes nothing, while the begun task could not take the vehicle.
+        """
+        seen = replace(self.view(now=now), may_arm=self._arming_allowed)
+        going_on = self.tasks.proceed(seen, actor=actor, now=now)
         self._may_arm = self._arming_allowed
-        going_on = self.tasks.proceed(self.view(now=now), actor=actor, now=now)
-        self.step(now=now)
+        if not self._is_ticking:
+            self.step(now=now)
         return going_on
 
     def shut_down(self, *, now: float) -> None:
-        """The server ends: pause what is begun and stop what we drive."""
+        """The server ends: pause what is begun and stop what we drive; nothing begins any more."""
+        self._is_closing = True
         if self.tasks.begun is not None:
             self.tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
-        if self.control.is_engaged and self.control.phase is not Phase.STOPPING:
-            self.control.begin_stop(now=now)
-            self._flush(now=now)
+        if self.control.is_engaged:
+            self._begin_stop(now=now)
 
     # time
 
@@ -305,37 +351,45 @@ class Vehicle:
 
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do."""
+        deadline = min(self._next_tick, self.sender.next_deadline() or inf)
+        if not self._was_heard:  # nothing is asked of one that cannot answer
+            return deadline
         silent_at = self._monitor.heard_at + self._settings.watch.heartbeat_lost + 1e-3
-        return min(
-            self._next_tick,
-            self.intervals.next_deadline(),
-            self.sender.next_deadline() or inf,
-            silent_at if self._was_heard else inf,
-        )
+        return min(deadline, self.intervals.next_deadline(), silent_at)
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due: the setpoint tick, repeats, rates, silence."""
-        if self._was_heard and not self.is_heard(now=now):
+        fell_silent = self._was_heard and not self.is_heard(now=now)
+        if fell_silent:
             self._was_heard = False
             self._note("silent", now=now)
         self.sender.handle_deadline(now=now)
-        if now >= self._next_tick:
-            if now - self._next_tick > self._settings.watch.late_tick and self.control.in_control:
-                self.outlet.send(self.control.zero_setpoint(), self._source)
-                self.tasks.hold(TaskReason.LATE, now=now)
+        if now >= self._next_tick or fell_silent:
             self.step(now=now)
         self._flush(now=now)
+        self._ask_for_rates(now=now)
 
     def step(self, *, now: float) -> None:
         """Let the tasks say what they demand, and do it."""
         seen = self.view(now=now)
         begun_before = self.tasks.begun
-        demand = self.tasks.step(seen, now=now)
-        if begun_before is not self.tasks.begun and self.tasks.begun is None:
+        demand = STOP if self._is_closing else self.tasks.step(seen, now=now)
+        if begun_before is not None and self.tasks.begun is None:
             self._granted.clear()
         self._follow(demand, seen, now=now)
         self._flush(now=now)
         self._plan_tick(now=now)
+
+    def check_late(self, *, now: float) -> None:
+        """What drove on without us for too long stops, and somebody looks at it first.
+
+        What came in meanwhile looks fresh and is not, so nothing is steered by it.
+        """
+        begun = self.tasks.begun
+        late = now - self._next_tick > self._settings.watch.late_tick
+        if late and begun is not None and begun.state is TaskState.EXECUTING:
+            self.outlet.send(self.control.zero_setpoint(), self._source)
+            self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
         if not self.control.is_engaged and self.tasks.begun is None:
@@ -393,30 +447,39 @@ class Vehicle:
             case DemandKind.HAND_BACK:
                 self.control.release(still=seen.still, disarm=True, now=now)
             case DemandKind.STOP:
-                self.control.stop(still=seen.still, now=now)
+                self.control.stop(still=seen.still, heard=seen.heard, now=now)
 
     def _flush(self, *, now: float) -> None:
         """Move what the services want sent to the way out, and their answers to who asked."""
-        request = self.intervals.next_request(now=now)
-        if request is not None:
-            request.target_system, request.target_component = self._target
-            self.sender.request(request, now=now, give_up_after=self._settings.watch.ask_vehicle)
-        for setpoint in self.control.take_messages():
-            self.outlet.send(setpoint, self._source)
+        setpoints = self.control.take_messages()
         outgoing, answers = self.sender.take()
+        if self.control.phase is Phase.STOPPING:  # HOLD also stops what does not follow setpoints
+            outgoing += setpoints
+        else:  # in our mode a zero comes before arming
+            outgoing = [*setpoints, *outgoing]
         for item in outgoing:
             if isinstance(item, Packet):
                 self.outlet.inject(item)
             else:
                 self.outlet.send(item, self._source)
         for answer in answers:
-            self._dispatch(answer)
+            self._dispatch(answer, now=now)
 
-    def _dispatch(self, answer: Answered) -> None:
+    def _ask_for_rates(self, *, now: float) -> None:
+        """Ask for the next message interval, unless nobody is there to be asked."""
+        if not self._was_heard:
+            return
+        request = self.intervals.next_request(now=now)
+        if request is not None:
+            request.target_system, request.target_component = self._target
+            self.sender.request(request, now=now, give_up_after=self._settings.watch.ask_vehicle)
+            self._flush(now=now)
+
+    def _dispatch(self, answer: Answered, *, now: float) -> None:
         if answer.origin is not None:
             self._answers.append(answer)
         elif is_request_of(answer):
-            self.control.answered(answer)
+            self.control.answered(answer, now=now)
         elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:
             ack = answer.ack
             self.intervals.answered(

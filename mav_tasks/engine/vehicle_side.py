@@ -92,9 +92,9 @@ class VehicleSide:
         COMMAND_ACK is not to be forwarded: it goes to the one who asked.
         """
         message: m.Message | None = None
-        if packet.message_id in USED:
+        if packet.message_id in USED or packet.source == self._our_address:
             message = self._decoder.decode(packet)
-            if message is None:
+            if message is None:  # what cannot be verified changes nothing
                 return None
         if self._is_intruder(packet):
             self._note_intruder(packet, message, now=now)
@@ -106,7 +106,11 @@ class VehicleSide:
             vehicle = self._meet(link, peer, packet, message, now=now)
             if vehicle is None:
                 return None
-        elif not self._is_in_place(vehicle, link, peer, now=now):
+        elif self._router.place_of(vehicle.system_id) != (link, peer) and not (
+            isinstance(message, m.Heartbeat)
+            and packet.component_id == AUTOPILOT
+            and self._moves(vehicle, link, peer, now=now)
+        ):
             return None
         if packet.component_id == AUTOPILOT:
             vehicle.last_seq = packet.seq
@@ -116,6 +120,11 @@ class VehicleSide:
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
         return vehicle
+
+    def check_late(self, *, now: float) -> None:
+        """Stop what was driven on without us; before anything else is done after a delay."""
+        for vehicle in self:
+            vehicle.check_late(now=now)
 
     def next_deadline(self) -> float | None:
         """Give when ``handle_deadline`` has something to do."""
@@ -180,10 +189,8 @@ class VehicleSide:
         vehicle.step(now=now)
         return vehicle
 
-    def _is_in_place(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
-        """Whether a packet comes from where the vehicle is; two of one id must not be mixed."""
-        if self._router.place_of(vehicle.system_id) == (link, peer):
-            return True
+    def _moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
+        """Whether a vehicle that fell silent is back at another place; two are not mixed."""
         if vehicle.is_heard(now=now):
             self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
             return False
@@ -199,7 +206,7 @@ class VehicleSide:
 
     def _note_intruder(self, packet: Packet, message: m.Message | None, *, now: float) -> None:
         """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
-        target = 0 if message is None else getattr(message, "target_system", 0)
+        target = getattr(message, "target_system", 0)
         for vehicle in self:
             if target in (0, vehicle.system_id):
                 vehicle.second_controller(packet.source, now=now)

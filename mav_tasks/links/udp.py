@@ -19,11 +19,7 @@ class UdpLink:
         try:
             family, address = _resolve(url.host, url.port)
             pushed = tuple(_resolve(host, port)[1] for host, port in push)
-            self._socket = socket.socket(family, socket.SOCK_DGRAM)
-            self._socket.setblocking(False)
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-            if url.kind == "udpin":
-                self._socket.bind(address)
+            self._socket = _open(family, address if url.kind == "udpin" else None)
         except OSError as error:
             reason = error.strerror or str(error)
             raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
@@ -62,6 +58,19 @@ class UdpLink:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
+
+
+def _open(family: socket.AddressFamily, bind_to: tuple[str, int] | None) -> socket.socket:
+    sock = socket.socket(family, socket.SOCK_DGRAM)
+    try:
+        sock.setblocking(False)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        if bind_to is not None:
+            sock.bind(bind_to)
+    except OSError:
+        sock.close()
+        raise
+    return sock
 
 
 def _resolve(host: str, port: int) -> tuple[socket.AddressFamily, tuple[str, int]]:

@@ -25,14 +25,18 @@ class Packet(NamedTuple):
 
     raw: bytes
     seq: int
-    system_id: int
-    component_id: int
+    source: Address
     message_id: int
 
     @property
-    def source(self) -> Address:
-        """The sender's address."""
-        return Address(self.system_id, self.component_id)
+    def system_id(self) -> int:
+        """The sender's system."""
+        return self.source.system_id
+
+    @property
+    def component_id(self) -> int:
+        """The sender's component."""
+        return self.source.component_id
 
     @property
     def is_v2(self) -> bool:
@@ -70,8 +74,7 @@ def split_datagram(data: bytes) -> list[Packet]:
                     Packet(
                         data[start:stop],
                         data[start + 4],
-                        data[start + 5],
-                        data[start + 6],
+                        Address(data[start + 5], data[start + 6]),
                         data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16,
                     )
                 )
@@ -84,8 +87,7 @@ def split_datagram(data: bytes) -> list[Packet]:
                     Packet(
                         data[start:stop],
                         data[start + 2],
-                        data[start + 3],
-                        data[start + 4],
+                        Address(data[start + 3], data[start + 4]),
                         data[start + 5],
                     )
                 )

@@ -9,6 +9,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 
 from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong
 
 SAME_PACKET = 5.0  # s, the very same packet again: the same answer (rule 1)
@@ -117,6 +118,18 @@ class CommandReceiver:
         if len(self._packets) > REMEMBERED:
             self._packets.popitem(last=False)
         return pending
+
+    def older_copy(self, command: Command, *, before: float, now: float) -> bool:
+        """Whether an equal command was carried out before ``before``, so lately that this may be
+        a repeat of it whose ack was lost."""
+        return any(
+            pending.at < before
+            and now - pending.at <= SAME_PAYLOAD
+            and pending.answer is not None
+            and pending.answer.result == MavResult.ACCEPTED
+            and _equal(pending.command, command)
+            for pending in self._packets.values()
+        )
 
     def same_submission(self, command: Command, *, nonce: int, now: float) -> Repeat | None:
         """Give the submission that this one repeats (rules 2, 3, 5), or None if it is new.

@@ -11,6 +11,8 @@ from collections import deque
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.retry import Retry
@@ -55,7 +57,8 @@ class _Lane:
 class CommandSender:
     """The commands under way to one vehicle."""
 
-    def __init__(self) -> None:
+    def __init__(self, source: Address) -> None:
+        self._source = source  # of our own commands
         self._lanes: dict[_LaneKey, _Lane] = {}
         self._outgoing: list[Message | Packet] = []
         self._answers: list[Answered] = []
@@ -93,19 +96,28 @@ class CommandSender:
         self._enqueue(request, now=now, urgent=urgent)
 
     def withdraw(self, component: int, command: int) -> None:
-        """Send no further copy of our own commands of this id, and none that wait.
+        """Send no further copy of our own commands of this id, and none that wait."""
+        lane = self._lanes.get((component, command))
+        if lane is None:
+            return
+        lane.waiting = deque(request for request in lane.waiting if request.origin is not None)
+        if lane.in_flight is not None and lane.in_flight.origin is None:
+            lane.quiet_until = lane.in_flight.retry.next_at - REPEAT + LATE
+            lane.in_flight = None
 
-        Clients' commands of the id that still wait are answered as if the vehicle had not.
-        """
+    def cancel(self, component: int, command: int, *, now: float) -> None:
+        """As ``withdraw``, and whatever clients wait for is answered: not by the vehicle."""
+        self.withdraw(component, command)
         lane = self._lanes.get((component, command))
         if lane is None:
             return
         for request in lane.waiting:
             self._answer(request, None)
         lane.waiting.clear()
-        if lane.in_flight is not None and lane.in_flight.origin is None:
-            lane.quiet_until = lane.in_flight.retry.next_at - REPEAT + LATE
+        if lane.in_flight is not None:  # it cannot be called back; its ack is not to be believed
+            self._answer(lane.in_flight, None)
             lane.in_flight = None
+            lane.quiet_until = now + LATE
 
     def is_pending(self, component: int, command: int) -> bool:
         """Whether a command of ours of this id is in flight or waits."""
@@ -118,7 +130,9 @@ class CommandSender:
     def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
         """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
         lane = self._lanes.get((component, ack.command))
-        if lane is None or lane.in_flight is None:
+        if lane is None or lane.in_flight is None or ack.result == MavResult.IN_PROGRESS:
+            return  # IN_PROGRESS is no answer yet: the terminal one follows
+        if not self._is_meant(ack, lane.in_flight):
             return
         request, lane.in_flight = lane.in_flight, None
         if request.retry.sent > 1:  # each copy is answered: the others' acks are on their way
@@ -134,8 +148,9 @@ class CommandSender:
                 lane.in_flight = None
                 lane.quiet_until = now + LATE
                 self._answer(flying, None)
-            while lane.waiting and lane.waiting[0].retry.is_over(now):
-                self._answer(lane.waiting.popleft(), None)
+            for request in [r for r in lane.waiting if r.retry.is_over(now)]:
+                lane.waiting.remove(request)
+                self._answer(request, None)
             self._advance(lane, now=now)
 
     def next_deadline(self) -> float | None:
@@ -145,7 +160,7 @@ class CommandSender:
             if lane.in_flight is not None:
                 deadlines.append(lane.in_flight.retry.next_deadline())
             if lane.waiting:
-                deadlines.append(lane.waiting[0].retry.give_up_at)
+                deadlines.append(min(request.retry.give_up_at for request in lane.waiting))
                 if lane.in_flight is None:
                     deadlines.append(lane.quiet_until)
         return min(deadlines, default=None)
@@ -155,6 +170,11 @@ class CommandSender:
         outgoing, self._outgoing = self._outgoing, []
         answers, self._answers = self._answers, []
         return outgoing, answers
+
+    def _is_meant(self, ack: CommandAck, request: _Request) -> bool:
+        """Whether an ack is for who asked; others may command the vehicle by another way."""
+        asker = self._source if request.packet is None else request.packet.source
+        return Address(ack.target_system, ack.target_component).reaches(asker)
 
     def _enqueue(self, request: _Request, *, now: float, urgent: bool) -> None:
         lane = self._lanes.setdefault(request.lane, _Lane())

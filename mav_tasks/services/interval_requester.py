@@ -22,6 +22,9 @@ WANTED: dict[int, float] = {
     m.MissionCurrent.id: 1.0,
 }
 
+SHORTEST = 0.02  # s: what a vehicle's main loop can give; a shorter one is refused altogether
+MAX_WANTED = 64  # messages; clients can name more ids than any vehicle has
+
 CHECK = 3.0  # s, over which messages are counted
 ENOUGH = 0.5  # of the rate asked for
 
@@ -38,7 +41,13 @@ class IntervalRequester:
         self._asked: int | None = None
 
     def wish(self, message_id: int, interval: float) -> None:
-        """Take a client's wish for a message at least every ``interval`` seconds."""
+        """Take a client's wish for a message at least every ``interval`` seconds.
+
+        A wish never costs the server what it needs itself: what is refused falls back to that.
+        """
+        interval = max(interval, SHORTEST)
+        if message_id not in self._wanted and len(self._wanted) >= MAX_WANTED:
+            return
         if interval < self._wanted.get(message_id, float("inf")):
             self._wanted[message_id] = interval
             self._refused.discard(message_id)
@@ -70,9 +79,15 @@ class IntervalRequester:
 
     def answered(self, *, accepted: bool | None) -> None:
         """Take the answer to the last request: None if there was none in time."""
-        if self._asked is not None and accepted is False:
-            self._refused.add(self._asked)
-        self._asked = None
+        asked, self._asked = self._asked, None
+        if asked is None or accepted is not False:
+            return
+        own = WANTED.get(asked)
+        if own is not None and self._wanted[asked] < own:
+            self._wanted[asked] = own
+            self._to_ask[asked] = None
+        else:
+            self._refused.add(asked)
 
     def next_deadline(self) -> float:
         """Give when the rates are looked at again."""

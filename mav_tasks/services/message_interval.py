@@ -42,6 +42,8 @@ STREAMED = frozenset(
 
 STOPPED = -1  # SET_MESSAGE_INTERVAL param2: send no more
 DEFAULT = 0  # SET_MESSAGE_INTERVAL param2: back to the default rate
+LONGEST_US = 2**31 - 1  # what MESSAGE_INTERVAL can say
+MAX_WISHES = 256  # of one client
 SLACK = 0.7  # of an interval: the jitter of a stream must not halve its rate
 
 
@@ -56,12 +58,12 @@ class Thinner:
     def set_interval(self, system_id: int, message_id: int, interval_us: float) -> None:
         """Take a client's wish: microseconds, STOPPED or DEFAULT."""
         key = (system_id, message_id)
-        if interval_us == DEFAULT:
+        if interval_us == DEFAULT or len(self._intervals) >= MAX_WISHES:
             self._intervals.pop(key, None)
         elif interval_us < 0:
             self._intervals[key] = None
         else:
-            self._intervals[key] = interval_us / 1e6
+            self._intervals[key] = min(interval_us, LONGEST_US) / 1e6
 
     def interval_us(self, system_id: int, message_id: int) -> int:
         """Give the interval in force, in microseconds; STOPPED if none."""

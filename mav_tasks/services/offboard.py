@@ -8,7 +8,7 @@ setpoint period; each does the next thing that is due.
 """
 
 from enum import Enum, auto
-from math import isfinite
+from math import inf, isfinite
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavModeFlag, MavResult
@@ -19,6 +19,12 @@ from mav_tasks.settings import Watch
 
 STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirmed yet
 RELEASE_REPEAT = 1.0  # s, the same of a hand-back
+ASK_REPEAT = 0.25  # s, between requests that the vehicle refuses
+STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
+RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
+#: s after a request was last sent in which what it asks for may still come true: a copy of it may
+#: be late on the net. Longer, and a person who does the same would be taken for it.
+LATE = 0.3
 
 
 class Phase(Enum):
@@ -60,9 +66,11 @@ class OffboardControl:
         self._armed = False
         self._mode = -1
         self._outgoing: list[Message] = []
+        self._ask_until = -inf  # our mode or arming is asked for until then
+        self._ask_again_at: float | None = None  # a refused request is repeated then
         self._next_hold_at = 0.0
-        self._hold_asked_at: float | None = None
-        self._stop_confirmed = False
+        self._release_until: float | None = None  # zeros only, until then at the longest
+        self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
         self.phase = Phase.IDLE
         self.refused: Refused | None = None
         self.we_armed = False
@@ -81,17 +89,20 @@ class OffboardControl:
         return self.phase is not Phase.IDLE
 
     @property
-    def is_stop_confirmed(self) -> bool:
-        """Whether HOLD and standstill were seen since the last ``begin_stop``."""
-        return self._stop_confirmed
-
-    @property
     def _in_our_mode(self) -> bool:
         return self._mode == self._persona.control_mode
 
-    def asked_for_hold_since(self, since: float) -> bool:
-        """Whether we requested HOLD at or after ``since``: a change to it may be our own."""
-        return self._hold_asked_at is not None and self._hold_asked_at >= since
+    def may_have_set(self, mode: int, *, now: float) -> bool:
+        """Whether a change to this mode can be our own doing."""
+        self._note_requests(now)
+        if mode == self._persona.hold_mode:
+            return now - self._hold_at <= LATE
+        return mode == self._persona.control_mode and now - self._control_at <= LATE
+
+    def may_have_disarmed(self, *, now: float) -> bool:
+        """Whether a disarming just seen can be our own doing."""
+        self._note_requests(now)
+        return now - self._disarm_at <= LATE
 
     def take_messages(self) -> list[Message]:
         """Give the setpoints to send since the last call."""
@@ -105,15 +116,16 @@ class OffboardControl:
         self._armed = armed
         self._mode = mode
 
-    def answered(self, answer: Answered) -> None:
-        """Take in the vehicle's answer to a mode or arm request of ours."""
+    def answered(self, answer: Answered, *, now: float) -> None:
+        """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
         if answer.ack is not None and answer.ack.result == MavResult.ACCEPTED:
             return
-        silent = answer.ack is None
-        if self.phase is Phase.ASKING_MODE and answer.command == MavCmd.DO_SET_MODE:
-            self.refused = None if silent and self._in_our_mode else Refused.MODE
-        elif self.phase is Phase.ASKING_ARM and answer.command == MavCmd.COMPONENT_ARM_DISARM:
-            self.refused = None if silent and self._armed else Refused.ARM
+        asked = {
+            Phase.ASKING_MODE: MavCmd.DO_SET_MODE,
+            Phase.ASKING_ARM: MavCmd.COMPONENT_ARM_DISARM,
+        }
+        if asked.get(self.phase) == answer.command:
+            self._ask_again_at = now + ASK_REPEAT
         elif self.phase is Phase.DISARMING and answer.command == MavCmd.COMPONENT_ARM_DISARM:
             self.phase = Phase.IDLE
 
@@ -122,52 +134,70 @@ class OffboardControl:
         self._withdraw_requests()
         self._outgoing.clear()
         self.phase = Phase.IDLE
+        self.refused = None
         self.we_armed = False
 
     def take(self, *, may_arm: bool, now: float) -> None:
-        """Get into control, one step a call; never moves the vehicle."""
+        """Get into control, one step a call; never moves the vehicle.
+
+        What was not refused for good is asked for again, as long as ``ask_vehicle`` allows; what
+        was, is in ``refused``, and the next call starts afresh.
+        """
+        self._note_requests(now)
+        self._release_until = None
+        if self.refused is not None:
+            self.phase = Phase.IDLE
         match self.phase:
-            case Phase.IDLE | Phase.RELEASING | Phase.DISARMING | Phase.STOPPING:
-                self._withdraw_requests()
-                self.refused = None
-                self.phase = Phase.ASKING_MODE
-                if not self._in_our_mode:
-                    self._request_mode(self._persona.control_mode, now=now)
-                else:
-                    self._arm_next(may_arm=may_arm, now=now)
-            case Phase.ASKING_MODE if self._in_our_mode:
-                self._arm_next(may_arm=may_arm, now=now)
-            case Phase.ASKING_ARM if self._armed and self._in_our_mode:
+            case Phase.DISARMING:  # seen through first: it could come true while we arm
+                if not self._armed:
+                    self.phase = Phase.IDLE
+            case Phase.ASKING_MODE if not self._in_our_mode:
+                self._insist(Refused.MODE, now=now)
+            case Phase.ASKING_ARM if self._in_our_mode and not self._armed:
+                self._send_setpoint(0.0, 0.0)
+                self._insist(Refused.ARM, now=now)
+            case Phase.ASKING_ARM if self._in_our_mode:
                 self._send_setpoint(0.0, 0.0)
                 self.phase = Phase.CONTROL
-            case Phase.CONTROL if not (self._armed and self._in_our_mode):
-                self.phase = Phase.IDLE
-                self.take(may_arm=may_arm, now=now)
-            case Phase.ASKING_ARM | Phase.CONTROL:
+            case Phase.CONTROL if self.in_control:
                 self._send_setpoint(0.0, 0.0)
+            case _ if self._in_our_mode:
+                self._begin_arming(may_arm=may_arm, now=now)
+            case _:
+                self._begin_asking(Phase.ASKING_MODE, now=now)
+                self._ask_mode(now=now)
 
     def drive(self, forward: float, yaw_rate: float) -> None:
         """Send a velocity setpoint, m/s and rad/s; zeros unless ``in_control``."""
         if self.phase in (Phase.ASKING_ARM, Phase.CONTROL):
+            self._release_until = None
             moving = self.in_control and isfinite(forward) and isfinite(yaw_rate)
             self._send_setpoint(*((forward, yaw_rate) if moving else (0.0, 0.0)))
 
     def release(self, *, still: bool, disarm: bool, now: float) -> None:
         """Zeros until the vehicle stands, then HOLD until seen, then nothing more.
 
-        With ``disarm`` a vehicle that we armed is disarmed in the end.
+        A vehicle that cannot be seen to stand gets HOLD after a while all the same. With
+        ``disarm`` a vehicle that we armed is disarmed in the end.
         """
+        self._note_requests(now)
+        self.refused = None
         match self.phase:
             case Phase.ASKING_MODE:
                 self.begin_release(now=now)
             case Phase.ASKING_ARM | Phase.CONTROL:
                 self._send_setpoint(0.0, 0.0)
                 self._withdraw(MavCmd.COMPONENT_ARM_DISARM)
-                if still:
+                if self._release_until is None:
+                    self._release_until = now + STAND_UNSEEN
+                if still or now >= self._release_until:
                     self.begin_release(now=now)
             case Phase.RELEASING if self._mode == self._persona.hold_mode:
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self._end_release(disarm=disarm, now=now)
+            case Phase.RELEASING if now >= self._ask_until and not self._in_our_mode:
+                self._withdraw(MavCmd.DO_SET_MODE)
+                self.phase = Phase.IDLE
             case Phase.RELEASING:
                 self._send_setpoint(0.0, 0.0)
                 if now >= self._next_hold_at:
@@ -179,29 +209,38 @@ class OffboardControl:
         """Zero and HOLD at once, on a vehicle in whatever mode; ``release`` sees it through."""
         self._withdraw_requests()
         self.phase = Phase.RELEASING
+        self.refused = None
+        self._ask_until = now + RELEASE_LIMIT
         self._send_setpoint(0.0, 0.0)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
     def begin_stop(self, *, now: float) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them."""
-        self._withdraw_requests()
+        for command in (MavCmd.DO_SET_MODE, MavCmd.COMPONENT_ARM_DISARM):
+            self._sender.cancel(self._target.component_id, command, now=now)
         self.phase = Phase.STOPPING
-        self._stop_confirmed = False
+        self.refused = None
         self._send_setpoint(0.0, 0.0)
         self._request_hold(now=now, again_after=STOP_REPEAT)
 
-    def stop(self, *, still: bool, now: float) -> None:
-        """Repeat zero and HOLD until HOLD is seen and the vehicle measured to stand."""
+    def stop(self, *, still: bool, heard: bool, now: float) -> None:
+        """Repeat zero and HOLD until HOLD is seen and the vehicle measured to stand.
+
+        To one that is silent zeros go only together with HOLD, so that HOLD is the first that it
+        hears when it hears again.
+        """
+        self._note_requests(now)
         if self.phase is not Phase.STOPPING:
             return
-        if still and self._mode == self._persona.hold_mode:
+        if heard and still and self._mode == self._persona.hold_mode:
             self._withdraw_requests()
-            self._stop_confirmed = True
             self.phase = Phase.IDLE
             return
-        self._send_setpoint(0.0, 0.0)
         if now >= self._next_hold_at:
             self._request_hold(now=now, again_after=STOP_REPEAT)
+        elif not heard:
+            return
+        self._send_setpoint(0.0, 0.0)
 
     def zero_setpoint(self) -> SetPositionTargetLocalNed:
         """Give the setpoint that asks the vehicle to stand."""
@@ -211,42 +250,73 @@ class OffboardControl:
         """Give the command that asks for HOLD."""
         return self._mode_request(self._persona.hold_mode)
 
-    def _arm_next(self, *, may_arm: bool, now: float) -> None:
+    def _note_requests(self, now: float) -> None:
+        """Remember until when what we ask for was still being asked for."""
+        match self.phase:
+            case Phase.ASKING_MODE:
+                self._control_at = now
+            case Phase.RELEASING | Phase.STOPPING:
+                self._hold_at = now
+            case Phase.DISARMING:
+                self._disarm_at = now
+
+    def _begin_asking(self, phase: Phase, *, now: float) -> None:
+        self._withdraw_requests()
+        self.refused = None
+        self.phase = phase
+        self._ask_until = now + self._watch.ask_vehicle
+        self._ask_again_at = None
+
+    def _begin_arming(self, *, may_arm: bool, now: float) -> None:
         """In our mode: clear what setpoint there was, then see to arming."""
+        self._begin_asking(Phase.ASKING_ARM, now=now)
         self._send_setpoint(0.0, 0.0)
-        self.phase = Phase.ASKING_ARM
         if not self._armed and may_arm:
             self.we_armed = True
-            self._sender.request(
-                self._command(MavCmd.COMPONENT_ARM_DISARM, 1.0),
-                now=now,
-                give_up_after=self._watch.ask_vehicle,
-            )
+            self._ask_arming(now=now)
+
+    def _insist(self, what: Refused, *, now: float) -> None:
+        """Ask again for what was refused or not answered, or take it for an answer."""
+        if self._ask_again_at is None:
+            return
+        if now >= self._ask_until:
+            self.refused = what
+        elif now >= self._ask_again_at:
+            self._ask_again_at = None
+            if what is Refused.MODE:
+                self._ask_mode(now=now)
+            else:
+                self._ask_arming(now=now)
+
+    def _ask_mode(self, *, now: float) -> None:
+        self._control_at = now
+        self._request(
+            self._mode_request(self._persona.control_mode), until=self._ask_until, now=now
+        )
+
+    def _ask_arming(self, *, now: float) -> None:
+        arming = self._command(MavCmd.COMPONENT_ARM_DISARM, 1.0)
+        self._request(arming, until=self._ask_until, now=now)
 
     def _end_release(self, *, disarm: bool, now: float) -> None:
         if disarm and self.we_armed and self._armed:
             self.phase = Phase.DISARMING
-            self._sender.request(
-                self._command(MavCmd.COMPONENT_ARM_DISARM, 0.0),
-                now=now,
-                give_up_after=self._watch.ask_vehicle,
-                urgent=True,
-            )
+            self._disarm_at = now
+            disarming = self._command(MavCmd.COMPONENT_ARM_DISARM, 0.0)
+            self._request(disarming, until=now + self._watch.ask_vehicle, now=now, urgent=True)
         else:
             self.phase = Phase.IDLE
 
     def _request_hold(self, *, now: float, again_after: float) -> None:
-        self._hold_asked_at = now
+        self._hold_at = now
         self._next_hold_at = now + again_after
-        self._request_mode(self._persona.hold_mode, now=now, urgent=True)
+        until = now + self._watch.ask_vehicle
+        self._request(self.hold_request(), until=until, now=now, urgent=True)
 
-    def _request_mode(self, mode: int, *, now: float, urgent: bool = False) -> None:
-        self._sender.request(
-            self._mode_request(mode),
-            now=now,
-            give_up_after=self._watch.ask_vehicle,
-            urgent=urgent,
-        )
+    def _request(
+        self, command: CommandLong, *, until: float, now: float, urgent: bool = False
+    ) -> None:
+        self._sender.request(command, now=now, give_up_after=until - now, urgent=urgent)
 
     def _withdraw_requests(self) -> None:
         self._withdraw(MavCmd.DO_SET_MODE)

@@ -7,6 +7,7 @@ for. It keeps ids only; what is sent is the state at the time of sending.
 from mav_tasks.services.statustext import RateLimit
 
 BURST = 20
+SHORTEST = 0.05  # s between reports of one task to one client
 
 
 class TaskStatusSender:
@@ -26,7 +27,7 @@ class TaskStatusSender:
 
     def set_interval(self, interval: float | None, *, now: float) -> None:
         """Stream active tasks every ``interval`` seconds; None: not at all."""
-        self._interval = interval
+        self._interval = None if interval is None else max(interval, SHORTEST)
         self._next_stream_at = now
 
     @property

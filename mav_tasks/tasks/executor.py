@@ -21,6 +21,7 @@ from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
 OFF_LINE = 1.0  # m, lifecycle: further off its line than this is no resumption
 JUMP = 2.0  # m, a position that moved further than the vehicle can have driven
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
+BLIND = 1.0  # m or rad towards the goal commanded without progress: the same, but sooner
 
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
 
@@ -43,6 +44,7 @@ class Executor:
         self._moved_at = 0.0  # when a velocity other than zero was last asked for
         self._best_remaining = inf
         self._progress_at = 0.0
+        self._commanded = 0.0  # m or rad, since the last progress
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
 
     def __repr__(self) -> str:
@@ -120,6 +122,9 @@ class Executor:
         )
         if not self._last_velocity.is_zero:
             self._moved_at = now
+            wish = self._last_velocity
+            rate = wish.forward if isinstance(task.goal, Move) else wish.yaw_rate
+            self._commanded += self._settings.watch.setpoint_period * abs(rate)
         return Demand(DemandKind.DRIVE, self._last_velocity)
 
     def _step(self, task: Task, seen: VehicleView, now: float) -> Demand:
@@ -128,6 +133,8 @@ class Executor:
                 return self._start(task, seen, now)
             case TaskState.EXECUTING:
                 return self._execute(task, seen, now)
+            case TaskState.PAUSED if self._has_jumped(seen):
+                self._change(TaskState.HELD, TaskReason.FRAME_RESET, actor=SERVER, now=now)
             case TaskState.PAUSED:
                 self._wait_for_return(task, seen, now)
             case TaskState.CANCELLING if seen.still:
@@ -148,9 +155,13 @@ class Executor:
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
+        if not seen.still:  # the heading at the start is that of a vehicle at rest
+            return view.STAND
+        if self._has_jumped(seen):
+            self._change(TaskState.HELD, TaskReason.FRAME_RESET, actor=SERVER, now=now)
+            return view.HOLD
         anchor = task.progress.anchor or motion.pose
-        self._last_motion = motion
-        self._best_remaining, self._progress_at = inf, now
+        self._best_remaining = inf
         self._change(
             TaskState.EXECUTING,
             TaskReason.NONE,
@@ -168,10 +179,9 @@ class Executor:
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
-        if self._jumped(motion):
+        if self._has_jumped(seen):
             self._change(TaskState.HELD, TaskReason.FRAME_RESET, actor=SERVER, now=now)
             return view.HOLD
-        self._last_motion = motion
         task = self._note_progress(task, motion.pose, now)
         signed_remaining = task.length - task.progress.done
         stands = seen.still and self._has_asked_to_stand(now)
@@ -179,11 +189,12 @@ class Executor:
             if stands:
                 self._finish(TaskState.COMPLETED, TaskReason.NONE, actor=SERVER, now=now)
             return view.STAND
+        if not self._book.is_durable(task.id):
+            self._progress_at = now
+            return view.STAND
         if self._is_stuck(signed_remaining, now):
             self._finish(TaskState.FAILED, TaskReason.STUCK, actor=SERVER, now=now)
             return view.HOLD
-        if not self._book.is_durable(task.id):
-            return view.STAND
         return Demand(DemandKind.DRIVE, self._steer(task, motion, signed_remaining))
 
     def _has_arrived(self, task: Task, signed_remaining: float, *, stands: bool) -> bool:
@@ -245,8 +256,12 @@ class Executor:
         )
         return self._book[task.id]
 
-    def _jumped(self, motion: Motion) -> bool:
-        last = self._last_motion
+    def _has_jumped(self, seen: VehicleView) -> bool:
+        """Whether the position moved further since the last look than a vehicle can drive."""
+        last, motion = self._last_motion, seen.motion
+        if motion is None:
+            return False
+        self._last_motion = motion
         if last is None:
             return False
         elapsed = max(0.0, motion.at - last.at)
@@ -259,7 +274,8 @@ class Executor:
         if abs(signed_remaining) < self._best_remaining - PROGRESS:
             self._best_remaining = abs(signed_remaining)
             self._progress_at = now
-        return now - self._progress_at > self._settings.watch.stuck
+            self._commanded = 0.0
+        return now - self._progress_at > self._settings.watch.stuck or self._commanded > BLIND
 
     def _begun(self, state: TaskState) -> Task:
         task = self.task

@@ -18,6 +18,7 @@ HEADING_GAIN = 1.5  # 1/s, heading error -> turn rate while moving
 CROSS_TRACK_GAIN = 1.2  # 1/m, sideways error -> approach angle
 MAX_APPROACH_ANGLE = pi / 6  # rad, towards the line
 MAX_STEER_RATE = 0.5  # rad/s, of corrections while moving
+PIVOT_ERROR = pi / 4  # rad, pointing further off than this it turns on the spot before it moves
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +111,10 @@ def steer(goal: Goal, anchor: Pose, pose: Pose, *, remaining: float, driving: Dr
                 creep=CREEP_SPEED,
             )
             forward = copysign(towards_end, distance * remaining)
-            return Velocity(forward, _steer_to_line(anchor, pose, forward=forward))
+            heading_error = _heading_error(anchor, pose, forward=forward)
+            steer_rate = HEADING_GAIN * heading_error
+            steer_rate = max(-MAX_STEER_RATE, min(MAX_STEER_RATE, steer_rate))
+            return Velocity(0.0 if abs(heading_error) > PIVOT_ERROR else forward, steer_rate)
         case Rotate(angle=angle, rate=rate):
             towards_end = _approach(
                 remaining,
@@ -128,11 +132,10 @@ def _approach(remaining: float, *, top: float, braking: float, gain: float, cree
     return max(creep, min(top, gain * left, sqrt(2 * 0.5 * braking * left)))
 
 
-def _steer_to_line(anchor: Pose, pose: Pose, *, forward: float) -> float:
-    """Turn rate that holds the line: point at it, less so the slower the vehicle goes."""
+def _heading_error(anchor: Pose, pose: Pose, *, forward: float) -> float:
+    """Angle to turn by so as to come back to the line; less the slower the vehicle goes."""
     ahead = copysign(1.0, forward)
     speed_share = min(1.0, abs(forward) / 0.2)  # below 0.2 m/s only the heading counts
     approach = atan(CROSS_TRACK_GAIN * cross_track(anchor, pose)) * speed_share
     approach = max(-MAX_APPROACH_ANGLE, min(MAX_APPROACH_ANGLE, approach))
-    heading_error = wrap(anchor.yaw - ahead * approach - pose.yaw)
-    return max(-MAX_STEER_RATE, min(MAX_STEER_RATE, HEADING_GAIN * heading_error))
+    return wrap(anchor.yaw - ahead * approach - pose.yaw)

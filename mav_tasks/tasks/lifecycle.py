@@ -101,6 +101,11 @@ class TaskReason(IntEnum):
     RATE_LIMITED = 113
 
 
+def words_of(reason: TaskReason) -> str:
+    """Give a reason as people read it."""
+    return reason.name.lower().replace("_", " ")
+
+
 _S = TaskState
 
 #: from -> to -> who moves the task along this edge, and why

@@ -4,12 +4,15 @@ The STOP latch is the queue's pause reason STOPPED: there is no second flag. Not
 a vehicle is spoken to; ``step`` says what it must be made to do.
 """
 
+from dataclasses import replace
+
+from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, QueueContinued, QueuePaused
 from mav_tasks.tasks.executor import Executor
-from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import TaskQueue
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Draft, Task, TaskId
@@ -107,14 +110,26 @@ class VehicleTasks:
         return None if begun is None else begun.id
 
     def proceed(self, seen: VehicleView, *, actor: str, now: float) -> TaskId | None:
-        """Release the STOP latch or any other pause; gives the task that goes on, if one does."""
+        """Release the STOP latch or any other pause; gives the task that goes on, if one does.
+
+        A task that could not take the vehicle now is not resumed: Rejection says what is in its
+        way, and everything stays as it is.
+        """
+        begun = self.begun
+        resumes = begun is not None and begun.state is TaskState.PAUSED
+        if resumes:
+            blocker = start_blocker(seen, watch=self._settings.watch, now=now)
+            if blocker:
+                raise Rejection(blocker, f"cannot continue: {words_of(blocker)}")
+        elif begun is not None and begun.state is TaskState.HELD and not self._paused:
+            raise Rejection(R.WRONG_STATE, f"task {begun.id} is held: {words_of(begun.reason)}")
         if self._paused:
             self._paused = R.NONE
             self._book.record(QueueContinued(self.vehicle, actor, now))
-        begun = self.begun
-        if begun is not None and begun.state is TaskState.PAUSED:
+        if resumes:
             self._executor.resume(seen, actor=actor, now=now)
-        return None if begun is None else begun.id
+        begun = self.begun
+        return None if begun is None or begun.state is TaskState.HELD else begun.id
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
         """Set the begun task aside until somebody decides what becomes of it."""
@@ -143,8 +158,8 @@ class VehicleTasks:
         if self.begun is not None:
             return demand
         self._begin_next(seen, now=now)
-        if self.begun is not None:
-            return self._executor.step(seen, now=now)
+        if self.begun is not None:  # what was refused was refused to the one before
+            return self._executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 
     def _begin_next(self, seen: VehicleView, *, now: float) -> None:

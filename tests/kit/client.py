@@ -1,13 +1,15 @@
 """A fake client on a memory link: plain pymavlink on its own, nothing of the server's codec.
 
 It speaks as a stock client does: heartbeats once a second, commands repeated as MAVSDK repeats them
-if asked to.
+if asked to. What it hears is kept raw and decoded when a test looks at it: most telemetry never is.
 """
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 os.environ.setdefault("MAVLINK20", "1")
 
@@ -19,53 +21,157 @@ from mav_tasks.links.memory import MemoryNet
 Message = Any  # pymavlink's classes carry no type information
 
 REPEATS = (0.0, 0.5, 1.0, 1.5)  # s, MAVSDK 4.1: byte-identical payload, confirmation 0, new seq
-TIMEOUT = 2.0  # s, MAVSDK 4.1
+
+MOVE, ROTATE, DRIVE, STOP = 54000, 54001, 54002, 54003
+SET_MODE, PAUSE_CONTINUE, ARM = 176, 193, 400
+GET_INTERVAL, SET_INTERVAL, REQUEST = 510, 511, 512
+TASK_STATUS, TASK_QUEUE_STATUS = 54000, 54001
+MANUAL, HOLD, AUTO, RTL, GUIDED = 0, 4, 10, 11, 15
+
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+
+IDS: dict[str, int] = {cls.msgname: number for number, cls in common.mavlink_map.items()}
+ACK = IDS["COMMAND_ACK"]
+
+
+class TaskStatus(NamedTuple):
+    """TASK_STATUS, decoded by hand as ``dialects/README.md`` says one may."""
+
+    time_boot_ms: int
+    task_id: int
+    version: int
+    nonce: int
+    after_task_id: int
+    remaining: float
+    time_to_start: float
+    time_to_finish: float
+    execution_time: float
+    command: int
+    queue_position: int
+    step: int
+    step_count: int
+    target_system: int
+    target_component: int
+    state: int
+    reason: int
+    priority: int
+    progress: int
+    remaining_unit: int
+    submitter_system: int
+    submitter_component: int
+    submitter_link: int
+    text: str
+
+    @property
+    def why(self) -> tuple[int, int]:
+        """(state, reason)."""
+        return self.state, self.reason
+
+    @classmethod
+    def of(cls, payload: bytes) -> "TaskStatus":
+        values = list(struct.unpack("<5I4f4H10B50s", payload.ljust(104, b"\0")))
+        values[-1] = values[-1].rstrip(b"\0").decode()
+        return cls._make(values)
+
+
+@dataclass(slots=True)
+class Received:
+    """One packet that came in."""
+
+    at: float
+    raw: bytes
+
+    @property
+    def message_id(self) -> int:
+        return self.raw[7] | self.raw[8] << 8 | self.raw[9] << 16
+
+    @property
+    def seq(self) -> int:
+        return self.raw[4]
+
+    @property
+    def source(self) -> tuple[int, int]:
+        return self.raw[5], self.raw[6]
+
+    @property
+    def payload(self) -> bytes:
+        return self.raw[10 : 10 + self.raw[1]]
 
 
 @dataclass(slots=True)
 class Sent:
-    """A command under way."""
+    """A command under way, and what came back to it."""
 
     message: Message
     at: float
     repeats: tuple[float, ...]
     times_sent: int = 0
     ack: Message | None = None
+    acked_at: float = -1.0
+
+    @property
+    def result(self) -> int | None:
+        return None if self.ack is None else int(self.ack.result)
+
+    @property
+    def answer(self) -> tuple[int, int] | None:
+        """(result, result_param2) of the ack."""
+        return None if self.ack is None else (int(self.ack.result), int(self.ack.result_param2))
+
+    @property
+    def task_id(self) -> int:
+        assert self.ack is not None, f"not acknowledged: {self.message}"
+        assert self.ack.result == ACCEPTED, f"refused: {self.ack}"
+        return int(self.ack.result_param2)
 
 
+@dataclass(slots=True)
+class _Stream:
+    message: Message
+    period: float
+    next_at: float
+
+
+@dataclass
 class FakeClient:
     """One ground station or script, with its own endpoint name."""
 
-    def __init__(
-        self,
-        net: MemoryNet,
-        name: str = "client",
-        *,
-        system_id: int = 255,
-        component_id: int = 190,
-        server: str = CLIENT_LINK,
-    ) -> None:
-        self.name = name
-        self._net = net
-        self._server = server
-        self._link = net.link(name)
-        self._mav = common.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
-        self._mav.robust_parsing = True
-        self._next_heartbeat = net.now
-        self._under_way: list[Sent] = []
-        self.received: list[tuple[float, Message]] = []
-        self.acks: list[Message] = []
-        self.on_message: Callable[[Message], None] | None = None
+    net: MemoryNet
+    name: str = "client"
+    system_id: int = 255
+    component_id: int = 190
+    server: str = CLIENT_LINK
+    heartbeats: bool = True
+    received: list[Received] = field(default_factory=list)
 
-    def send(self, message: Message) -> None:
-        """Send one message now."""
-        raw = message.pack(self._mav)
+    def __post_init__(self) -> None:
+        self.link = self.net.link(self.name)
+        self._mav = common.MAVLink(None, self.system_id, self.component_id)
+        self._decoder = common.MAVLink(None)
+        self._next_heartbeat = self.net.now
+        self._under_way: list[Sent] = []
+        self._streams: list[_Stream] = []
+        self.acks: list[Message] = []
+
+    # what it sends
+
+    def send(self, message: Message) -> bytes:
+        """Send one message now; gives its bytes."""
+        raw: bytes = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
-        self._link.send(self._server, raw)
+        self.link.send(self.server, raw)
+        return raw
 
     def send_raw(self, data: bytes) -> None:
         """Send any bytes now."""
-        self._link.send(self._server, data)
+        self.link.send(self.server, data)
+
+    def stream(self, message: Message, *, rate: float) -> None:
+        """Send a message again and again, from now on."""
+        self._streams.append(_Stream(message, 1.0 / rate, self.net.now))
+
+    def end_streams(self) -> None:
+        self._streams.clear()
 
     def command(
         self,
@@ -76,79 +182,189 @@ class FakeClient:
         confirmation: int = 0,
     ) -> Sent:
         """Send a COMMAND_LONG, repeated at these times until it is acknowledged."""
-        filled = (*params, *(0.0,) * (7 - len(params)))
-        message = common.MAVLink_command_long_message(*target, command, confirmation, *filled)
-        sent = Sent(message, self._net.now, repeats)
-        self._under_way.append(sent)
-        self._send_due(self._net.now)
-        return sent
+        message = command_long(command, *params, target=target, confirmation=confirmation)
+        return self._submit(message, repeats)
 
-    def move(self, distance: float, *, priority: float = 5, nonce: int = 0, **kw: Any) -> Sent:
+    def command_int(
+        self,
+        command: int,
+        *params: float,
+        x: int = 0,
+        y: int = 0,
+        z: float = 0.0,
+        frame: int = 1,
+        target: tuple[int, int] = (1, 191),
+        repeats: tuple[float, ...] = (0.0,),
+    ) -> Sent:
+        """Send a COMMAND_INT."""
+        filled = (*params, *(0.0,) * (4 - len(params)))
+        message = common.MAVLink_command_int_message(
+            *target, frame, command, 0, 0, *filled, x, y, z
+        )
+        return self._submit(message, repeats)
+
+    def move(
+        self, distance: float, *, speed: float = 0, priority: float = 5, nonce: int = 0, **kw: Any
+    ) -> Sent:
         """Submit TASK_MOVE."""
-        return self.command(54000, distance, 0, 0, nonce, 0, 0, priority, **kw)
+        return self.command(MOVE, distance, speed, 0, nonce, 0, 0, priority, **kw)
 
     def rotate(self, angle: float, *, priority: float = 5, nonce: int = 0, **kw: Any) -> Sent:
         """Submit TASK_ROTATE, degrees."""
-        return self.command(54001, angle, 0, 0, nonce, 0, 0, priority, **kw)
+        return self.command(ROTATE, angle, 0, 0, nonce, 0, 0, priority, **kw)
 
-    def stop(self, *, clear: bool = False, target: tuple[int, int] = (1, 191)) -> Sent:
+    def stop(self, *, clear: bool = False, target: tuple[int, int] = (1, 191), **kw: Any) -> Sent:
         """Send TASK_STOP."""
-        return self.command(54003, 1 if clear else 0, target=target)
+        return self.command(STOP, 1 if clear else 0, target=target, **kw)
 
-    def proceed(self) -> Sent:
+    def proceed(self, *, target: tuple[int, int] = (1, 191), **kw: Any) -> Sent:
         """Send DO_PAUSE_CONTINUE(1)."""
-        return self.command(193, 1)
+        return self.command(PAUSE_CONTINUE, 1, target=target, **kw)
 
-    def pause(self) -> Sent:
+    def pause(self, *, target: tuple[int, int] = (1, 191), **kw: Any) -> Sent:
         """Send DO_PAUSE_CONTINUE(0)."""
-        return self.command(193, 0)
+        return self.command(PAUSE_CONTINUE, 0, target=target, **kw)
 
-    def texts(self) -> list[str]:
-        """Give the STATUSTEXTs received, as text."""
-        return [m.text for _, m in self.received if m.get_type() == "STATUSTEXT"]
+    def mode(self, mode: int, *, target: tuple[int, int] = (1, 1), **kw: Any) -> Sent:
+        """Ask for a mode by command."""
+        return self.command(SET_MODE, 1, mode, target=target, **kw)
+
+    def arm(self, armed: bool = True, *, target: tuple[int, int] = (1, 1), **kw: Any) -> Sent:
+        """Arm, or disarm."""
+        return self.command(ARM, 1 if armed else 0, target=target, **kw)
+
+    def request_status(self, task_id: int, **kw: Any) -> Sent:
+        """Ask for a TASK_STATUS."""
+        return self.command(REQUEST, TASK_STATUS, task_id, **kw)
+
+    # what it heard
+
+    def decoded(self, packet: Received) -> Message:
+        """Give the message of a packet; those of our dialect by hand."""
+        if packet.message_id == TASK_STATUS:
+            return TaskStatus.of(packet.payload)
+        return self._decoder.decode(bytearray(packet.raw))
+
+    def of_id(self, message_id: int) -> Iterator[Received]:
+        """Give the packets of one message."""
+        return (packet for packet in self.received if packet.message_id == message_id)
 
     def of_type(self, name: str) -> list[Message]:
         """Give the messages of one type received."""
-        return [m for _, m in self.received if m.get_type() == name]
+        return [self.decoded(packet) for packet in self.of_id(IDS[name])]
+
+    def heard(self, name: str) -> bool:
+        """Whether a message of this type has come."""
+        return any(True for _ in self.of_id(IDS[name]))
+
+    def texts(self) -> list[str]:
+        """Give the STATUSTEXTs received; a long one as its chunks joined."""
+        texts: list[str] = []
+        open_id = 0
+        for message in self.of_type("STATUSTEXT"):
+            if message.id and message.id == open_id and message.chunk_seq:
+                texts[-1] += message.text
+            else:
+                texts.append(message.text)
+            open_id = message.id
+        return texts
+
+    def statuses(self, task_id: int | None = None) -> list[TaskStatus]:
+        """Give the TASK_STATUS messages received, of one task or of all."""
+        statuses = [TaskStatus.of(packet.payload) for packet in self.of_id(TASK_STATUS)]
+        return [s for s in statuses if task_id in (None, s.task_id)]
+
+    def acks_of(self, command: int) -> list[tuple[int, int]]:
+        """Give (result, result_param2) of every ack of a command."""
+        return [(a.result, a.result_param2) for a in self.acks if a.command == command]
+
+    def gaps(self, source: tuple[int, int]) -> int:
+        """Count the packets of a source that its sequence numbers say are missing."""
+        numbers = [packet.seq for packet in self.received if packet.source == source]
+        return sum((after - before - 1) % 256 for before, after in pairwise(numbers))
 
     # Party
 
     def next_deadline(self) -> float | None:
-        due = [self._next_heartbeat]
+        due = [self._next_heartbeat] if self.heartbeats else []
+        due += [stream.next_at for stream in self._streams]
         due += [
             sent.at + sent.repeats[sent.times_sent]
             for sent in self._under_way
-            if sent.ack is None and sent.times_sent < len(sent.repeats)
+            if sent.times_sent < len(sent.repeats)
         ]
-        return min(due)
+        return min(due, default=None)
 
     def turn(self, *, now: float) -> None:
-        for _, data in self._link.receive(len(self._link.arrived)):
-            for message in self._mav.parse_buffer(data) or ():
-                self._take(message, now)
-        if now >= self._next_heartbeat:
+        for _, data in self.link.receive(len(self.link.arrived)):
+            packet = Received(now, data)
+            self.received.append(packet)
+            if packet.message_id == ACK:
+                self._take_ack(self.decoded(packet), now)
+        if self.heartbeats and now >= self._next_heartbeat:
             self._next_heartbeat = now + 1.0
-            self.send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+            self.send(heartbeat())
+        for stream in self._streams:
+            if now >= stream.next_at:
+                stream.next_at += stream.period
+                self.send(stream.message)
         self._send_due(now)
 
-    def _take(self, message: Message, now: float) -> None:
-        self.received.append((now, message))
-        if message.get_type() == "COMMAND_ACK":
-            self.acks.append(message)
-            for sent in self._under_way:
-                if sent.ack is None and sent.message.command == message.command:
-                    sent.ack = message
-                    break
-        if self.on_message is not None:
-            self.on_message(message)
+    def _submit(self, message: Message, repeats: tuple[float, ...]) -> Sent:
+        sent = Sent(message, self.net.now, repeats)
+        self._under_way.append(sent)
+        self._send_due(self.net.now)
+        return sent
+
+    def _take_ack(self, message: Message, now: float) -> None:
+        self.acks.append(message)
+        for sent in self._under_way:
+            if sent.message.command == message.command:
+                sent.ack, sent.acked_at = message, now
+                self._under_way.remove(sent)
+                return
 
     def _send_due(self, now: float) -> None:
         for sent in self._under_way:
             while (
-                sent.ack is None
-                and sent.times_sent < len(sent.repeats)
+                sent.times_sent < len(sent.repeats)
                 and sent.at + sent.repeats[sent.times_sent] <= now
             ):
                 sent.times_sent += 1
                 self.send(sent.message)
-        self._under_way = [s for s in self._under_way if s.ack is None]
+
+
+def command_long(
+    command: int, *params: float, target: tuple[int, int] = (1, 191), confirmation: int = 0
+) -> Message:
+    """Give a COMMAND_LONG; parameters not named are 0."""
+    filled = (*params, *(0.0,) * (7 - len(params)))
+    return common.MAVLink_command_long_message(*target, command, confirmation, *filled)
+
+
+def heartbeat() -> Message:
+    """Give the heartbeat of a ground station."""
+    return common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+def setpoint(vx: float, yaw_rate: float = 0.0, *, mask: int = 0x05C7, system: int = 1) -> Message:
+    """Give a velocity setpoint in the body frame."""
+    return common.MAVLink_set_position_target_local_ned_message(
+        0, system, 1, 8, mask, 0, 0, 0, vx, 0, 0, 0, 0, 0, 0, yaw_rate
+    )
+
+
+def sticks(x: int = 0, y: int = 0, z: int = 0, r: int = 0, *, system: int = 1) -> Message:
+    """Give a MANUAL_CONTROL."""
+    return common.MAVLink_manual_control_message(system, x, y, z, r, 0)
+
+
+def rc_override(*channels: int, system: int = 1) -> Message:
+    """Give an RC_CHANNELS_OVERRIDE; channels not named are left alone."""
+    filled = (*channels, *(0,) * (8 - len(channels)))
+    return common.MAVLink_rc_channels_override_message(system, 1, *filled)
+
+
+def set_mode(mode: int, *, system: int = 1) -> Message:
+    """Give the old message SET_MODE."""
+    return common.MAVLink_set_mode_message(system, 1, mode)

@@ -1,80 +1,328 @@
-"""Watches every packet on its way to a rover, and the rover itself: the rules that always hold.
+"""Watches everything between clients, server and one rover: the rules that always hold.
 
-- no non-zero setpoint before the rover was seen armed by the server, nor while it is disarmed
-- never two sources of setpoints within a time in which neither can have known of the other
-- no number that is not finite in a setpoint
-- after STOP no non-zero setpoint and no arm request, until somebody continues
+Rules about what the server does are judged when a packet leaves it, against what had reached it by
+then: a bad net is not its fault. protocol.md, sections 6 and 7:
+
+- a setpoint is finite; one that moves goes only to a rover seen armed and in our mode, after a zero
+  in that mode, on position and attitude not older than 0.3 s
+- order: mode, zero, arm, motion; no arming in any other mode
+- our mode is taken only from HOLD, from itself, or from MANUAL while disarmed
+- motion comes at 20 Hz: no gap without a zero, no burst
+- after STOP zero and HOLD leave in the same step; then nothing that could move the rover passes
+  until somebody continues
+- after a takeover no more setpoints (one zero where the rover was not yet told by its mode)
+- never two sources of motion
 """
 
+from collections import deque
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-TWO_SOURCES = 1.0  # s between non-zero setpoints of two sources
-SETPOINT = "SET_POSITION_TARGET_LOCAL_NED"
+SERVER = (250, 191)
+GUIDED, HOLD, MANUAL, INITIALISING = 15, 4, 0, 16
+
+FRESH = 0.3  # s
+GAP = 0.12  # s between setpoints while driving: 20 Hz, one tick missed
+BURST = 4  # moving setpoints in 0.1 s
+ENGAGED = 0.2  # s since the last setpoint: the server is driving
+OWN_REQUEST = 3.0  # s in which a change to HOLD or disarmed follows from our own request
+TWO_SOURCES = 1.0  # s between moving setpoints of two sources
+STICKS = 50
+
+COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
+SETPOINTS = ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT")
+MOTION = (*SETPOINTS, "SET_ATTITUDE_TARGET", "SET_ACTUATOR_CONTROL_TARGET", "FOLLOW_TARGET")
+BY_HAND = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE")
+MOVING_COMMANDS = (16, 17, 18, 19, 20, 21, 22, 34, 115, 192, 209, 213, 300)
+STOP, PAUSE_CONTINUE, SET_MODE, ARM = 54003, 193, 176, 400
+ACK, ACCEPTED = 77, 0
+
+#: the ids that any rule looks at; telemetry beyond these is not decoded
+WATCHED = {0, 11, 30, 32, 69, 70, 75, 76, 82, 84, 86, 139, 144}
 
 
 @dataclass
 class Observer:
-    """Sees what passes on the vehicle side of one rover; ``check`` raises what was wrong."""
+    """Sees what passes by one rover; ``check`` raises what was wrong."""
 
-    armed_seen: bool = False
+    system_id: int = 1
+    #: a test that stops the server's clock expects a gap
+    expects_gaps: bool = False
+    #: seen so by the server
+    armed: bool = False
+    mode: int = -1
     stopped: bool = False
+    taken_over: bool = False
     violations: list[str] = field(default_factory=list)
-    setpoints: list[tuple[float, Any]] = field(default_factory=list)
-    commands: list[tuple[float, Any]] = field(default_factory=list)
-    _last_moving: tuple[float, tuple[int, int]] | None = None
+    #: setpoints and commands that left the server, whoever they are from
+    driven: list[tuple[float, Any]] = field(default_factory=list)
+    #: everything that reached the rover, by message id
+    reached: list[tuple[float, int]] = field(default_factory=list)
+    _zeros_left: int = 0
+    _before_continue: tuple[bool, bool] | None = None
+    _zero_in_mode: bool = False
+    _position_at: float = -1e9
+    _attitude_at: float = -1e9
+    _setpoint_at: float = -1e9
+    _hold_at: float = -1e9
+    _disarm_at: float = -1e9
+    _moved_last: bool = False
+    _stop_due: tuple[float, set[str]] | None = None
+    _last_source: tuple[float, tuple[int, int]] | None = None
 
     def __post_init__(self) -> None:
-        self._to_rover = _parser()
-        self._from_rover = _parser()
+        self._decoder = common.MAVLink(None)
+        self._asked: deque[tuple[str, bytes]] = deque(maxlen=64)
+        self._recent: deque[float] = deque(maxlen=BURST)
 
-    def to_rover(self, now: float, data: bytes) -> None:
-        """A datagram arrives at the rover."""
-        for message in self._to_rover.parse_buffer(data) or ():
-            if message.get_type() == SETPOINT:
-                self.setpoints.append((now, message))
-                self._check_setpoint(now, message)
-            elif message.get_type() in ("COMMAND_LONG", "COMMAND_INT"):
-                self.commands.append((now, message))
-                if self.stopped and message.command == 400 and message.param1 != 0:
-                    self._violation(now, f"arm request after STOP: {message}")
+    # where it looks
 
-    def to_server(self, now: float, data: bytes) -> None:
-        """A datagram of the rover arrives at the server."""
-        del now
-        for message in self._from_rover.parse_buffer(data) or ():
-            if message.get_type() == "HEARTBEAT" and message.get_srcComponent() == 1:
-                self.armed_seen = bool(message.base_mode & 128)
+    def asked(self, now: float, data: bytes, *, peer: str) -> None:
+        """A client's datagram reaches the server."""
+        message = self._decode(data)
+        if message is None or self._is_for_another(message):
+            return
+        kind = message.get_type()
+        if kind in COMMANDS and message.command != STOP:
+            if (peer, data) in self._asked:
+                return  # the same packet again is not acted on
+            self._asked.append((peer, data))
+        if kind in COMMANDS:
+            self._see_command_of_client(now, message)
+        elif kind == "SET_MODE" and message.custom_mode == HOLD:
+            self.taken_over = False
+        elif kind in BY_HAND and _off_centre(message):
+            self._take_over(now, zeros=1)
 
-    def check(self) -> None:
+    def heard(self, now: float, data: bytes) -> None:
+        """A datagram from the vehicles' side reaches the server."""
+        message = self._decode(data)
+        if message is None:
+            return
+        kind = message.get_type()
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        if source == SERVER or kind in SETPOINTS:
+            self._take_over(now, zeros=1)
+        elif source == (self.system_id, 1):
+            if kind == "HEARTBEAT":
+                self._see_heartbeat(now, message)
+            elif kind == "LOCAL_POSITION_NED":
+                self._position_at = now
+            elif kind == "ATTITUDE":
+                self._attitude_at = now
+
+    def answered(self, now: float, data: bytes) -> None:
+        """The server sends a datagram to a client: a continue that is refused ends nothing."""
+        if data[7] != ACK or self._before_continue is None:
+            return
+        message = self._decoder.decode(bytearray(data))
+        if message.command == PAUSE_CONTINUE and message.result != ACCEPTED:
+            self.stopped, self.taken_over = self._before_continue
+        self._before_continue = None
+
+    def sent(self, now: float, data: bytes) -> None:
+        """The server sends a datagram to the rover."""
+        self._check_stop(now)
+        message = self._decode(data)
+        if message is None:
+            return
+        kind = message.get_type()
+        if kind in SETPOINTS:
+            self.driven.append((now, message))
+            self._see_setpoint(now, message)
+        elif kind in COMMANDS:
+            self.driven.append((now, message))
+            self._see_command(now, message)
+        if self.stopped:
+            self._check_stopped(now, message)
+
+    def arrived(self, now: float, data: bytes) -> None:
+        """A datagram reaches the rover."""
+        message = self._decode(data)
+        if message is None:
+            return
+        self.reached.append((now, message.get_msgId()))
+        if message.get_type() in SETPOINTS and _moves(message):
+            source = (message.get_srcSystem(), message.get_srcComponent())
+            if self._last_source is not None:
+                at, before = self._last_source
+                if before != source and now - at < TWO_SOURCES:
+                    self._violation(now, f"two sources of setpoints: {before}, {source}")
+            self._last_source = (now, source)
+
+    def check(self, *, now: float = float("inf")) -> None:
         """Raise AssertionError if anything was wrong."""
+        self._check_stop(now)
         assert not self.violations, "\n".join(self.violations)
 
-    def _check_setpoint(self, now: float, message: Any) -> None:
+    # what a test may ask
+
+    def sent_since(self, at: float) -> list[str]:
+        """Give what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ..."""
+        return [_name(message) for t, message in self.driven if t >= at]
+
+    # rules
+
+    def _see_command_of_client(self, now: float, message: Any) -> None:
+        param1 = message.param1
+        if message.command == STOP and message.target_component in (0, 1, 191):
+            self.stopped, self.taken_over = True, False
+            self._stop_due = (now, {"zero", "HOLD"})
+        elif message.command == PAUSE_CONTINUE and param1 == 1.0:
+            self._check_stop(now)
+            self._before_continue = self.stopped, self.taken_over
+            self.stopped = self.taken_over = False
+        elif message.command == SET_MODE and message.param2 == HOLD:
+            self.taken_over = False
+
+    def _see_heartbeat(self, now: float, message: Any) -> None:
+        armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
+        if self.armed and not armed and now - self._disarm_at > OWN_REQUEST:
+            self._take_over(now, zeros=0)
+        if mode != self.mode:
+            self._zero_in_mode = False
+            by_us = mode == HOLD and now - self._hold_at < OWN_REQUEST
+            if self.mode == GUIDED and not by_us:
+                self._take_over(now, zeros=0)
+        self.armed, self.mode = armed, mode
+
+    def _take_over(self, now: float, *, zeros: int) -> None:
+        """Somebody else has the rover; of interest only while the server is driving."""
+        if not self._moved_last and now - self._hold_at < OWN_REQUEST:
+            return  # it was handing it back
+        if now - self._setpoint_at < ENGAGED and not self.stopped and not self.taken_over:
+            self.taken_over = True
+            self._zeros_left = zeros
+            self._moved_last = False
+
+    def _see_setpoint(self, now: float, message: Any) -> None:
         values = (message.vx, message.vy, message.vz, message.yaw_rate)
         if not all(isfinite(value) for value in values):
             self._violation(now, f"setpoint not finite: {message}")
-        if not any(values):
+        moves = _moves(message)
+        if (message.get_srcSystem(), message.get_srcComponent()) != SERVER:
+            if moves and now - self._setpoint_at < ENGAGED:
+                self._violation(now, "a client's setpoint while the server drives")
             return
-        source = (message.get_srcSystem(), message.get_srcComponent())
-        if not self.armed_seen:
-            self._violation(now, f"moving setpoint to a rover not seen armed: {message}")
-        if self.stopped:
-            self._violation(now, f"moving setpoint after STOP: {message}")
-        if self._last_moving is not None:
-            at, before = self._last_moving
-            if before != source and now - at < TWO_SOURCES:
-                self._violation(now, f"two sources of setpoints: {before}, {source}")
-        self._last_moving = (now, source)
+        if self.taken_over:
+            if moves or self._zeros_left == 0:
+                self._violation(now, f"setpoint after a takeover: {_name(message)}")
+            self._zeros_left -= 1
+        self._check_rate(now, moves=moves)
+        if moves:
+            self._check_motion(now)
+        else:
+            self._zero_in_mode = True
+            if self._stop_due is not None:
+                self._stop_due[1].discard("zero")
+        self._setpoint_at = now
+        self._moved_last = moves
+
+    def _check_motion(self, now: float) -> None:
+        if not self.armed:
+            self._violation(now, "moving setpoint to a rover not seen armed")
+        if self.mode != GUIDED:
+            self._violation(now, f"moving setpoint in mode {self.mode}")
+        elif not self._zero_in_mode:
+            self._violation(now, "moving setpoint before a zero in this mode")
+        if now - min(self._position_at, self._attitude_at) > FRESH:
+            self._violation(now, "moving setpoint on stale data")
+
+    def _check_rate(self, now: float, *, moves: bool) -> None:
+        gap = now - self._setpoint_at if self._moved_last else 0.0
+        if gap > FRESH and moves:
+            self._violation(now, f"gap of {gap:.3f} s, then motion")
+        elif gap > GAP and not self.expects_gaps:
+            self._violation(now, f"gap of {gap:.3f} s while driving")
+        if moves:
+            if len(self._recent) == BURST and now - self._recent[0] < 0.1:
+                self._violation(now, "burst of setpoints")
+            self._recent.append(now)
+
+    def _see_command(self, now: float, message: Any) -> None:
+        if (message.get_srcSystem(), message.get_srcComponent()) != SERVER:
+            return
+        if message.command == ARM:
+            if message.param1 == 0.0:
+                self._disarm_at = now
+            elif self.mode != GUIDED or not self._zero_in_mode:
+                self._violation(now, f"arming in mode {self.mode}, before a zero in our mode")
+            elif self.taken_over:
+                self._violation(now, "arming after a takeover")
+        elif message.command == SET_MODE:
+            if message.param2 == HOLD:
+                self._hold_at = now
+                if self._stop_due is not None:
+                    self._stop_due[1].discard("HOLD")
+            elif self.taken_over:
+                self._violation(now, "our mode asked for after a takeover")
+            elif self.mode not in (HOLD, GUIDED) and (self.armed or self.mode != MANUAL):
+                self._violation(now, f"our mode taken from mode {self.mode}")
+
+    def _check_stopped(self, now: float, message: Any) -> None:
+        """While STOP is latched nothing passes that could move the rover."""
+        kind = message.get_type()
+        moves = (kind in SETPOINTS and _moves(message)) or kind in (*MOTION[2:], *BY_HAND)
+        if kind in COMMANDS:
+            moves = (
+                (message.command == ARM and message.param1 != 0.0)
+                or (message.command == SET_MODE and message.param2 != HOLD)
+                or message.command in MOVING_COMMANDS
+            )
+        elif kind == "SET_MODE":
+            moves = message.custom_mode != HOLD
+        if moves:
+            self._violation(now, f"passed in spite of STOP: {_name(message)}")
+
+    def _check_stop(self, now: float) -> None:
+        """Zero and HOLD left in the step in which STOP came."""
+        if self._stop_due is not None and now > self._stop_due[0]:
+            at, missing = self._stop_due
+            self._stop_due = None
+            if missing:
+                self._violation(at, f"STOP without {' and '.join(sorted(missing))} at once")
+
+    def _is_for_another(self, message: Any) -> bool:
+        target = getattr(message, "target_system", getattr(message, "target", 0))
+        return target not in (0, self.system_id)
+
+    def _decode(self, data: bytes) -> Any:
+        if len(data) < 12 or data[0] != 0xFD or data[7] not in WATCHED or data[8] or data[9]:
+            return None
+        try:
+            return self._decoder.decode(bytearray(data))
+        except common.MAVError:
+            return None  # garbage that a test sends
 
     def _violation(self, now: float, text: str) -> None:
         self.violations.append(f"{now:.3f}: {text}")
 
 
-def _parser() -> Any:
-    parser = common.MAVLink(None)
-    parser.robust_parsing = True
-    return parser
+def _moves(message: Any) -> bool:
+    """Whether a setpoint asks for motion."""
+    return any((message.vx, message.vy, message.vz, message.yaw_rate))
+
+
+def _off_centre(message: Any) -> bool:
+    if message.get_type() == "MANUAL_CONTROL":
+        axes = (message.x, message.y, message.z, message.r)
+        return any(abs(a) > STICKS for a in axes if a != 0x7FFF)
+    channels = (message.chan1_raw, message.chan2_raw, message.chan3_raw, message.chan4_raw)
+    return any(abs(c - 1500) > STICKS for c in channels if c not in (0, 65535))
+
+
+def _name(message: Any) -> str:
+    """Give a packet to the rover in one word."""
+    kind = message.get_type()
+    if kind in SETPOINTS:
+        return "move" if _moves(message) else "zero"
+    if kind not in COMMANDS:
+        return str(kind)
+    if message.command == SET_MODE:
+        return {HOLD: "HOLD", GUIDED: "GUIDED"}.get(int(message.param2), f"mode{message.param2:g}")
+    if message.command == ARM:
+        return "arm" if message.param1 else "disarm"
+    return str(message.command)

@@ -1,22 +1,30 @@
 """The virtual world of the scenarios: server, rovers and clients on one net, always observed."""
 
 from collections.abc import Callable
+from math import degrees, hypot, remainder
 from typing import TypeVar
 
-from mav_tasks.in_memory import VEHICLE_LINK, InMemoryServer
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
 from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore, Store
-from mav_tasks.tasks.lifecycle import TERMINAL
+from mav_tasks.tasks.events import TaskChanged
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.task import Task, TaskId
-from rover_sim.body import Body, Pose
+from rover_sim.body import Body, BodyState, Pose
+from rover_sim.faults import Faults
 from rover_sim.kinematic import KinematicBody
+from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
-from tests.kit.client import FakeClient
+from tests.kit.client import ACK, FakeClient
 from tests.kit.observer import Observer
+from tests.kit.store import LateStore
 
 E = TypeVar("E")
+
+LOOK = 0.02  # s of virtual time between two looks at what a test waits for
+STANDS = 0.01  # m/s and rad/s
 
 
 def kinematic_body(start: Pose) -> Body:
@@ -25,7 +33,10 @@ def kinematic_body(start: Pose) -> Body:
 
 
 class World(VirtualWorld):
-    """One server, one rover (or more) and one client (or more)."""
+    """One server, one rover (or more) and one client (or more).
+
+    Scenarios get theirs from the fixture ``make_world``, which checks the observers at the end.
+    """
 
     def __init__(
         self,
@@ -38,19 +49,23 @@ class World(VirtualWorld):
         body: Callable[[Pose], Body] = kinematic_body,
     ) -> None:
         self.seed = seed
-        super().__init__(ObservedNet(seed=seed, conditions=conditions or Conditions()))
+        self.watched = ObservedNet(seed=seed, conditions=conditions or Conditions())
+        super().__init__(self.watched)
+        if isinstance(store, LateStore):
+            store.clock = lambda: self.now
         self.rovers: list[Vehicle] = []
+        self.rover_parties: list[RoverParty] = []
         self.observers: list[Observer] = []
         for number in range(1, rovers + 1):
             start = Pose(east=3.0 * (number - 1))
             vehicle = make_vehicle(body(start), system_id=number, now=0.0)
             link = self.net.link(f"rover{number}")
-            observer = Observer()
-            assert isinstance(self.net, ObservedNet)
-            self.net.observers[link.name] = observer
+            observer = self.watched.observers[link.name] = Observer(number)
             self.rovers.append(vehicle)
             self.observers.append(observer)
-            self.join(RoverParty(vehicle, link))
+            party = RoverParty(vehicle, link)
+            self.rover_parties.append(party)
+            self.join(party)
         names = tuple(f"rover{number}" for number in range(1, rovers + 1))
         self.server = InMemoryServer(self.net, vehicles=names, settings=settings, store=store)
         self.join(self.server)
@@ -66,25 +81,102 @@ class World(VirtualWorld):
         """The observer of the first rover."""
         return self.observers[0]
 
+    @property
+    def truth(self) -> BodyState:
+        """Where the first rover really is."""
+        return self.rover.truth
+
     def add_client(self, name: str, *, system_id: int = 255, component_id: int = 190) -> FakeClient:
         """Let another client take part."""
         client = FakeClient(self.net, name, system_id=system_id, component_id=component_id)
         self.join(client)
         return client
 
+    # time
+
     def ready(self) -> "World":
         """Wait until the server has found every rover and knows where it is."""
-        assert self.run_until(self._is_ready, within=30), "the server did not find its rovers"
+        self.until(self._is_ready, within=30)
         return self
+
+    def until(self, condition: Callable[[], object], *, within: float) -> None:
+        """Let time pass until the condition holds; AssertionError if it does not."""
+        end = self.now + within
+        while not condition():
+            assert self.now < end, f"not within {within} s (seed {self.seed}): {self.describe()}"
+            self.run(LOOK)
+
+    def until_state(self, task_id: int, state: TaskState, *, within: float = 30) -> None:
+        """Let time pass until a task is in a state."""
+        self.until(lambda: self.state(task_id)[0] is state, within=within)
+
+    def until_idle(self, *, tasks: int, within: float = 60) -> None:
+        """Let time pass until all tasks are over and the rovers handed back."""
+        self.until(lambda: self.is_idle(tasks=tasks), within=within)
+
+    def suspend_server(self, seconds: float) -> None:
+        """Let the server's machine stand still for a while: nothing in it is called."""
+        self.leave(self.server)
+        self.watched.is_server_away = True
+        self.run(seconds)
+        self.watched.is_server_away = False
+        self.join(self.server)
+
+    # what a person at the rover does, and what breaks
+
+    def operator_mode(self, mode: Mode) -> None:
+        """Turn the mode switch at the first rover."""
+        self.rover.autopilot.operator_mode(mode, now=self.now)
+
+    def operator_arm(self, armed: bool) -> None:
+        """Arm or disarm at the first rover."""
+        self.rover.autopilot.operator_arm(armed, now=self.now)
+
+    def fault(self, faults: Faults) -> None:
+        """Break something in the first rover; ``Faults()`` mends it."""
+        self.rover.autopilot.set_faults(faults)
+
+    def lose_acks(self) -> list[bytes]:
+        """From now on lose the acks of the first rover; gives the list that they end up in."""
+        lost: list[bytes] = []
+
+        def loses(source: str, target: str, data: bytes) -> bool:
+            if (source, target) != ("rover1", VEHICLE_LINK) or data[7] != ACK:
+                return False
+            lost.append(data)
+            return True
+
+        self.watched.loses = loses
+        return lost
+
+    def from_vehicle_side(self, data: bytes, *, peer: str = "stranger") -> None:
+        """Let a datagram reach the server's vehicle link."""
+        self.net.send(peer, VEHICLE_LINK, data)
+
+    # what a test looks at
 
     def task(self, task_id: int) -> Task:
         """Give a task as the server has it now."""
-        tasks = {task.id: task for task in self.tasks()}
-        return tasks[TaskId(task_id)]
+        return {task.id: task for task in self.tasks()}[TaskId(task_id)]
+
+    def state(self, task_id: int) -> tuple[TaskState, TaskReason]:
+        """Give a task's state and reason; UNKNOWN if there is none of that id."""
+        for task in self.tasks():
+            if task.id == task_id:
+                return task.state, task.reason
+        return TaskState.UNKNOWN, TaskReason.NONE
 
     def tasks(self) -> tuple[Task, ...]:
         """Give every task of the server."""
         return self.server.engine.snapshot(now=self.now).tasks
+
+    def control(self) -> str:
+        """Give how far the server's control of the first rover has come."""
+        return self.server.engine.snapshot(now=self.now).vehicles[0].control
+
+    def paused(self) -> TaskReason:
+        """Give why the first rover's queue stands."""
+        return self.server.engine.snapshot(now=self.now).vehicles[0].paused
 
     def is_idle(self, *, tasks: int) -> bool:
         """Whether so many tasks were submitted, all are over, and the rover is handed back."""
@@ -95,37 +187,96 @@ class World(VirtualWorld):
             and all(vehicle.control == "IDLE" for vehicle in snapshot.vehicles)
         )
 
+    def stands(self, number: int = 1) -> bool:
+        """Whether a rover really stands."""
+        truth = self.rovers[number - 1].truth
+        return hypot(truth.forward_speed, truth.lateral_speed) < STANDS and (
+            abs(truth.yaw_rate) < STANDS
+        )
+
+    def pose(self) -> tuple[float, float, float]:
+        """Give the first rover's true north and east in metres, and heading in degrees."""
+        truth = self.truth
+        return truth.north, truth.east, degrees(truth.yaw)
+
     def events(self, kind: type[E]) -> list[E]:
         """Give the journal's events of one kind, in order."""
         store = self.server.store
-        assert isinstance(store, MemoryStore)
+        assert isinstance(store, MemoryStore | LateStore)
         return [event for event in store.events if isinstance(event, kind)]
 
+    def history(self, task_id: int) -> list[tuple[TaskState, TaskReason]]:
+        """Give the states that a task went through, with reasons."""
+        return [(e.new, e.reason) for e in self.events(TaskChanged) if e.task_id == task_id]
+
+    def describe(self) -> str:
+        """Give the state of affairs in a few words, for a failing test."""
+        vehicles = self.server.engine.snapshot(now=self.now).vehicles
+        tasks = [(t.id, t.state.name, t.reason.name) for t in self.tasks()]
+        return f"t={self.now:.2f} {vehicles} {tasks} {self.rover!r}"
+
     def check(self) -> None:
-        """Raise what any observer saw that must never be. Call it at the end of every scenario."""
+        """Raise what any observer saw that must never be."""
         for observer in self.observers:
             observer.check()
 
     def _is_ready(self) -> bool:
-        snapshot = self.server.engine.snapshot(now=self.now)
-        return (
-            len(snapshot.vehicles) == len(self.rovers)
-            and all(client.of_type("LOCAL_POSITION_NED") for client in [self.client])
-            and self.now > 3.0
+        found = self.server.engine.snapshot(now=self.now).vehicles
+        return len(found) == len(self.rovers) and (
+            self.now > 3.0 and self.client.heard("LOCAL_POSITION_NED")
         )
 
 
 class ObservedNet(MemoryNet):
-    """A net that shows to observers what arrives at rovers, and what arrives from them."""
+    """A net that shows to each rover's observer what concerns it."""
 
     def __init__(self, *, seed: int, conditions: Conditions) -> None:
         super().__init__(seed=seed, conditions=conditions)
         self.observers: dict[str, Observer] = {}
+        self.is_server_away = False
+        self._unread: list[tuple[str, str, bytes]] = []
+        #: loses (source, target, datagram) for which it says so
+        self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
+
+    def send(self, source: str, target: str, data: bytes) -> None:
+        """Show what the server sends to a rover."""
+        if self.loses(source, target, data):
+            return
+        if source == VEHICLE_LINK and target in self.observers:
+            self.observers[target].sent(self.now, data)
+        elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
+            self.observers[f"rover{data[5]}"].answered(self.now, data)
+        super().send(source, target, data)
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Show it, then deliver it."""
+        """Show what arrives at a rover or at the server."""
         if link.name in self.observers:
-            self.observers[link.name].to_rover(self.now, data)
-        elif link.name == VEHICLE_LINK and source in self.observers:
-            self.observers[source].to_server(self.now, data)
+            self.observers[link.name].arrived(self.now, data)
+        elif link.name in (VEHICLE_LINK, CLIENT_LINK):
+            self._unread.append((link.name, source, data))
         super().arrive(link, source, data)
+
+    def deliver(self) -> None:
+        """Deliver, and show what the server now knows: what waits while it is away it does not."""
+        super().deliver()
+        if self.is_server_away:
+            return
+        for link, source, data in self._unread:
+            for name, observer in self.observers.items():
+                if link == CLIENT_LINK:
+                    observer.asked(self.now, data, peer=source)
+                elif source == name or source not in self.observers:
+                    observer.heard(self.now, data)
+        self._unread.clear()
+
+
+def near_pose(
+    actual: tuple[float, float, float],
+    wanted: tuple[float, float, float],
+    *,
+    metres: float = 0.02,
+    angle: float = 1.0,
+) -> bool:
+    """Whether two poses (north, east, heading in degrees) are the same within tolerance."""
+    apart = hypot(actual[0] - wanted[0], actual[1] - wanted[1])
+    return apart <= metres and abs(remainder(actual[2] - wanted[2], 360)) <= angle

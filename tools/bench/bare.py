@@ -30,7 +30,7 @@ class Forward(asyncio.DatagramProtocol):
         self._out = out
         self._to = to
 
-    def datagram_received(self, data: bytes, addr: tuple[str | int, int]) -> None:
+    def datagram_received(self, data: bytes, _addr: tuple[str | int, int]) -> None:
         """Forward."""
         self._out.sendto(data, self._to)
 

@@ -14,12 +14,16 @@ END_WITHIN = 10.0  # s
 
 
 @contextmanager
-def child(module: str, *arguments: str) -> Iterator[None]:
-    """Run a module of this package as a process of its own while the block runs."""
+def child(module: str, *arguments: str, quiet: bool = False) -> Iterator[None]:
+    """Run a module of this package as a process of its own while the block runs.
+
+    What a ``quiet`` one writes to stderr, its log, is thrown away by the system.
+    """
     process = subprocess.Popen(
         [sys.executable, "-m", f"tools.bench.{module}", *arguments],
         cwd=ROOT,
         stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL if quiet else None,
         text=True,
     )
     try:

@@ -39,7 +39,7 @@ def measure(profile: str | None = None) -> list[Row]:
     extra = () if profile is None else (profile,)
     with udp_socket() as client, udp_socket() as vehicle_socket:
         vehicle_port: int = vehicle_socket.getsockname()[1]
-        with child("server", str(port), str(vehicle_port), *extra):
+        with child("server", str(port), str(vehicle_port), *extra, quiet=True):
             vehicle = ScriptedVehicle(vehicle_socket)
             meet(vehicle, client, loopback(port))
             client.connect(loopback(port))

@@ -53,7 +53,7 @@ def _ours(profile: str | None) -> float:
     extra = () if profile is None else (profile,)
     with udp_socket() as client, udp_socket() as vehicle_socket:
         vehicle_port: int = vehicle_socket.getsockname()[1]
-        with child("server", str(port), str(vehicle_port), *extra):
+        with child("server", str(port), str(vehicle_port), *extra, quiet=True):
             vehicle = ScriptedVehicle(vehicle_socket)
             meet(vehicle, client, loopback(port))
             assert vehicle.server is not None
@@ -123,7 +123,7 @@ def _telemetry() -> list[bytes]:
         ),
         m.MissionCurrent.id: m.MissionCurrent(0),
     }
-    due = [(0.0, heartbeat)]
+    due: list[tuple[float, m.Message]] = [(0.0, heartbeat)]
     for message_id, interval in WANTED.items():
         due += [(n * interval, samples[message_id]) for n in range(max(1, round(1 / interval)))]
     second = [message for _, message in sorted(due, key=lambda item: item[0])]

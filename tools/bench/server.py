@@ -6,6 +6,7 @@ figures of the whole run are written to that file.
 
 import asyncio
 import cProfile
+import logging
 import sys
 
 from mav_tasks.engine.engine import Engine
@@ -24,6 +25,7 @@ SETTINGS = Settings(
 
 
 async def _serve(client_port: int, vehicle_port: int) -> int:
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
     engine = Engine(SETTINGS, now=asyncio.get_running_loop().time())
     clients = [UdpLink(LinkUrl("udpin", HOST, client_port))]
     vehicles = [UdpLink(LinkUrl("udpout", HOST, vehicle_port))]

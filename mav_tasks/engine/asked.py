@@ -1,0 +1,63 @@
+"""A command on its way through the server: who asked what of which vehicle, and the way back."""
+
+from dataclasses import dataclass
+
+from mav_tasks.engine import translate
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import Answer, Command, CommandReceiver, Pending
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """One command of one client to one vehicle; to be answered exactly once."""
+
+    client: GcsClient
+    vehicle: Vehicle
+    packet: Packet
+    pending: Pending
+
+    @property
+    def command(self) -> Command:
+        """What is asked for."""
+        return self.pending.command
+
+    @property
+    def actor(self) -> str:
+        """Who asks, in words."""
+        return str(self.client.submitter(self.packet.source))
+
+    @property
+    def receiver(self) -> CommandReceiver:
+        """The memory of what this client asked before."""
+        return self.client.receiver(self.packet.source)
+
+    @property
+    def answering(self) -> Address:
+        """The component that answers: the one addressed; where that is all, our own."""
+        component = self.command.target.component_id or self.vehicle.server_component
+        return Address(self.vehicle.system_id, component)
+
+    def answer(self, result: MavResult, result_param2: int = 0) -> None:
+        """Acknowledge it."""
+        self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
+        self.client.answer(self.pending.answer, self.packet.source)
+
+    def refuse(self, refusal: Rejection, *, now: float) -> SubmissionRefused:
+        """Answer with the reason's code and say it in words; gives it for the audit log."""
+        self.answer(translate.result_of(refusal.reason), refusal.reason)
+        self.tell(refusal.text, MavSeverity.WARNING, now=now)
+        reason = TaskReason(refusal.reason)
+        return SubmissionRefused(
+            self.vehicle.system_id, self.command.command, reason, refusal.text, self.actor, now
+        )
+
+    def tell(self, text: str, severity: MavSeverity, *, now: float) -> None:
+        """Say something to the client, in the name of the vehicle's task server."""
+        self.client.tell(text, severity, self.vehicle.server_address, now=now)

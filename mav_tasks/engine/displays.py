@@ -1,0 +1,122 @@
+"""What a client is shown because it asks: messages on request, and the rates of streams."""
+
+from functools import partial
+from math import isfinite
+
+from mav_tasks.engine import translate
+from mav_tasks.engine.asked import Asked
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import TaskReason
+
+R = TaskReason
+
+PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
+EVERYBODY = Address(0, 0)
+PAGE = 16  # waiting tasks that one request shows
+MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
+
+
+class Displays:
+    """Answers to REQUEST_MESSAGE and to the commands about intervals."""
+
+    def __init__(self, vehicles: VehicleSide, book: TaskBook) -> None:
+        self._vehicles = vehicles
+        self._book = book
+
+    def set_interval(self, asked: Asked, *, now: float) -> None:
+        """SET_MESSAGE_INTERVAL: thin for this client, and see that enough comes."""
+        client, vehicle, command = asked.client, asked.vehicle, asked.command
+        message_id, interval_us = translate.message_id_of(command), command.params[1]
+        if message_id < 0:
+            raise Rejection(R.BAD_PARAMETER, f"param1 message id {command.params[0]:g} is none")
+        if not isfinite(interval_us):
+            raise Rejection(R.BAD_PARAMETER, f"param2 interval {interval_us:g} is not a number")
+        if message_id == m.TaskStatus.id:
+            client.uses_dialect = True
+            client.statuses.set_interval(interval_us / 1e6 if interval_us > 0 else None, now=now)
+            return
+        client.thinner.set_interval(vehicle.system_id, message_id, interval_us)
+        for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
+            vehicle.intervals.wish(wished_id, interval)
+
+    def show_interval(self, asked: Asked) -> None:
+        """GET_MESSAGE_INTERVAL: what this client gets."""
+        message_id = translate.message_id_of(asked.command)
+        if not 0 <= message_id <= MAX_INTERVAL_ID:
+            words = f"param1 message id {asked.command.params[0]:g} not in 0..{MAX_INTERVAL_ID}"
+            raise Rejection(R.BAD_PARAMETER, words)
+        interval = asked.client.thinner.interval_us(asked.vehicle.system_id, message_id)
+        asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
+
+    def show(self, asked: Asked, *, now: float) -> bool:
+        """REQUEST_MESSAGE for what the server itself can show; whether it can."""
+        client, vehicle = asked.client, asked.vehicle
+        match translate.message_id_of(asked.command):
+            case m.TaskStatus.id:
+                client.uses_dialect = True
+                self._show_tasks(asked, now=now)
+            case m.TaskQueueStatus.id:
+                client.uses_dialect = True
+                counts = [0] * 14
+                for task in self._book.of_vehicle(vehicle.system_id):
+                    counts[task.state] += 1
+                status = translate.queue_status(
+                    vehicle.tasks, counts, version=self._book.recorded, now=now
+                )
+                client.outlet.send(status, vehicle.server_address)
+            case m.ProtocolVersion.id:
+                client.outlet.send(PROTOCOL_VERSION, asked.answering)
+            case _:
+                return False
+        return True
+
+    def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
+        """Send a task's TASK_STATUS to a client that listens, without the cost of its position."""
+        task = self._book.get(task_id)
+        if task is not None:
+            to = task.submitter.system_id, task.submitter.component_id
+            reader = Address(*to) if client.submitted(task) else EVERYBODY
+            self._send_status(client, task_id, reader=reader, with_position=False, now=now)
+
+    def _send_status(
+        self,
+        client: GcsClient,
+        task_id: int,
+        *,
+        reader: Address,
+        with_position: bool,
+        now: float,
+    ) -> None:
+        """Send a task's TASK_STATUS, from the task server of its vehicle."""
+        task = self._book.get(task_id)
+        vehicle = None if task is None else self._vehicles.vehicles.get(task.vehicle)
+        if task is None or vehicle is None:
+            return
+        status = translate.task_status(
+            task,
+            vehicle.tasks,
+            reader=reader,
+            link_number=0,
+            with_position=with_position,
+            now=now,
+        )
+        client.outlet.send(status, vehicle.server_address)
+
+    def _show_tasks(self, asked: Asked, *, now: float) -> None:
+        task_id = translate.task_id_of(asked.command)
+        send = partial(
+            self._send_status, asked.client, reader=asked.packet.source, with_position=True, now=now
+        )
+        if task_id == 0:
+            first = max(0, translate.first_index_of(asked.command))
+            for waiting in asked.vehicle.tasks.waiting[first : first + PAGE]:
+                send(waiting)
+        elif self._book.get(task_id) is None:
+            raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
+        else:
+            send(task_id)

@@ -1,0 +1,41 @@
+"""A store whose disk is as slow as a test wants it."""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from mav_tasks.store import Kept, NotKept, Outcome
+from mav_tasks.tasks.events import Event
+
+
+class LateStore:
+    """Implements ``Store``: commits ``delay`` seconds after the append; ``inf``: never."""
+
+    def __init__(self, *, delay: float = 0.0) -> None:
+        self.delay = delay
+        self.clock: Callable[[], float] = lambda: 0.0  # the world's, set by it
+        self.events: list[Event] = []
+        self._under_way: deque[tuple[float, int]] = deque()
+        self._failure: str | None = None
+
+    def __repr__(self) -> str:
+        return f"LateStore({len(self.events)} events, {len(self._under_way)} under way)"
+
+    def fail(self, text: str) -> None:
+        """Report a failure once."""
+        self._failure = text
+
+    def append(self, events: Sequence[Event]) -> None:
+        self.events += events
+        self._under_way.append((self.clock(), len(self.events)))
+
+    def take_outcomes(self) -> list[Outcome]:
+        outcomes: list[Outcome] = []
+        if self._failure is not None:
+            outcomes.append(NotKept(self._failure))
+            self._failure = None
+        while self._under_way and self._under_way[0][0] + self.delay <= self.clock():
+            outcomes.append(Kept(self._under_way.popleft()[1]))
+        return outcomes
+
+    def close(self) -> None:
+        """Nothing is open."""

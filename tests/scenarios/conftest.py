@@ -1,0 +1,36 @@
+"""Every world of a scenario is checked at its end, whether the scenario thinks of it or not."""
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import pytest
+
+from tests.kit.world import World
+
+
+class MakeWorld(Protocol):
+    """Makes a world (see World) whose observers are asked at the end of the test."""
+
+    def __call__(self, **kw: Any) -> World: ...
+
+
+@pytest.fixture
+def make_world() -> Iterator[MakeWorld]:
+    """Give a factory of worlds that are ready to be used."""
+    worlds: list[World] = []
+
+    def make(**kw: Any) -> World:
+        world = World(**kw)
+        worlds.append(world)
+        print(f"world {len(worlds)}: seed {world.seed}")
+        return world.ready()
+
+    yield make
+    for world in worlds:
+        world.check()
+
+
+@pytest.fixture
+def world(make_world: MakeWorld) -> World:
+    """Give a world in which nothing is unusual."""
+    return make_world()

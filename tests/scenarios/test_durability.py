@@ -1,0 +1,131 @@
+"""What acknowledges a task, or moves a rover for it, leaves only after the task is durable."""
+
+from math import inf
+
+import pytest
+
+from mav_tasks.tasks.events import TaskWithdrawn
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED
+from tests.kit.store import LateStore
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+
+@pytest.fixture
+def store() -> LateStore:
+    return LateStore()
+
+
+@pytest.fixture
+def world(make_world: MakeWorld, store: LateStore) -> World:
+    return make_world(store=store)
+
+
+def test_the_ack_comes_when_the_task_is_durable(world: World, store: LateStore) -> None:
+    store.delay = 0.25
+    at = world.now
+    sent = world.client.move(1)
+    world.run(0.24)
+    assert (sent.ack, world.state(1)[0]) == (None, S.QUEUED)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, 1)
+    assert sent.acked_at - at == pytest.approx(0.26, abs=0.03)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_the_task_does_not_start_before_it_is_durable(world: World, store: LateStore) -> None:
+    store.delay = inf
+    world.client.move(1)
+    world.run(0.35)
+    assert world.state(1)[0] is S.QUEUED
+    assert world.observer.sent_since(0) == [
+        name for name in world.observer.sent_since(0) if name == "511"
+    ]
+
+
+def test_motion_waits_until_executing_is_durable(world: World, store: LateStore) -> None:
+    world.client.move(1)
+    world.until_state(1, S.STARTING, within=1)
+    store.delay = inf
+    world.run(15)  # longer than a rover may be stuck
+    assert world.state(1)[0] is S.EXECUTING
+    assert "move" not in world.observer.sent_since(0)
+    assert world.truth.north == 0.0
+    store.delay = 0.0
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_what_is_not_durable_in_time_is_withdrawn_and_works_later(
+    world: World, store: LateStore
+) -> None:
+    store.delay = inf
+    at = world.now
+    refused = world.client.move(1)
+    world.run(0.6)
+    assert refused.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
+    assert 0.4 <= refused.acked_at - at <= 0.5
+    assert world.tasks() == ()
+    assert [e.task_id for e in world.events(TaskWithdrawn)] == [1]
+
+    meanwhile = world.client.rotate(10)
+    world.run(0.1)
+    assert meanwhile.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
+
+    store.delay = 0.0
+    world.run(0.1)
+    again = world.client.move(1)
+    world.until(lambda: again.ack, within=0.1)
+    world.until_idle(tasks=1)
+    assert (again.task_id, world.state(2)[0]) == (2, S.COMPLETED)
+    assert world.client.acks_of(54000) == [
+        (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE),
+        (ACCEPTED, 2),
+    ]
+
+
+def test_a_nonce_can_be_used_again_after_a_withdrawal(world: World, store: LateStore) -> None:
+    store.delay = inf
+    world.client.move(1, nonce=77)
+    world.run(0.6)
+    store.delay = 0.0
+    world.run(0.1)
+    again = world.client.move(1, nonce=77)
+    world.run(0.1)
+    assert again.answer == (ACCEPTED, 2)
+
+
+def test_a_store_that_failed_refuses_until_it_commits_again(world: World, store: LateStore) -> None:
+    store.fail("disk full")
+    world.run(0.1)
+    refused = world.client.move(1)
+    world.run(0.1)
+    assert refused.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
+    world.run(0.1)  # the refusal itself was committed
+    again = world.client.move(1)
+    world.run(0.1)
+    assert again.answer == (ACCEPTED, 1)
+
+
+def test_a_blocked_store_does_not_keep_a_driving_rover_from_its_end(
+    world: World, store: LateStore
+) -> None:
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    world.run(0.2)
+    store.delay = inf
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_nobody_is_told_of_a_task_that_is_not_durable(world: World, store: LateStore) -> None:
+    store.delay = 0.3
+    world.client.move(1)
+    world.run(0.28)
+    assert (world.client.texts()[1:], world.client.statuses()) == ([], [])
+    world.run(0.1)
+    assert world.client.texts()[1] == "Task 1 queued: move 1 m"
+    assert [s.task_id for s in world.client.statuses()][:1] == [1]

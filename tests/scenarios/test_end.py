@@ -1,0 +1,159 @@
+"""Handing the rover back, and the orderly end of the server."""
+
+import pytest
+
+from mav_tasks.engine.inputs import Shutdown
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import ServerStopped
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import TEMPORARILY_REJECTED
+from tests.kit.observer import Observer
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+
+def shut_down(world: World) -> None:
+    world.server.pump.handle(Shutdown(), now=world.now)
+    world.server.turn(now=world.now)
+
+
+def test_an_empty_queue_hands_the_rover_back_and_the_stream_ends(world: World) -> None:
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    at = world.now
+    world.run(5)
+    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
+    assert world.stands()
+    assert world.observer.sent_since(at) == []
+
+
+def test_a_rover_that_the_operator_armed_stays_armed(world: World) -> None:
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(1)
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    world.run(3)
+    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, True)
+
+
+@pytest.mark.parametrize("after", [k * 0.003 for k in range(14)])
+def test_the_next_task_right_after_the_hand_back_works(world: World, after: float) -> None:
+    """Submitted while HOLD, disarming, or what follows is on its way, in steps of 3 ms."""
+    world.client.move(0.3)
+    world.until(lambda: world.control() == "RELEASING", within=10)
+    world.run(after)
+    world.client.move(0.3, nonce=2)
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED, S.COMPLETED]
+    assert not world.rover.autopilot.armed
+
+
+def test_between_two_tasks_the_rover_stays_ours(world: World) -> None:
+    world.client.move(0.3)
+    world.client.rotate(20)
+    world.until_idle(tasks=2)
+    names = [name for name in world.observer.sent_since(0) if name in ("GUIDED", "HOLD", "arm")]
+    assert names == ["GUIDED", "arm", "HOLD"]
+
+
+def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
+    world.client.move(20, speed=1.0)
+    world.client.rotate(10)
+    world.run(4)
+    at = world.now
+    shut_down(world)
+    assert world.observer.sent_since(at)[:2] == ["HOLD", "zero"]
+    world.until(lambda: world.events(ServerStopped), within=0.85)
+    world.run(4)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert [world.state(k) for k in (1, 2)] == [(S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE)]
+
+
+def test_a_server_that_drives_nothing_ends_at_once(world: World) -> None:
+    shut_down(world)
+    assert len(world.events(ServerStopped)) == 1
+
+
+def test_a_server_that_stops_a_standing_rover_ends_when_hold_is_seen(world: World) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    at = world.now
+    shut_down(world)
+    world.until(lambda: world.events(ServerStopped), within=0.85)
+    assert world.now - at < 0.7
+
+
+def test_a_lost_hold_is_sent_again_on_the_way_out(world: World) -> None:
+    world.client.move(20, speed=1.0)
+    world.run(4)
+    world.fault(Faults(deaf=True))
+    shut_down(world)
+    world.run(0.4)
+    world.fault(Faults())
+    world.run(5)
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_submissions_are_refused_and_nothing_begins_on_the_way_out(world: World) -> None:
+    world.client.move(5, speed=1.0)
+    world.client.rotate(10)
+    world.run(3)
+    shut_down(world)
+    refused = world.client.move(1, nonce=4)
+    world.run(0.5)
+    assert refused.answer == (TEMPORARILY_REJECTED, R.RATE_LIMITED)
+    world.run(5)
+    assert world.state(2)[0] is S.QUEUED
+
+
+def test_waiting_tasks_do_not_begin_on_the_way_out(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(arming="operator"))
+    world.client.move(1)
+    world.run(1)
+    world.server.pump.handle(Shutdown(), now=world.now)
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(0.5)
+    assert world.state(1)[0] is S.QUEUED
+
+
+def test_last_words_are_there_exactly_while_a_rover_is_engaged(world: World) -> None:
+    engine = world.server.engine
+    seen: list[tuple[bool, list[str]]] = []
+
+    def note(now: float) -> None:
+        listener = Observer()
+        for words in engine.last_words:
+            listener.sent(now, words.data)
+        seen.append((world.control() != "IDLE", listener.sent_since(0)))
+
+    world.watch(note)
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    world.run(1)
+    expected = {(True, ("zero", "HOLD")), (False, ())}
+    assert {(engaged, tuple(words)) for engaged, words in seen} == expected
+
+
+def test_last_words_stop_a_driving_rover(world: World) -> None:
+    world.client.move(20, speed=1.0)
+    world.run(4)
+    world.leave(world.server)
+    world.server.pump.send_last_words()
+    world.observer.expects_gaps = True
+    world.run(5)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_server_that_vanishes_leaves_a_rover_that_stops_by_itself(world: World) -> None:
+    world.client.move(20, speed=1.0)
+    world.run(4)
+    world.leave(world.server)
+    world.run(6)
+    assert world.stands()

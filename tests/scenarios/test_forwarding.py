@@ -1,0 +1,499 @@
+"""Clients see the rover as if nothing stood between, and hear nothing that is not for them."""
+
+from itertools import pairwise
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import (
+    ACCEPTED,
+    DENIED,
+    GET_INTERVAL,
+    GUIDED,
+    IDS,
+    REQUEST,
+    SET_INTERVAL,
+    SET_MODE,
+    TASK_STATUS,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    FakeClient,
+    setpoint,
+)
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+ATTITUDE, POSITION = 30, 32
+DATA_STREAM, PARAM_VALUE = 66, 22
+OUR_MESSAGES = range(54000, 54050)
+
+
+def packed(message: object, system_id: int, component_id: int, *, seq: int = 0) -> bytes:
+    mav = common.MAVLink(None, system_id, component_id)
+    mav.seq = seq
+    raw: bytes = message.pack(mav)  # type: ignore[attr-defined]
+    return raw
+
+
+def rate(client: FakeClient, message_id: int, since: float, until: float) -> float:
+    return sum(since < p.at <= until for p in client.of_id(message_id)) / (until - since)
+
+
+# telemetry
+
+
+def test_no_client_sees_a_loss_that_is_none(world: World) -> None:
+    other = world.add_client("other", system_id=245)
+    world.client.move(0.5)
+    other.rotate(30)
+    for _ in range(20):
+        world.run(0.2)
+        other.command(REQUEST, 148, target=(1, 1))
+        other.arm(target=(1, 1))
+    world.until_idle(tasks=2)
+    for client in (world.client, other):
+        assert [client.gaps(source) for source in ((1, 1), (1, 191))] == [0, 0]
+    assert world.client.heard("ATTITUDE")
+
+
+def test_a_real_loss_stays_visible(world: World) -> None:
+    sent = lost = 0
+
+    def loses(source: str, target: str, _data: bytes) -> bool:
+        nonlocal sent, lost
+        if (source, target) != ("rover1", VEHICLE_LINK):
+            return False
+        sent += 1
+        lost += sent % 17 == 0
+        return sent % 17 == 0
+
+    world.watched.loses = loses
+    world.run(10)
+    world.watched.loses = lambda *_: False
+    world.run(2)
+    assert lost > 30
+    assert world.client.gaps((1, 1)) == lost
+
+
+def test_the_first_of_a_system_is_its_autopilots_heartbeat_then_ours_once_a_second(
+    world: World,
+) -> None:
+    late = world.add_client("late")
+    world.run(0.3)
+    world.client.move(3)
+    world.run(8)
+    for client in (world.client, late):
+        first = next(p for p in client.received if p.source[0] == 1)
+        assert (first.source, first.message_id) == ((1, 1), 0)
+        beats = [p.at for p in client.of_id(0) if p.source == (1, 191)]
+        assert len(beats) >= 8
+        assert {round(b - a, 2) for a, b in pairwise(beats)} == {1.0}
+
+
+def test_our_heartbeat_says_what_the_server_is_and_does(world: World) -> None:
+    world.client.move(2)
+    world.run(2)
+    ours = [world.client.decoded(p) for p in world.client.of_id(0) if p.source == (1, 191)]
+    assert {(h.type, h.autopilot, h.base_mode, h.custom_mode) for h in ours} == {(18, 8, 0, 0)}
+    assert [ours[0].system_status, ours[-1].system_status] == [3, 4]
+
+
+def test_each_client_has_its_own_intervals(world: World) -> None:
+    fast, none, usual = world.client, world.add_client("none"), world.add_client("usual")
+    world.run(0.1)
+    sent = [
+        fast.command(SET_INTERVAL, ATTITUDE, 40_000, target=(1, 1)),
+        none.command(SET_INTERVAL, ATTITUDE, -1, target=(1, 1)),
+        fast.command(SET_INTERVAL, POSITION, 1_000_000, target=(1, 191)),
+    ]
+    world.run(5)
+    since = world.now
+    world.run(10)
+    rates = [rate(client, ATTITUDE, since, world.now) for client in (fast, none, usual)]
+    assert rates == [pytest.approx(25, abs=1.5), 0, pytest.approx(10, abs=0.6)]
+    assert rate(fast, POSITION, since, world.now) == pytest.approx(1, abs=0.2)
+    assert [s.answer for s in sent] == [(ACCEPTED, 0)] * 3
+
+    fast.command(SET_INTERVAL, ATTITUDE, 0, target=(1, 1))
+    world.run(1)
+    since = world.now
+    world.run(5)
+    assert rate(fast, ATTITUDE, since, world.now) == pytest.approx(10, abs=0.6)
+
+
+def test_an_interval_can_be_asked_for(world: World) -> None:
+    world.client.command(SET_INTERVAL, ATTITUDE, 40_000, target=(1, 1))
+    world.client.command(GET_INTERVAL, ATTITUDE, target=(1, 1))
+    world.run(0.1)
+    answer = world.client.of_type("MESSAGE_INTERVAL")[0]
+    assert (answer.message_id, answer.interval_us) == (ATTITUDE, 40_000)
+
+
+def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
+    for message_id in (ATTITUDE, POSITION):
+        world.client.command(SET_INTERVAL, message_id, 1, target=(1, 1))
+        world.client.command(SET_INTERVAL, message_id, 1e9, target=(1, 1))
+        world.client.command(SET_INTERVAL, message_id, 1, target=(1, 1))
+    world.client.command(SET_INTERVAL, TASK_STATUS, 1)
+    world.run(1)
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(8)
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_a_request_for_data_streams_does_not_reach_the_rover(world: World) -> None:
+    world.client.send(common.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))
+    world.run(3)
+    assert DATA_STREAM not in [kind for _, kind in world.observer.reached]
+    assert rate(world.client, POSITION, world.now - 2, world.now) > 8
+
+
+def test_parameters_can_be_listed_through_the_server(world: World) -> None:
+    silent = world.add_client("other", system_id=7)
+    world.run(0.1)
+    world.client.send(common.MAVLink_param_request_list_message(1, 1))
+    world.run(1)
+    values = world.client.of_type("PARAM_VALUE")
+    assert len({v.param_id for v in values}) == values[0].param_count
+    assert [silent.gaps((1, 1)), world.client.gaps((1, 1))] == [0, 0]
+
+
+@pytest.mark.parametrize("component", [1, 191])
+def test_the_protocol_version_is_answered(world: World, component: int) -> None:
+    asked = world.client.command(REQUEST, 300, target=(1, component))
+    world.run(0.1)
+    versions = list(world.client.of_id(300))
+    assert asked.answer == (ACCEPTED, 0)
+    assert [p.source for p in versions] == [(1, component)]
+    assert versions[0].payload == bytes((200, 0, 100, 0, 200))  # 2.00, 1.00, 2.00, cut zeros
+
+
+def test_every_request_for_a_message_is_answered(world: World) -> None:
+    known = world.client.command(REQUEST, 148, target=(1, 1))
+    world.run(0.1)
+    unknown = world.client.command(REQUEST, 435, target=(1, 1))
+    world.run(0.1)
+    ours = world.client.command(REQUEST, 435, target=(1, 191))
+    world.run(0.1)
+    world.lose_acks()
+    silent = world.client.command(REQUEST, 148, target=(1, 1))
+    world.run(0.5)
+    assert [s.result for s in (known, unknown, ours, silent)] == [
+        ACCEPTED,
+        common.MAV_RESULT_FAILED,
+        UNSUPPORTED,
+        UNSUPPORTED,
+    ]
+    assert world.client.heard("AUTOPILOT_VERSION")
+
+
+# commands
+
+
+def test_acks_go_to_who_asked_though_both_are_called_the_same(world: World) -> None:
+    twin = world.add_client("twin")
+    world.run(0.1)
+    world.client.move(1)
+    twin.rotate(10)
+    world.run(0.05)
+    twin.command(REQUEST, 148, target=(1, 1))
+    world.client.command(31000, target=(1, 1))
+    world.run(0.2)
+    assert [a.command for a in world.client.acks] == [54000, 31000]
+    assert [a.command for a in twin.acks] == [54001, REQUEST]
+
+
+def test_two_clients_send_the_same_command_at_once(world: World) -> None:
+    twin = world.add_client("twin")
+    world.run(0.1)
+    sent = [client.arm() for client in (world.client, twin)]
+    world.run(0.2)
+    assert [s.result for s in sent] == [ACCEPTED, ACCEPTED]
+    assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
+
+
+def test_no_answer_in_0_4_s_is_a_rejection_and_the_late_ack_is_dropped(world: World) -> None:
+    lost = world.lose_acks()
+    at = world.now
+    sent = world.client.command(31000, target=(1, 1))
+    world.run(0.6)
+    assert sent.answer == (TEMPORARILY_REJECTED, 0)
+    assert 0.4 <= sent.acked_at - at <= 0.5
+    world.net.send("rover1", VEHICLE_LINK, lost[0])
+    world.run(1)
+    assert len(world.client.acks) == 1
+
+
+def test_the_late_ack_of_one_client_is_not_given_to_another(world: World) -> None:
+    twin = world.add_client("twin")
+    world.run(0.1)
+    lost = world.lose_acks()
+    world.client.command(31000, target=(1, 1))
+    world.run(0.41)
+    world.watched.loses = lambda *_: False
+    second = twin.command(31000, target=(1, 1))
+    world.net.send("rover1", VEHICLE_LINK, lost[0])
+    world.run(0.05)
+    assert second.ack is None
+    world.run(0.6)
+    assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
+
+
+def test_of_three_at_once_all_are_answered_within_half_a_second(world: World) -> None:
+    clients = [world.add_client(f"c{k}") for k in range(3)]
+    world.run(0.1)
+    world.lose_acks()
+    at = world.now
+    sent = [client.command(31000, target=(1, 1)) for client in clients]
+    world.run(2)
+    assert [s.result for s in sent] == [TEMPORARILY_REJECTED] * 3
+    assert all(s.acked_at - at <= 0.5 for s in sent)
+
+
+def test_disarm_never_waits(world: World) -> None:
+    twin = world.add_client("twin")
+    world.operator_arm(True)
+    world.run(0.1)
+    world.lose_acks()
+    world.client.arm()
+    world.run(0.01)
+    twin.arm(False)
+    world.run(0.05)
+    assert not world.rover.autopilot.armed
+
+
+def test_an_answer_meant_for_another_ground_station_is_not_passed_on(world: World) -> None:
+    world.lose_acks()
+    world.client.command(31000, target=(1, 1))
+    world.run(0.05)
+    world.watched.loses = lambda *_: False
+    foreign = common.MAVLink_command_ack_message(31000, 0, 0, 0, 77, 190)
+    world.from_vehicle_side(packed(foreign, 1, 1), peer="rover1")
+    world.run(0.1)
+    assert world.client.acks == []
+
+
+@pytest.mark.parametrize("result", [7, 8, 9, 200])
+def test_a_result_that_crashes_clients_is_not_passed_on(world: World, result: int) -> None:
+    world.lose_acks()
+    sent = world.client.command(31000, target=(1, 1))
+    world.run(0.05)
+    world.watched.loses = lambda *_: False
+    ack = common.MAVLink_command_ack_message(31000, result, 0, 0, 255, 190)
+    world.from_vehicle_side(packed(ack, 1, 1), peer="rover1")
+    world.run(0.1)
+    assert sent.answer == (UNSUPPORTED, 0)
+
+
+def test_in_progress_is_not_passed_on_and_what_follows_is(world: World) -> None:
+    world.lose_acks()
+    sent = world.client.command(31000, target=(1, 1))
+    world.run(0.05)
+    world.watched.loses = lambda *_: False
+    for result in (5, 5, 0):
+        ack = common.MAVLink_command_ack_message(31000, result, 0, 0, 255, 190)
+        world.from_vehicle_side(packed(ack, 1, 1), peer="rover1")
+        world.run(0.05)
+    assert [a.result for a in world.client.acks] == [ACCEPTED]
+    assert sent.result == ACCEPTED
+
+
+def test_commands_for_systems_that_are_not_here_are_nobodys(world: World) -> None:
+    world.client.move(1, target=(9, 191))
+    world.client.stop(target=(9, 1))
+    world.client.arm(target=(9, 1))
+    world.client.arm(target=(0, 0))
+    world.run(1)
+    assert (world.client.acks, world.tasks()) == ([], ())
+    assert not world.rover.autopilot.armed
+
+
+# task status
+
+
+def test_a_status_is_shown_on_request(world: World) -> None:
+    world.client.move(2)
+    world.client.rotate(10, nonce=9)
+    world.run(2)
+    found = world.client.request_status(2)
+    world.run(0.1)
+    missing = world.client.request_status(99)
+    world.run(0.1)
+    assert (found.answer, missing.answer) == ((ACCEPTED, 0), (DENIED, R.NOT_FOUND))
+    status = world.client.statuses(2)[-1]
+    assert (status.nonce, status.command, status.priority) == (9, 54001, 5)
+    assert (status.why, status.queue_position) == ((S.QUEUED, R.BEHIND_OTHERS), 1)
+    assert "no task 99" in world.client.texts()
+
+
+def test_a_status_is_pushed_to_who_submitted_and_to_nobody_else(world: World) -> None:
+    other = world.add_client("other")
+    world.run(0.1)
+    other.request_status(1)
+    world.client.move(0.3)
+    world.until_idle(tasks=1)
+    world.run(0.2)
+    states = [s.state for s in world.client.statuses(1)]
+    assert states[-3:] == [S.STARTING, S.EXECUTING, S.COMPLETED]
+    assert other.statuses() == []
+    final = world.client.statuses(1)[-1]
+    assert (final.progress, final.target_system, final.target_component) == (100, 255, 190)
+    assert final.execution_time > 0.5
+
+
+def test_messages_of_our_dialect_go_only_to_clients_that_use_it(world: World) -> None:
+    stock = world.add_client("stock")
+    world.client.command(SET_INTERVAL, TASK_STATUS, 100_000)
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    assert not [p for p in stock.received if p.message_id in OUR_MESSAGES]
+    assert len(world.client.statuses(1)) > 10
+
+
+def test_a_stream_of_statuses_has_the_rate_that_was_asked_for(world: World) -> None:
+    world.client.move(4)
+    world.run(1)
+    world.client.command(SET_INTERVAL, TASK_STATUS, 200_000)
+    world.run(0.5)
+    since = world.now
+    world.run(4)
+    assert rate(world.client, TASK_STATUS, since, world.now) == pytest.approx(5, abs=0.5)
+    remaining = [s.remaining for s in world.client.statuses(1)][-15:]
+    assert remaining == sorted(remaining, reverse=True)
+
+
+def test_a_rover_with_a_191_of_its_own_moves_the_server_to_192(world: World) -> None:
+    companion = common.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+    for seq in range(3):
+        world.from_vehicle_side(packed(companion, 1, 191, seq=seq), peer="rover1")
+        world.run(1)
+    own = world.client.move(0.3, target=(1, 192))
+    world.run(0.1)
+    assert own.task_id == 1
+    assert [p.source for p in world.client.of_id(TASK_STATUS)][:1] == [(1, 192)]
+    assert any("192" in text for text in world.client.texts())
+    world.client.stop(target=(1, 191))  # of habit
+    world.run(3)
+    assert world.paused() is R.STOPPED
+
+
+# motion of clients
+
+
+def test_a_clients_setpoints_pass_once_it_has_asked_for_our_mode(world: World) -> None:
+    world.operator_arm(True)
+    world.run(0.5)
+    world.client.stream(setpoint(0.5), rate=10)
+    world.run(2)
+    assert world.stands()
+    world.client.mode(GUIDED)
+    world.run(3)
+    assert world.truth.forward_speed > 0.3
+
+
+def test_a_clients_stream_does_not_drive_the_instant_a_task_ends(world: World) -> None:
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(0.5)
+    world.client.mode(GUIDED)
+    world.run(0.2)
+    world.client.move(0.5)
+    world.until_state(1, S.EXECUTING)
+    world.client.stream(setpoint(0.5), rate=20)
+    world.until_idle(tasks=1)
+    where = world.pose()
+    world.run(3)
+    assert world.pose() == where
+
+
+def test_a_clients_stream_makes_tasks_wait(world: World) -> None:
+    driver = world.add_client("driver")
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(0.5)
+    driver.mode(GUIDED)
+    world.run(0.2)
+    driver.stream(setpoint(0.2), rate=10)
+    world.run(1)
+    world.client.move(0.5)
+    world.run(3)
+    world.client.request_status(1)
+    world.run(0.1)
+    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.OTHER_CONTROLLER)
+    driver.end_streams()
+    world.run(1.9)
+    assert world.state(1)[0] is S.QUEUED
+    world.until_idle(tasks=1)
+
+
+def test_go_to_is_denied_while_a_task_drives(world: World) -> None:
+    world.client.move(2)
+    world.run(2)
+    sent = world.client.command_int(192, -1, 1, 0, 0, x=1, y=1, frame=6, target=(1, 1))
+    world.run(0.1)
+    assert sent.answer == (DENIED, R.NOT_ALLOWED)
+
+
+@pytest.mark.parametrize("field", ["vx", "yaw_rate", "x"])
+def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, field: str) -> None:
+    world.operator_arm(True)
+    world.run(0.2)
+    world.client.mode(GUIDED)
+    world.run(0.5)
+    bad = setpoint(0.5)
+    setattr(bad, field, float("nan"))
+    world.client.send(bad)
+    world.run(0.1)
+    assert 84 not in [kind for _, kind in world.observer.reached]
+    slow = world.client.command(178, 1, float("nan"), target=(1, 1))
+    world.run(0.1)
+    assert slow.answer == (DENIED, R.BAD_PARAMETER)
+
+
+def test_a_mode_by_a_client_is_forwarded_and_answered(world: World) -> None:
+    asked = world.client.mode(10)
+    world.run(0.1)
+    assert world.client.acks_of(SET_MODE) == [(ACCEPTED, 0)]
+    assert asked.result == ACCEPTED
+    assert world.rover.autopilot.mode is Mode.AUTO
+
+
+def test_a_client_on_mavlink_1_is_a_client(make_world: MakeWorld) -> None:
+    world = make_world()
+    old = world.add_client("old")
+    old.heartbeats = False
+    mav = common.MAVLink(None, 255, 190)
+    old.send_raw(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(mav, force_mavlink1=True))
+    world.run(2)
+    assert old.heard("ATTITUDE")
+    assert all(p.raw[0] == 0xFD for p in old.received)
+
+
+def test_ids_that_nobody_knows_pass_both_ways(world: World) -> None:
+    unknown = bytes((0xFD, 3, 0, 0, 7, 1, 1, 0x11, 0x27, 0)) + b"abc" + b"\x12\x34"
+    world.from_vehicle_side(unknown, peer="rover1")
+    world.client.send_raw(unknown)
+    world.run(0.1)
+    assert [p.payload for p in world.client.of_id(0x2711)] == [b"abc"]
+
+
+def test_keys_are_not_set_through_the_server(world: World) -> None:
+    towards: list[int] = []
+
+    def listen(source: str, _target: str, data: bytes) -> bool:
+        if source == VEHICLE_LINK:
+            towards.append(data[7] | data[8] << 8)
+        return False
+
+    world.watched.loses = listen
+    world.client.send(common.MAVLink_setup_signing_message(1, 1, [0] * 32, 0))
+    world.client.send(common.MAVLink_ping_message(0, 0, 1, 1))
+    world.run(0.1)
+    assert IDS["PING"] in towards
+    assert IDS["SETUP_SIGNING"] not in towards

@@ -1,0 +1,236 @@
+"""What is lost on the way, or stops making sense: the rover stops, and nothing is guessed."""
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.world import World, near_pose
+
+HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
+INTERVAL = common.MAV_CMD_SET_MESSAGE_INTERVAL
+
+
+@pytest.fixture
+def driving(world: World) -> World:
+    """A world in which a task drives and another waits."""
+    world.client.move(4)
+    world.until_state(1, S.EXECUTING)
+    world.client.rotate(90)
+    world.run(2)
+    assert world.truth.forward_speed > 0.3
+    return world
+
+
+LOSSES = {
+    "heartbeats": (Faults(withheld=frozenset({HEARTBEAT})), R.LINK_LOST, 4.0),
+    "everything": (Faults(silent=True), R.POSITION_LOST, 1.5),
+    "position": (Faults(withheld=frozenset({POSITION})), R.POSITION_LOST, 1.5),
+    "attitude": (Faults(withheld=frozenset({ATTITUDE})), R.POSITION_LOST, 1.5),
+    "frozen position": (Faults(position_frozen=True), R.POSITION_LOST, 1.5),
+}
+
+
+@pytest.mark.parametrize("what", LOSSES)
+def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
+    driving: World, what: str
+) -> None:
+    world = driving
+    faults, reason, within = LOSSES[what]
+    world.fault(faults)
+    world.until_state(1, S.PAUSED, within=within)
+    assert world.state(1) == (S.PAUSED, reason)
+    world.until(world.stands, within=2)
+    world.run(4)
+    where = world.pose()
+    assert world.state(1) == (S.PAUSED, reason)
+
+    world.fault(Faults())
+    back = world.now
+    world.until(lambda: world.state(1)[0] is not S.PAUSED, within=4)
+    assert 1.9 < world.now - back < 3.5
+    assert world.pose() == where
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert near_pose(world.pose(), (4.0, 0.0, 90.0))
+
+
+@pytest.mark.parametrize("what", LOSSES)
+def test_after_30_s_it_fails_and_the_queue_pauses(driving: World, what: str) -> None:
+    world = driving
+    faults, _, within = LOSSES[what]
+    world.fault(faults)
+    world.run(30 + within + 3)
+    assert world.state(1) == (S.FAILED, R.LINK_TIMEOUT)
+    assert (world.paused(), world.state(2)[0]) == (R.LINK_TIMEOUT, S.QUEUED)
+    world.fault(Faults())
+    world.run(5)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.control() == "IDLE"
+
+
+def test_no_motion_on_data_older_than_0_3_s(driving: World) -> None:
+    world = driving
+    at = world.now
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    world.run(0.9)
+    assert "move" in world.observer.sent_since(at)
+    assert "move" not in world.observer.sent_since(at + 0.3)
+    assert world.state(1)[0] is S.EXECUTING
+    world.fault(Faults())
+    world.until_idle(tasks=2)
+    assert near_pose(world.pose(), (4.0, 0.0, 90.0))
+
+
+def test_a_position_frozen_at_rest_fails_as_stuck_before_it_gets_far(world: World) -> None:
+    world.fault(Faults(position_frozen=True))
+    world.client.move(10)
+    world.run(0.1)
+    world.client.rotate(10)
+    world.run(15)
+    assert world.state(1) == (S.FAILED, R.STUCK)
+    assert world.paused() is R.STUCK
+    assert world.truth.north < 2.0
+    assert world.stands()
+
+
+def test_a_lost_task_does_not_resume_while_paused_by_an_operator(driving: World) -> None:
+    world = driving
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    world.until_state(1, S.PAUSED, within=2)
+    world.client.pause()
+    world.run(1)
+    world.fault(Faults())
+    world.run(6)
+    assert (world.state(1)[0], world.paused()) == (S.PAUSED, R.OPERATOR)
+    world.client.proceed()
+    world.until_idle(tasks=2)
+
+
+def test_a_lost_task_does_not_resume_on_a_disarmed_rover(driving: World) -> None:
+    world = driving
+    world.fault(Faults(silent=True))
+    world.until_state(1, S.PAUSED, within=2)
+    world.operator_arm(False)
+    world.run(4)
+    world.fault(Faults())
+    world.run(8)
+    assert world.state(1)[0] is S.PAUSED
+    assert not world.rover.autopilot.armed
+
+
+@pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0)])
+def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float, float]) -> None:
+    world = driving
+    world.fault(Faults(position_jump=jump))
+    world.run(1)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    world.until(world.stands, within=2)
+    world.run(10)
+    assert world.state(2)[0] is S.QUEUED
+    world.client.stop()
+    world.run(1)
+    assert world.state(1) == (S.KILLED, R.STOP)
+
+
+def test_a_jump_while_paused_holds_the_task_too(driving: World) -> None:
+    world = driving
+    world.client.pause()
+    world.run(3)
+    world.fault(Faults(position_jump=(3.0, 0.0)))
+    world.run(1)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+
+
+def test_a_reboot_holds_the_task_and_the_rates_are_asked_for_again(driving: World) -> None:
+    world = driving
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(2)
+    at = world.now
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    world.run(5)
+    before = len(list(world.client.of_id(POSITION)))
+    world.run(2)
+    assert len(list(world.client.of_id(POSITION))) - before >= 16
+    assert set(world.observer.sent_since(at)) <= {"511"}
+    assert world.stands()
+
+
+def test_a_reboot_of_an_idle_rover_does_not_keep_it_from_its_next_task(world: World) -> None:
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(6)
+    world.client.move(0.5)
+    world.until_idle(tasks=2)
+    assert world.state(2)[0] is S.COMPLETED
+
+
+def test_a_task_that_was_paused_when_the_rover_rebooted_is_held(driving: World) -> None:
+    world = driving
+    world.client.pause()
+    world.run(4)
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(6)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+
+
+@pytest.mark.parametrize("late", [0.55, 1.0, 2.5])
+def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: float) -> None:
+    world = driving
+    world.observer.expects_gaps = True
+    world.suspend_server(late)
+    at = world.now
+    world.run(0.1)
+    assert world.observer.sent_since(at)[0] == "zero"
+    assert "move" not in world.observer.sent_since(at)
+    assert world.state(1) == (S.HELD, R.LATE)
+    assert len(world.observer.sent_since(at)) < 8
+    world.until(world.stands, within=3)
+    world.run(2)
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_client_that_wakes_a_late_server_does_not_make_it_drive_on(driving: World) -> None:
+    world = driving
+    world.observer.expects_gaps = True
+    world.leave(world.server)
+    world.run(1.0)
+    world.client.proceed()
+    world.run(0.01)
+    world.join(world.server)
+    world.run(0.1)
+    assert world.state(1) == (S.HELD, R.LATE)
+
+
+def test_a_tick_that_is_a_little_late_changes_nothing(driving: World) -> None:
+    world = driving
+    world.observer.expects_gaps = True
+    world.suspend_server(0.1)
+    world.run(0.5)
+    assert world.state(1)[0] is S.EXECUTING
+
+
+def test_heartbeats_lost_singly_change_nothing(driving: World) -> None:
+    world = driving
+    for _ in range(3):
+        world.fault(Faults(withheld=frozenset({HEARTBEAT})))
+        world.run(1.7)
+        world.fault(Faults())
+        world.run(1.1)
+    assert (S.PAUSED, R.LINK_LOST) not in world.history(1)
+
+
+def test_a_held_task_keeps_its_queue_and_continue_says_so(driving: World) -> None:
+    world = driving
+    world.fault(Faults(position_jump=(5.0, 0.0)))
+    world.run(3)
+    refused = world.client.proceed()
+    world.run(0.1)
+    assert refused.answer == (common.MAV_RESULT_DENIED, R.WRONG_STATE)
+    world.client.request_status(2)
+    world.run(0.1)
+    assert world.client.statuses(2)[-1].why == (S.QUEUED, R.HELD_AHEAD)

@@ -1,0 +1,207 @@
+"""The observer that ends every scenario: it is content with good driving and catches each sin."""
+
+from collections.abc import Callable
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from tests.kit.client import (
+    AUTO,
+    GUIDED,
+    HOLD,
+    MANUAL,
+    PAUSE_CONTINUE,
+    STOP,
+    command_long,
+    set_mode,
+    setpoint,
+    sticks,
+)
+from tests.kit.observer import Observer
+
+ROVER, SERVER, CLIENT = (1, 1), (250, 191), (255, 190)
+
+
+class Story:
+    """What an observer sees, told by hand."""
+
+    def __init__(self) -> None:
+        self.observer = Observer()
+        self.now = 10.0
+
+    def later(self, seconds: float) -> "Story":
+        self.now += seconds
+        return self
+
+    def rover(self, mode: int, *, armed: bool) -> "Story":
+        beat = common.MAVLink_heartbeat_message(10, 3, 129 if armed else 1, mode, 4, 3)
+        self.observer.heard(self.now, packed(beat, ROVER))
+        return self
+
+    def position(self) -> "Story":
+        place = common.MAVLink_local_position_ned_message(1, 0, 0, 0, 0, 0, 0)
+        self.observer.heard(self.now, packed(place, ROVER))
+        heading = common.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0)
+        self.observer.heard(self.now, packed(heading, ROVER))
+        return self
+
+    def sends(self, message: object, source: tuple[int, int] = SERVER) -> "Story":
+        self.observer.sent(self.now, packed(message, source))
+        self.observer.arrived(self.now, packed(message, source))
+        return self
+
+    def moves(self, speed: float = 0.5) -> "Story":
+        return self.sends(setpoint(speed))
+
+    def asks(self, message: object) -> "Story":
+        self.observer.asked(self.now, packed(message, CLIENT), peer="client")
+        return self
+
+    def answers(self, command: int, result: int) -> "Story":
+        ack = common.MAVLink_command_ack_message(command, result)
+        self.observer.answered(self.now, packed(ack, ROVER))
+        return self
+
+    def driving(self) -> "Story":
+        """A rover that we have taken as we should, and that we drive."""
+        self.rover(HOLD, armed=False).position()
+        self.sends(mode_request(GUIDED)).later(0.01).rover(GUIDED, armed=False)
+        self.moves(0.0).sends(arming(1)).later(0.01).rover(GUIDED, armed=True)
+        for _ in range(5):
+            self.later(0.05).position().moves()
+        return self
+
+
+def packed(message: object, source: tuple[int, int]) -> bytes:
+    raw: bytes = message.pack(common.MAVLink(None, *source))  # type: ignore[attr-defined]
+    return raw
+
+
+def mode_request(mode: int) -> object:
+    return command_long(176, 1, mode, target=(1, 1))
+
+
+def arming(armed: int) -> object:
+    return command_long(400, armed, target=(1, 1))
+
+
+def test_good_driving_is_no_violation() -> None:
+    story = Story().driving().later(0.05).moves(0.0)
+    story.sends(mode_request(HOLD)).later(0.1).rover(HOLD, armed=True)
+    story.sends(arming(0)).later(0.1).rover(HOLD, armed=False)
+    story.observer.check()
+
+
+def test_a_stop_well_done_is_no_violation() -> None:
+    story = Story().driving().later(0.01).asks(command_long(STOP))
+    story.sends(mode_request(HOLD)).moves(0.0).later(0.05).moves(0.0).rover(HOLD, armed=True)
+    story.later(3).asks(command_long(PAUSE_CONTINUE, 1)).answers(PAUSE_CONTINUE, 0)
+    story.sends(mode_request(GUIDED)).observer.check()
+
+
+def test_a_continue_that_was_refused_ends_no_stop() -> None:
+    story = Story().rover(HOLD, armed=True).asks(command_long(STOP))
+    story.sends(mode_request(HOLD)).moves(0.0).later(1)
+    story.asks(command_long(PAUSE_CONTINUE, 1)).answers(PAUSE_CONTINUE, 1)
+    with pytest.raises(AssertionError, match="in spite of STOP"):
+        story.sends(mode_request(GUIDED)).observer.check()
+
+
+SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
+    "not armed": (
+        "not seen armed",
+        lambda s: s.rover(GUIDED, armed=False).position().moves(0.0).later(0.05).moves(),
+    ),
+    "other mode": ("in mode 10", lambda s: s.rover(AUTO, armed=True).position().moves()),
+    "no zero first": (
+        "before a zero",
+        lambda s: s.rover(GUIDED, armed=True).position().moves(),
+    ),
+    "not a number": ("not finite", lambda s: s.driving().later(0.05).moves(float("nan"))),
+    "infinite": ("not finite", lambda s: s.driving().later(0.05).moves(float("inf"))),
+    "stale": (
+        "stale data",
+        lambda s: [s.driving()] + [s.later(0.05).moves() for _ in range(7)],
+    ),
+    "gap": ("gap of .* while", lambda s: s.driving().later(0.2).position().moves()),
+    "long gap": ("gap of .* then", lambda s: s.driving().later(0.4).position().moves()),
+    "burst": (
+        "burst",
+        lambda s: [s.driving()] + [s.later(0.01).moves() for _ in range(6)],
+    ),
+    "armed in AUTO": ("arming in mode 10", lambda s: s.rover(AUTO, armed=False).sends(arming(1))),
+    "armed before a zero": (
+        "before a zero",
+        lambda s: s.rover(GUIDED, armed=False).sends(arming(1)),
+    ),
+    "mode taken from MANUAL": (
+        "taken from mode 0",
+        lambda s: s.rover(MANUAL, armed=True).sends(mode_request(GUIDED)),
+    ),
+    "mode taken from AUTO": (
+        "taken from mode 10",
+        lambda s: s.rover(AUTO, armed=False).sends(mode_request(GUIDED)),
+    ),
+    "setpoint after a switch": (
+        "after a takeover",
+        lambda s: s.driving().later(0.01).rover(HOLD, armed=True).later(0.04).moves(0.0),
+    ),
+    "two zeros after sticks": (
+        "after a takeover",
+        lambda s: s.driving().asks(sticks(500)).moves(0.0).later(0.05).moves(0.0),
+    ),
+    "motion after sticks": (
+        "after a takeover",
+        lambda s: s.driving().asks(sticks(500)).later(0.05).position().moves(),
+    ),
+    "arming after a disarm": (
+        "arming after a takeover",
+        lambda s: s.driving().rover(GUIDED, armed=False).later(0.05).sends(arming(1)),
+    ),
+    "no HOLD at a STOP": (
+        "without HOLD",
+        lambda s: s.driving().asks(command_long(STOP)).moves(0.0),
+    ),
+    "no zero at a STOP": (
+        "without zero",
+        lambda s: s.driving().asks(command_long(STOP)).sends(mode_request(HOLD)),
+    ),
+    "too late at a STOP": (
+        "without HOLD and zero",
+        lambda s: s.driving().asks(command_long(STOP)).later(0.05).moves(0.0),
+    ),
+    "two sources": (
+        "two sources",
+        lambda s: s.driving().later(0.5).sends(setpoint(1.0), CLIENT),
+    ),
+    "a client drives too": (
+        "while the server drives",
+        lambda s: s.driving().later(0.01).sends(setpoint(1.0), CLIENT),
+    ),
+}
+PASSED = [
+    setpoint(1.0),
+    sticks(500),
+    set_mode(GUIDED),
+    mode_request(AUTO),
+    arming(1),
+    command_long(20, target=(1, 1)),
+    command_long(300, target=(1, 1)),
+]
+
+
+@pytest.mark.parametrize("sin", SINS)
+def test_each_sin_is_caught(sin: str) -> None:
+    words, tell = SINS[sin]
+    story = Story()
+    tell(story)
+    with pytest.raises(AssertionError, match=words):
+        story.observer.check()
+
+
+@pytest.mark.parametrize("message", PASSED, ids=lambda m: m.get_type())
+def test_whatever_moves_and_passes_after_a_stop_is_caught(message: object) -> None:
+    story = Story().rover(HOLD, armed=True).asks(command_long(STOP))
+    story.sends(mode_request(HOLD)).moves(0.0).later(0.5).sends(message, CLIENT)
+    with pytest.raises(AssertionError, match="in spite of STOP"):
+        story.observer.check()

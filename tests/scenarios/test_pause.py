@@ -1,0 +1,105 @@
+"""Pause and continue: zeros at once, and the same end whatever the pattern of pauses."""
+
+from collections.abc import Callable
+from random import Random
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, PAUSE_CONTINUE, ROTATE, set_mode
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+PAUSES: dict[str, Callable[[World], object]] = {
+    "DO_PAUSE_CONTINUE": lambda w: w.client.pause(),
+    "DO_PAUSE_CONTINUE to component 1": lambda w: w.client.pause(target=(1, 1)),
+    "DO_SET_MODE": lambda w: w.client.mode(HOLD),
+    "SET_MODE": lambda w: w.client.send(set_mode(HOLD)),
+}
+
+
+@pytest.mark.parametrize("way", PAUSES)
+def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str) -> None:
+    world.client.move(3)
+    world.until_state(1, S.EXECUTING)
+    world.client.rotate(20)
+    world.run(2)
+    at = world.now
+    PAUSES[way](world)
+    world.run(0.02)
+    assert world.observer.sent_since(at)[0] == "zero"
+    world.run(4)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.rover.autopilot.armed
+    assert (world.control(), world.paused()) == ("IDLE", R.OPERATOR)
+    assert [world.state(k) for k in (1, 2)] == [(S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE)]
+
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert near_pose(world.pose(), (3.0, 0.0, 20.0))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_end_is_the_same_with_any_pattern_of_pauses(make_world: MakeWorld, seed: int) -> None:
+    world = make_world(seed=seed)
+    random = Random(seed)
+    for command, amount in ((MOVE, 2.0), (ROTATE, -135.0), (MOVE, -1.0)):
+        world.client.command(command, amount, 0, 0, 0, 0, 0, 5)
+        world.run(0.1)
+        until = world.now + 60
+        while not world.is_idle(tasks=len(world.tasks())) and world.now < until:
+            world.run(random.uniform(0.0, 2.0))
+            random.choice(list(PAUSES.values()))(world)
+            world.run(random.choice([0.05, 0.3, 3.0]))
+            world.client.proceed(confirmation=0)
+            world.run(random.uniform(2.0, 3.0))
+    print("seed", seed, world.history(1))
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 3
+    diagonal = 0.5**0.5
+    assert near_pose(world.pose(), (2.0 + diagonal, diagonal, -135.0), metres=0.04)
+
+
+def test_pausing_an_empty_queue_keeps_what_is_submitted_then(world: World) -> None:
+    paused = world.client.pause()
+    world.client.move(1)
+    world.run(2)
+    assert paused.answer == (ACCEPTED, 0)
+    assert world.state(1) == (S.QUEUED, R.NONE)
+    world.client.proceed()
+    world.until_idle(tasks=1)
+
+
+def test_neither_0_nor_1_is_denied(world: World) -> None:
+    for value in (2.0, -1.0, float("nan"), float("inf")):
+        world.client.command(PAUSE_CONTINUE, value)
+    world.run(0.1)
+    assert world.client.acks_of(PAUSE_CONTINUE) == [(DENIED, R.BAD_PARAMETER)] * 4
+
+
+def test_continue_while_driving_changes_nothing(world: World) -> None:
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    for _ in range(30):
+        world.client.proceed()
+        world.run(0.013)
+    world.until_idle(tasks=1)
+    assert world.history(1) == [
+        (S.STARTING, R.NONE),
+        (S.EXECUTING, R.NONE),
+        (S.COMPLETED, R.NONE),
+    ]
+
+
+def test_a_pause_while_starting_resumes(world: World) -> None:
+    world.client.move(1)
+    world.run(0.012)
+    assert world.state(1)[0] is S.STARTING
+    world.client.pause()
+    world.run(3)
+    assert (world.state(1), world.control()) == ((S.PAUSED, R.OPERATOR), "IDLE")
+    world.client.proceed()
+    world.until_idle(tasks=1)
+    assert near_pose(world.pose(), (1.0, 0.0, 0.0))

@@ -1,0 +1,168 @@
+"""A command that comes again, by a lost ack or by intention: protocol.md section 4."""
+
+import pytest
+
+from mav_tasks.links.memory import Conditions
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from tests.kit.client import (
+    ACCEPTED,
+    DENIED,
+    MOVE,
+    REPEATS,
+    ROTATE,
+    TEMPORARILY_REJECTED,
+    command_long,
+)
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+
+@pytest.fixture
+def paused(world: World) -> World:
+    """A world in which tasks only pile up."""
+    world.client.pause()
+    world.run(0.1)
+    return world
+
+
+def test_the_very_same_packet_gets_the_same_answer(paused: World) -> None:
+    paused.client.move(1)
+    paused.run(0.05)
+    packet = paused.client.send(command_long(MOVE, 2.0))
+    for pause in (0.1, 0.4, 3.0):
+        paused.run(pause)
+        paused.client.send_raw(packet)
+    paused.run(0.1)
+    assert paused.client.acks_of(MOVE) == [(ACCEPTED, 1)] + [(ACCEPTED, 2)] * 4
+    assert len(paused.tasks()) == 2
+
+
+def test_a_nonce_names_a_task_for_good(paused: World) -> None:
+    first = paused.client.move(1, nonce=5)
+    paused.run(30)
+    again = paused.client.move(1, nonce=5)
+    paused.run(0.1)
+    other = paused.client.move(2, nonce=5)
+    paused.run(0.1)
+    fresh = paused.client.move(1, nonce=6)
+    paused.run(0.1)
+    assert [s.answer for s in (first, again, other, fresh)] == [
+        (ACCEPTED, 1),
+        (ACCEPTED, 1),
+        (DENIED, R.NONCE_REUSED),
+        (ACCEPTED, 2),
+    ]
+
+
+def test_a_nonce_counts_from_another_port_of_the_same_address_too(paused: World) -> None:
+    first = paused.client.move(1, nonce=5)
+    paused.run(0.1)
+    elsewhere = paused.add_client("elsewhere")
+    again = elsewhere.move(1, nonce=5)
+    stranger = paused.add_client("stranger", system_id=7)
+    own = stranger.move(1, nonce=5)
+    paused.run(0.1)
+    assert [s.task_id for s in (first, again, own)] == [1, 1, 2]
+
+
+@pytest.mark.parametrize(("after", "task_id"), [(2.4, 1), (9.9, 1), (10.1, 2)])
+def test_confirmation_above_0_is_a_repeat_for_10_s(
+    paused: World, after: float, task_id: int
+) -> None:
+    paused.client.move(1)
+    paused.run(after)
+    again = paused.client.move(1, confirmation=1)
+    paused.run(0.1)
+    assert again.task_id == task_id
+
+
+@pytest.mark.parametrize(("after", "task_id"), [(2.4, 1), (2.6, 2)])
+def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, task_id: int) -> None:
+    paused.client.move(1)
+    paused.run(after)
+    again = paused.client.move(1)
+    paused.run(0.1)
+    assert again.task_id == task_id
+    told = [text for text in paused.client.texts() if "same command again" in text]
+    assert told == ["same command again: still task 1"] * (2 - task_id)
+
+
+def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
+    ids = []
+    for distance in (1.0, 2.0, 1.0):
+        sent = paused.client.move(distance)
+        paused.run(0.1)
+        ids.append(sent.task_id)
+    assert ids == [1, 2, 3]
+
+
+def test_a_b_a_is_two_tasks_if_b_is_another_command(paused: World) -> None:
+    sent = [paused.client.move(1), paused.client.rotate(9)]
+    paused.run(0.1)
+    sent.append(paused.client.move(1))
+    paused.run(0.1)
+    assert [s.task_id for s in sent] == [1, 2, 1]
+
+
+def test_two_clients_may_ask_for_the_same(paused: World) -> None:
+    twin = paused.add_client("twin")
+    sent = [paused.client.move(1), twin.move(1)]
+    paused.run(0.1)
+    assert [s.task_id for s in sent] == [1, 2]
+
+
+def test_what_was_refused_can_be_tried_again_at_once(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(queueing=Queueing(capacity=1)))
+    world.client.stop()
+    world.run(0.5)
+    world.client.move(1)
+    world.run(0.1)
+    refused = world.client.rotate(20)
+    world.run(0.1)
+    assert refused.answer == (TEMPORARILY_REJECTED, R.QUEUE_FULL)
+    world.client.proceed()
+    world.until_idle(tasks=1)
+    again = world.client.rotate(20)
+    world.run(0.1)
+    assert again.answer == (ACCEPTED, 2)
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_repeats_over_a_bad_net_give_one_task_each(make_world: MakeWorld, seed: int) -> None:
+    bad = Conditions(delay=0.005, jitter=0.1, loss=0.25, duplication=0.2)
+    world = make_world(seed=seed, conditions=bad)
+    world.client.pause(repeats=REPEATS)
+    world.run(2)
+    for distance in (1.0, 2.0):
+        world.client.move(distance, repeats=REPEATS)
+        world.client.rotate(distance, repeats=REPEATS)
+        world.run(4)
+    tasks = [(t.id, t.command) for t in world.tasks()]
+    commands = [command for _, command in tasks]
+    assert max(commands.count(MOVE), commands.count(ROTATE)) <= 2
+    # an answer names the task of its command, whichever copy it answers
+    for command in (MOVE, ROTATE):
+        ids = {task_id for task_id, c in tasks if c == command}
+        assert {param2 for _, param2 in world.client.acks_of(command)} <= ids
+
+
+def test_each_command_is_answered_once_in_time_and_never_later(world: World) -> None:
+    sent = [
+        world.client.move(0.3),
+        world.client.rotate(10),
+        world.client.pause(),
+        world.client.request_status(1),
+        world.client.request_status(99),
+        world.client.command(54001, float("inf")),
+        world.client.command(54002, 1, 0, 1),
+        world.client.command(31000, target=(1, 1)),
+        world.client.command(31010, target=(1, 191)),
+        world.client.command(512, 300, target=(1, 1)),
+        world.client.arm(),
+    ]
+    world.run(20)
+    at = {s.message.command: s.at for s in sent}
+    assert len(world.client.acks) == len(sent)
+    assert all(s.acked_at - at[s.message.command] <= 0.5 for s in sent)
+    assert all(ack.result <= 4 for ack in world.client.acks)

@@ -1,0 +1,160 @@
+"""What a task waits for, and what becomes of it when the rover does not want to."""
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+POSITION = 32
+
+
+def shown(world: World, task_id: int) -> tuple[int, int]:
+    """Ask for a task's status; give state and reason as shown."""
+    asked = world.client.request_status(task_id)
+    world.run(0.05)
+    assert asked.result == ACCEPTED
+    return world.client.statuses(task_id)[-1].why
+
+
+@pytest.mark.parametrize("arming", ["auto", "server"])
+def test_the_server_arms_where_it_may(make_world: MakeWorld, arming: str) -> None:
+    world = make_world(settings=Settings(arming=arming))
+    world.client.move(0.3)
+    world.until_idle(tasks=1)
+    assert world.observer.sent_since(0)[-1] == "disarm"
+
+
+def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(arming="operator"))
+    world.client.move(0.3)
+    world.run(3)
+    assert shown(world, 1) == (S.QUEUED, R.DISARMED)
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.until_idle(tasks=1)
+    sent = world.observer.sent_since(0)
+    assert "arm" not in sent
+    assert "disarm" not in sent
+    assert world.rover.autopilot.armed
+
+
+@pytest.mark.parametrize("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
+def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, mode: Mode) -> None:
+    world.operator_arm(True)
+    world.operator_mode(mode)
+    world.run(1)
+    at = world.now
+    world.client.move(0.3)
+    world.run(3)
+    assert shown(world, 1) == (S.QUEUED, R.WRONG_MODE)
+    assert [name for name in world.observer.sent_since(at) if name != "511"] == []
+    world.operator_mode(Mode.HOLD)
+    world.until_idle(tasks=1)
+
+
+def test_without_position_a_task_waits(world: World) -> None:
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    world.run(1)
+    world.client.move(0.3)
+    world.run(2)
+    assert shown(world, 1) == (S.QUEUED, R.NO_POSITION)
+    world.fault(Faults())
+    world.until_idle(tasks=1)
+
+
+def test_for_a_silent_rover_a_task_waits(world: World) -> None:
+    world.client.pause()
+    world.run(0.1)
+    world.client.move(0.3)
+    world.run(0.1)
+    world.fault(Faults(silent=True))
+    world.run(5)
+    world.client.proceed()
+    world.run(0.1)
+    assert shown(world, 1) == (S.QUEUED, R.VEHICLE_SILENT)
+    world.fault(Faults())
+    world.until_idle(tasks=1)
+
+
+def test_a_task_that_waits_says_when_the_rover_falls_silent(world: World) -> None:
+    world.operator_arm(True)
+    world.operator_mode(Mode.AUTO)
+    world.rover.autopilot.parameters["WP_SPEED"] = 0.5
+    world.run(1)
+    world.client.move(0.3)
+    world.run(1)
+    assert shown(world, 1) == (S.QUEUED, R.WRONG_MODE)
+    world.fault(Faults(silent=True))
+    world.run(4)
+    assert shown(world, 1) == (S.QUEUED, R.VEHICLE_SILENT)
+
+
+@pytest.mark.parametrize(
+    ("faults", "reason"),
+    [(Faults(refuse_arm=True), R.ARM_REFUSED), (Faults(refuse_mode=True), R.MODE_REFUSED)],
+)
+def test_a_refusal_fails_the_task_in_about_a_second_and_the_queue_goes_on(
+    world: World, faults: Faults, reason: R
+) -> None:
+    world.fault(faults)
+    at = world.now
+    world.client.move(0.3)
+    world.run(0.05)
+    world.client.rotate(10)
+    world.until_state(1, S.FAILED)
+    assert 0.8 < world.now - at < 1.3
+    assert world.history(1) == [(S.STARTING, R.NONE), (S.FAILED, reason)]
+    world.until_state(2, S.FAILED)
+    assert 1.8 < world.now - at < 2.8
+    assert world.history(2) == [(S.STARTING, R.NONE), (S.FAILED, reason)]
+    assert world.paused() is R.NONE
+
+    world.fault(Faults())
+    world.run(3)
+    world.client.move(0.3, nonce=3)
+    world.until_idle(tasks=3)
+    assert world.state(3)[0] is S.COMPLETED
+
+
+@pytest.mark.parametrize("phase", ["mode", "arm"])
+def test_what_is_refused_at_first_is_asked_for_again(world: World, phase: str) -> None:
+    world.fault(Faults(refuse_mode=phase == "mode", refuse_arm=phase == "arm"))
+    world.client.move(0.3)
+    world.run(0.5)
+    world.fault(Faults())
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_a_rover_that_answers_nothing_fails_the_task(world: World) -> None:
+    world.fault(Faults(deaf=True))
+    at = world.now
+    world.client.move(0.3)
+    world.until_state(1, S.FAILED)
+    assert world.now - at < 1.5
+    assert world.state(1)[1] is R.MODE_REFUSED
+
+
+def test_behind_another_and_behind_a_pause(world: World) -> None:
+    world.client.move(2)
+    world.client.rotate(10)
+    world.run(1)
+    assert shown(world, 2) == (S.QUEUED, R.BEHIND_OTHERS)
+    world.client.pause()
+    world.run(1)
+    assert shown(world, 2) == (S.QUEUED, R.QUEUE_PAUSED)
+
+
+def test_mode_zero_arm_zeros_motion(world: World) -> None:
+    at = world.now
+    world.client.move(0.3)
+    world.until_idle(tasks=1)
+    sent = [name for name in world.observer.sent_since(at) if name != "511"]
+    order = [name for k, name in enumerate(sent) if k == 0 or sent[k - 1] != name]
+    assert order == ["GUIDED", "zero", "arm", "zero", "move", "zero", "HOLD", "disarm"]

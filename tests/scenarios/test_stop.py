@@ -1,0 +1,354 @@
+"""STOP: whatever the rover does, it stands soon, and nothing moves it until continue."""
+
+from collections.abc import Callable
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.links.memory import Conditions
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import (
+    ACCEPTED,
+    AUTO,
+    DENIED,
+    FAILED,
+    GUIDED,
+    MANUAL,
+    REPEATS,
+    RTL,
+    TEMPORARILY_REJECTED,
+    rc_override,
+    set_mode,
+    setpoint,
+    sticks,
+)
+from tests.kit.store import LateStore
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+BRAKING = 3.5  # s, from the speeds driven here to a stand
+
+
+def drive(world: World) -> None:
+    """Have a task drive, and another one wait."""
+    first = world.client.move(20, speed=1.0)
+    world.until_state(1, S.EXECUTING)
+    world.client.rotate(30)
+    world.run(2.0)
+    assert first.task_id == 1
+    assert world.truth.forward_speed > 0.5
+
+
+def drive_by_itself(world: World, mode: Mode) -> None:
+    """Have the operator send the rover somewhere; a task waits."""
+    world.rover.autopilot.parameters["WP_SPEED"] = 1.0
+    world.operator_arm(True)
+    world.operator_mode(Mode.AUTO)
+    world.run(0.5)
+    world.client.move(1)
+    world.run(2.5)
+    world.operator_mode(mode)
+    world.run(1.0)
+    assert not world.stands()
+
+
+def stands_in_hold(world: World) -> bool:
+    return world.stands() and world.rover.autopilot.mode is Mode.HOLD and world.control() == "IDLE"
+
+
+@pytest.mark.parametrize("component", [0, 1, 191])
+def test_a_driving_rover_is_stopped_and_its_task_killed(world: World, component: int) -> None:
+    drive(world)
+    stop = world.client.stop(target=(1, component))
+    world.until(lambda: stop.ack, within=0.1)
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+
+    assert stop.answer == (ACCEPTED, 1)
+    assert world.history(1)[-1] == (S.KILLED, R.STOP)
+    assert world.state(2) == (S.QUEUED, R.NONE)
+    assert world.paused() is R.STOPPED
+    where = world.pose()
+    world.run(10)
+    assert (world.pose(), world.state(2)[0]) == (where, S.QUEUED)
+
+
+def test_the_queue_goes_on_after_continue(world: World) -> None:
+    drive(world)
+    world.client.stop()
+    world.run(5)
+    proceed = world.client.proceed()
+    world.until_idle(tasks=2)
+    assert proceed.result == ACCEPTED
+    assert world.state(2) == (S.COMPLETED, R.NONE)
+
+
+@pytest.mark.parametrize("mode", [Mode.AUTO, Mode.RTL])
+def test_a_rover_that_drives_by_itself_is_stopped(world: World, mode: Mode) -> None:
+    drive_by_itself(world, mode)
+    stop = world.client.stop()
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+    assert stop.answer == (ACCEPTED, 0)
+    assert world.state(1) == (S.QUEUED, R.NONE)
+
+
+def test_with_param1_the_queue_is_cleared(world: World) -> None:
+    drive(world)
+    world.client.stop(clear=True)
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+    assert world.state(2) == (S.CANCELLED, R.CLEARED)
+    world.client.proceed()
+    world.run(2)
+    assert world.is_idle(tasks=2)
+
+
+def test_system_0_stops_every_rover(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.move(20, speed=1.0, target=(1, 191))
+    world.client.move(20, speed=1.0, target=(2, 191))
+    world.run(3)
+    assert not world.stands(1)
+    assert not world.stands(2)
+    stop = world.client.stop(target=(0, 0))
+    world.until(lambda: world.stands(1) and world.stands(2), within=BRAKING)
+    assert stop.answer == (ACCEPTED, 1)
+    assert [t.state for t in world.tasks()] == [S.KILLED, S.KILLED]
+
+
+def test_one_rover_is_stopped_and_the_other_drives_on(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.move(5, speed=1.0, target=(1, 191))
+    world.client.move(5, speed=1.0, target=(2, 191))
+    world.run(3)
+    world.client.stop(target=(1, 191))
+    world.until(lambda: world.stands(1), within=BRAKING)
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
+
+
+def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
+    first, second = world.client.stop(), world.client.stop()
+    world.until(lambda: stands_in_hold(world), within=2)
+    assert (first.answer, second.answer) == ((ACCEPTED, 0), (ACCEPTED, 0))
+    submitted = world.client.move(1)
+    world.run(3)
+    assert world.state(submitted.task_id) == (S.QUEUED, R.NONE)
+    third = world.client.stop()
+    world.run(3)
+    assert third.answer == (ACCEPTED, 0)
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED)
+
+
+@pytest.mark.parametrize("delay", [k * 0.002 for k in range(12)])
+def test_stop_while_starting(world: World, delay: float) -> None:
+    """From before the mode is asked for until the first motion, in steps of 2 ms."""
+    world.client.move(5)
+    world.run(delay)
+    world.client.stop()
+    world.until(lambda: stands_in_hold(world), within=3)
+    world.run(3)
+    assert world.state(1)[0] in (S.KILLED, S.QUEUED)
+    assert (world.truth.north, world.paused()) == (0.0, R.STOPPED)
+
+
+@pytest.mark.parametrize("phase", ["ASKING_MODE", "ASKING_ARM"])
+def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: str) -> None:
+    world.client.move(5)
+    if phase == "ASKING_MODE":
+        world.fault(Faults(deaf=True))
+        world.run(0.2)
+    else:
+        world.until(lambda: world.rover.autopilot.mode is Mode.GUIDED, within=1)
+        world.fault(Faults(deaf=True))
+        world.run(0.1)
+    assert world.control() == phase
+    world.client.stop()
+    world.run(0.3)
+    world.fault(Faults())
+    world.until(lambda: stands_in_hold(world), within=2)
+    assert world.history(1) == [(S.STARTING, R.NONE), (S.KILLED, R.STOP)]
+    assert world.truth.north == 0.0
+
+
+def test_stop_while_a_clients_arming_is_in_flight_and_another_waits(world: World) -> None:
+    operator, other = world.add_client("operator"), world.add_client("other")
+    world.run(0.1)
+    world.fault(Faults(deaf=True))
+    arms = [operator.arm(), other.arm()]
+    world.run(0.1)
+    stop = world.client.stop()
+    world.run(0.05)
+    world.fault(Faults())
+    world.run(3)
+    assert stop.result == ACCEPTED
+    assert [arm.result for arm in arms] == [TEMPORARILY_REJECTED, TEMPORARILY_REJECTED]
+    assert not world.rover.autopilot.armed
+
+
+@pytest.mark.parametrize("mode", [AUTO, RTL])
+@pytest.mark.parametrize("seed", range(4))
+def test_stop_overtaken_by_a_clients_mode_request(
+    make_world: MakeWorld, mode: int, seed: int
+) -> None:
+    """The request left before STOP came; on this net it may arrive after HOLD."""
+    world = make_world(seed=seed, conditions=Conditions(jitter=0.1))
+    world.operator_arm(True)
+    world.run(1)
+    world.client.mode(mode)
+    world.run(0.06)
+    world.client.stop()
+    world.run(4)
+    where = world.pose()
+    assert stands_in_hold(world)
+    world.run(3)
+    assert world.pose() == where
+
+
+MOTION_OF_CLIENTS = [
+    setpoint(1.0),
+    common.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5),
+    common.MAVLink_manual_control_message(1, 1000, 0, 1000, 0, 0),
+    rc_override(1500, 1500, 2000),
+    set_mode(GUIDED),
+    set_mode(AUTO),
+    set_mode(MANUAL),
+]
+MOVING_COMMANDS: list[Callable[[World], object]] = [
+    lambda world: world.client.arm(),
+    lambda world: world.client.arm(target=(1, 0)),
+    lambda world: world.client.arm(target=(1, 99)),
+    lambda world: world.client.command_int(400, 1, target=(1, 1)),
+    lambda world: world.client.mode(GUIDED),
+    lambda world: world.client.mode(AUTO, target=(1, 99)),
+    lambda world: world.client.command(20, target=(1, 1)),
+    lambda world: world.client.command(300, target=(1, 50)),
+    lambda world: world.client.command_int(192, -1, 1, 0, 0, x=1, y=1, frame=6, target=(1, 1)),
+    lambda world: world.client.command(209, 1, 0, 50, 10, target=(1, 1)),
+]
+
+
+@pytest.mark.parametrize("message", MOTION_OF_CLIENTS, ids=lambda m: m.get_type())
+def test_no_motion_message_passes_while_stopped(world: World, message: object) -> None:
+    world.operator_arm(True)
+    world.client.mode(GUIDED)
+    world.run(1)
+    world.client.stop()
+    world.run(1)
+    world.client.stream(message, rate=10)
+    world.run(2)
+    assert stands_in_hold(world)
+
+
+@pytest.mark.parametrize("send", MOVING_COMMANDS)
+def test_no_command_that_moves_passes_while_stopped(
+    world: World, send: Callable[[World], object]
+) -> None:
+    world.client.stop()
+    world.run(1)
+    send(world)
+    world.run(1)
+    assert [a.result for a in world.client.acks[1:]] in ([TEMPORARILY_REJECTED], [DENIED])
+    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
+
+
+def test_hold_by_a_client_does_not_end_a_stop_that_is_under_way(world: World) -> None:
+    drive(world)
+    world.fault(Faults(refuse_mode=True))
+    world.client.stop()
+    world.run(0.5)
+    world.client.mode(4)
+    world.run(0.5)
+    world.fault(Faults())
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+    assert world.paused() is R.STOPPED
+
+
+def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World) -> None:
+    drive(world)
+    world.fault(Faults(silent=True, deaf=True))
+    world.run(4)
+    stop = world.client.stop()
+    world.run(1)
+    assert stop.answer == (FAILED, R.VEHICLE_SILENT)
+    assert world.paused() is R.STOPPED
+    world.run(10)
+    world.operator_mode(Mode.AUTO)  # somebody at the rover, who knows nothing of the STOP
+    world.rover.autopilot.parameters["WP_SPEED"] = 1.0
+    world.run(3)
+    assert not world.stands()
+
+    world.fault(Faults(deaf=True))
+    world.until(lambda: world.server.engine.snapshot(now=world.now).vehicles[0].heard, within=2)
+    at = world.now - 0.03
+    assert world.observer.sent_since(at)[:2] == ["HOLD", "zero"]
+    world.fault(Faults())
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+
+
+def test_when_only_we_cannot_hear_it_the_rover_is_stopped_all_the_same(world: World) -> None:
+    drive(world)
+    world.fault(Faults(silent=True))
+    world.run(4)
+    world.client.stop()
+    world.until(lambda: world.stands() and world.rover.autopilot.mode is Mode.HOLD, within=BRAKING)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_stop_through_a_lossy_net(make_world: MakeWorld, seed: int) -> None:
+    bad = Conditions(delay=0.005, jitter=0.1, loss=0.3, duplication=0.1)
+    world = make_world(seed=seed, conditions=bad)
+    world.client.move(20, repeats=REPEATS, nonce=1)
+    world.run(4)
+    world.client.stop(repeats=tuple(k * 0.2 for k in range(12)))
+    world.until(lambda: stands_in_hold(world), within=6)
+    world.run(3)
+    where = world.pose()
+    assert stands_in_hold(world)
+    world.run(4)
+    assert world.pose() == where
+
+
+def test_stop_does_not_wait_for_the_store(make_world: MakeWorld) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    drive(world)
+    store.delay = float("inf")
+    stop = world.client.stop()
+    world.until(lambda: stop.ack, within=0.1)
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+
+
+def test_a_repeat_of_an_older_continue_does_not_release_a_newer_stop(world: World) -> None:
+    """The first copy was acted on, its ack was lost, and meanwhile somebody pressed STOP."""
+    operator = world.add_client("operator")
+    world.client.move(20)
+    world.until_state(1, S.EXECUTING)
+    world.client.pause()
+    world.run(1)
+    proceed = world.client.proceed()
+    world.run(0.3)
+    operator.stop()
+    world.run(0.2)
+    again = world.client.proceed()
+    world.run(1)
+    assert (proceed.result, again.result) == (ACCEPTED, TEMPORARILY_REJECTED)
+    assert world.paused() is R.STOPPED
+    world.run(2)
+    world.client.proceed()  # meant so
+    world.run(0.5)
+    assert world.paused() is R.NONE
+
+
+def test_sticks_reach_the_rover_again_after_continue(world: World) -> None:
+    world.client.stop()
+    world.run(1)
+    world.client.send(sticks(500))
+    world.client.proceed()
+    world.run(0.1)
+    reached = [kind for _, kind in world.observer.reached].count(69)
+    world.client.send(sticks(500))
+    world.run(0.1)
+    assert (reached, [kind for _, kind in world.observer.reached].count(69)) == (0, 1)

@@ -1,0 +1,286 @@
+"""Somebody else has the rover: not one more setpoint, and everything waits for continue."""
+
+from collections.abc import Callable
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import (
+    ACCEPTED,
+    AUTO,
+    HOLD,
+    MANUAL,
+    TEMPORARILY_REJECTED,
+    rc_override,
+    setpoint,
+    sticks,
+)
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+
+def packed(message: object, system_id: int, component_id: int) -> bytes:
+    raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))  # type: ignore[attr-defined]
+    return raw
+
+
+#: how the rover can be taken from us, by name
+WAYS: dict[str, Callable[[World], object]] = {
+    "switch to HOLD": lambda w: w.operator_mode(Mode.HOLD),
+    "switch to MANUAL": lambda w: w.operator_mode(Mode.MANUAL),
+    "switch to AUTO": lambda w: w.operator_mode(Mode.AUTO),
+    "switch to RTL": lambda w: w.operator_mode(Mode.RTL),
+    "client asks for AUTO": lambda w: w.client.mode(AUTO),
+    "client asks for MANUAL": lambda w: w.client.mode(MANUAL),
+    "disarm at the rover": lambda w: w.operator_arm(False),
+    "disarm by a client": lambda w: w.client.arm(False),
+    "sticks": lambda w: w.client.send(sticks(x=300)),
+    "throttle stick": lambda w: w.client.send(sticks(z=300)),
+    "RC override": lambda w: w.client.send(rc_override(1500, 1500, 1700, 1500)),
+    "setpoints of a second server": lambda w: w.from_vehicle_side(packed(setpoint(1.0), 250, 191)),
+    "setpoints of anybody": lambda w: w.from_vehicle_side(packed(setpoint(1.0), 9, 9)),
+    "our own address": lambda w: w.from_vehicle_side(
+        packed(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), 250, 191)
+    ),
+}
+
+
+@pytest.fixture
+def driving(world: World) -> World:
+    """A world in which a task drives and another waits."""
+    world.client.move(4)
+    world.until_state(1, S.EXECUTING)
+    world.client.rotate(90)
+    world.run(2)
+    assert world.truth.north > 0.3
+    return world
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) -> None:
+    world = driving
+    at = world.now
+    WAYS[way](world)
+    world.until_state(1, S.PAUSED, within=0.5)
+    world.run(0.1)
+    paused_at = world.now
+    world.run(5)
+    assert world.history(1)[-1] == (S.PAUSED, R.TAKEOVER)
+    assert (world.paused(), world.state(2)) == (R.TAKEOVER, (S.QUEUED, R.NONE))
+    assert world.observer.sent_since(paused_at) == []
+    assert "arm" not in world.observer.sent_since(at)
+    told = world.client.texts()
+    assert "Task 1 paused: takeover" in told
+    assert world.client.statuses(1)[-1].why == (S.PAUSED, R.TAKEOVER)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_continue_resumes_to_the_exact_end_on_the_original_line(driving: World, way: str) -> None:
+    world = driving
+    WAYS[way](world)
+    world.run(0.3)
+    world.operator_mode(Mode.HOLD)
+    world.run(4)
+    proceed = world.client.proceed()
+    world.until_idle(tasks=2)
+    assert proceed.answer == (ACCEPTED, 1)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED, S.COMPLETED]
+    assert near_pose(world.pose(), (4.0, 0.0, 90.0))
+
+
+def test_pushed_off_its_line_by_more_than_a_metre_it_is_held(driving: World) -> None:
+    world = driving
+    world.operator_mode(Mode.MANUAL)
+    world.rover.autopilot.operator_sticks(0.8, 1.2)
+    world.run(1.2)
+    world.rover.autopilot.operator_sticks(0.8, 0.0)
+    world.run(2.5)
+    world.operator_mode(Mode.HOLD)
+    world.run(3)
+    assert abs(world.truth.east) > 1.0
+    world.client.proceed()
+    world.run(2)
+    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    assert world.state(2)[0] is S.QUEUED
+    assert world.stands()
+
+
+def test_pushed_a_little_it_comes_back_to_its_line(driving: World) -> None:
+    world = driving
+    world.operator_mode(Mode.MANUAL)
+    world.rover.autopilot.operator_sticks(0.4, 0.4)
+    world.run(1.5)
+    world.operator_mode(Mode.HOLD)
+    world.run(3)
+    assert 0.05 < abs(world.truth.east) < 1.0
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED)
+    assert world.truth.north == pytest.approx(4.0, abs=0.02)
+    assert abs(world.truth.east) < 0.15
+
+
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
+def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, mode: Mode) -> None:
+    world = driving
+    world.operator_mode(mode)
+    world.run(1)
+    at = world.now
+    refused = world.client.proceed()
+    world.run(2)
+    assert refused.answer == (TEMPORARILY_REJECTED, R.WRONG_MODE)
+    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert world.observer.sent_since(at) == []
+    assert world.rover.autopilot.mode is mode
+    world.operator_mode(Mode.HOLD)
+    world.run(3)
+    assert world.client.proceed()
+    world.until_idle(tasks=2)
+
+
+def test_a_foreign_disarm_withdraws_the_permission_to_arm_until_continue(world: World) -> None:
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    world.operator_arm(False)
+    world.run(1)
+    world.client.stop(clear=True)
+    world.run(2)
+    world.client.proceed()
+    world.run(1)
+    world.operator_mode(Mode.HOLD)
+    world.run(0.5)
+    world.operator_arm(True)
+    world.run(0.5)
+    world.operator_arm(False)  # this time nothing of ours runs
+    world.run(0.5)
+    at = world.now
+    second = world.client.move(1)
+    world.run(3)
+    status = world.client.request_status(second.task_id)
+    world.run(0.1)
+    assert status.result == ACCEPTED
+    assert world.client.statuses(second.task_id)[-1].why == (S.QUEUED, R.DISARMED)
+    assert "arm" not in world.observer.sent_since(at)
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert world.state(2)[0] is S.COMPLETED
+
+
+def test_a_client_that_disarms_while_we_arm_is_obeyed(world: World) -> None:
+    other = world.add_client("other")
+    world.fault(Faults(refuse_arm=True))
+    world.client.move(1)
+    world.until(lambda: world.control() == "ASKING_ARM", within=1)
+    other.arm(False)
+    world.run(0.02)
+    world.fault(Faults())
+    world.run(3)
+    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert not world.rover.autopilot.armed
+
+
+def test_an_operator_who_switches_to_hold_right_after_our_hold_is_obeyed(world: World) -> None:
+    """A change to HOLD counts as ours only while it can be."""
+    world.client.move(0.2)
+    world.until_idle(tasks=1)
+    world.client.move(4, nonce=9)
+    world.until_state(2, S.EXECUTING)
+    world.run(0.3)
+    world.operator_mode(Mode.HOLD)
+    world.run(1)
+    assert world.state(2) == (S.PAUSED, R.TAKEOVER)
+
+
+def test_an_operator_who_switches_to_hold_while_we_ask_for_our_mode_is_obeyed(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world()
+    world.fault(Faults(refuse_mode=True))
+    world.client.move(1)
+    world.until(lambda: world.control() == "ASKING_MODE", within=1)
+    world.operator_mode(Mode.HOLD)  # from MANUAL
+    world.run(0.02)
+    world.fault(Faults())
+    world.run(3)
+    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_rover_that_is_armed_to_be_driven_by_hand_while_we_ask_for_our_mode_is_left_alone(
+    world: World,
+) -> None:
+    world.fault(Faults(refuse_mode=True))
+    world.client.move(1)
+    world.until(lambda: world.control() == "ASKING_MODE", within=1)
+    world.operator_arm(True)  # in MANUAL
+    world.run(0.1)
+    world.fault(Faults())
+    world.run(3)
+    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert world.rover.autopilot.mode is Mode.MANUAL
+
+
+def test_a_lost_task_does_not_resume_by_itself_after_an_operator_had_the_rover(
+    driving: World,
+) -> None:
+    world = driving
+    world.fault(Faults(withheld=frozenset({32})))
+    world.run(12)
+    assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
+    world.operator_mode(Mode.MANUAL)
+    world.run(0.5)
+    world.fault(Faults())
+    world.run(1)
+    world.operator_mode(Mode.HOLD)
+    world.run(6)
+    assert world.state(1)[0] is S.PAUSED
+    assert world.paused() is R.TAKEOVER
+    world.client.proceed()
+    world.until_idle(tasks=2)
+
+
+def test_sticks_at_rest_are_no_takeover(driving: World) -> None:
+    world = driving
+    world.client.stream(sticks(0, 0, 0, 0), rate=10)
+    world.client.stream(rc_override(1500, 1500, 1510, 0), rate=10)
+    world.until_state(1, S.COMPLETED)
+
+
+def test_sticks_for_one_rover_do_not_take_over_another(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.move(1, target=(1, 191))
+    world.client.move(1, target=(2, 191))
+    world.run(1.5)
+    world.client.send(sticks(x=500, system=2))
+    world.run(0.3)
+    assert [t.state for t in world.tasks()] == [S.EXECUTING, S.PAUSED]
+
+
+@pytest.mark.parametrize("arming", ["server", "operator"])
+def test_other_setpoints_make_waiting_tasks_wait(make_world: MakeWorld, arming: str) -> None:
+    world = make_world(settings=Settings(arming=arming))
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(0.5)
+    for _ in range(20):
+        world.from_vehicle_side(packed(setpoint(0.3), 9, 9))
+        world.run(0.05)
+    world.client.move(1)
+    world.run(0.5)
+    world.client.request_status(1)
+    world.run(0.1)
+    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.OTHER_CONTROLLER)
+    world.run(3)
+    assert world.state(1)[0] is S.EXECUTING
+
+
+def test_the_mode_hold_by_a_client_is_a_pause_and_no_takeover(driving: World) -> None:
+    world = driving
+    held = world.client.mode(HOLD)
+    world.run(2)
+    assert held.answer == (ACCEPTED, 1)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)

@@ -1,0 +1,91 @@
+"""A net in memory: as bad as asked for, and the same each time."""
+
+import pytest
+
+from mav_tasks.links.base import Link
+from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+
+BAD = Conditions(delay=0.01, jitter=0.05, loss=0.2, duplication=0.2)
+
+
+def pair(net: MemoryNet) -> tuple[MemoryLink, MemoryLink]:
+    return net.link("a", peers=("b",)), net.link("b")
+
+
+def arrivals(net: MemoryNet, at: MemoryLink) -> list[tuple[float, bytes]]:
+    """Let everything arrive; gives when, and what."""
+    came: list[tuple[float, bytes]] = []
+    while (when := net.next_arrival()) is not None:
+        net.now = when
+        net.deliver()
+        came += [(when, data) for _, data in at.receive(1000)]
+    return came
+
+
+def traffic(seed: int, conditions: Conditions) -> list[tuple[float, bytes]]:
+    net = MemoryNet(seed=seed, conditions=conditions)
+    a, b = pair(net)
+    for number in range(200):
+        net.now = number * 0.001
+        a.send("b", bytes([number]))
+    return arrivals(net, b)
+
+
+def test_it_is_a_link() -> None:
+    link: Link = MemoryNet().link("a", peers=("b",))
+    assert (link.name, link.peers, link.is_local) == ("a", ("b",), True)
+
+
+def test_a_datagram_arrives_after_its_delay_and_names_its_sender() -> None:
+    net = MemoryNet(conditions=Conditions(delay=0.25))
+    a, b = pair(net)
+    a.send("b", b"hello")
+    net.now = 0.2
+    net.deliver()
+    assert b.receive(10) == []
+    assert net.next_arrival() == 0.25
+    net.now = 0.25
+    net.deliver()
+    assert b.receive(10) == [("a", b"hello")]
+    assert net.next_arrival() is None
+
+
+def test_a_good_net_keeps_everything_in_order() -> None:
+    came = traffic(1, Conditions())
+    assert [data for _, data in came] == [bytes([n]) for n in range(200)]
+
+
+def test_the_same_seed_gives_the_same_losses_doubles_and_delays() -> None:
+    assert traffic(7, BAD) == traffic(7, BAD)
+    assert traffic(7, BAD) != traffic(8, BAD)
+
+
+def test_a_bad_net_loses_doubles_and_reorders() -> None:
+    came = [data for _, data in traffic(7, BAD)]
+    assert len(set(came)) < 200
+    assert len(came) > len(set(came))
+    assert came != sorted(came)
+
+
+@pytest.mark.parametrize("loss", [0.0, 1.0])
+def test_loss_is_a_probability(loss: float) -> None:
+    assert len(traffic(3, Conditions(loss=loss))) == (0 if loss else 200)
+
+
+def test_what_is_sent_to_nobody_is_lost() -> None:
+    net = MemoryNet()
+    a, _ = pair(net)
+    a.send("nobody", b"hello")
+    net.now = 1.0
+    net.deliver()
+    assert net.next_arrival() is None
+
+
+def test_a_closed_link_has_lost_what_had_arrived() -> None:
+    net = MemoryNet()
+    a, b = pair(net)
+    a.send("b", b"hello")
+    net.now = 1.0
+    net.deliver()
+    b.close()
+    assert b.receive(10) == []

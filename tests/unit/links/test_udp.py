@@ -1,0 +1,139 @@
+"""UDP links on real loopback sockets with ports that the system chooses."""
+
+import select
+import socket
+from collections.abc import Iterator
+from typing import cast
+
+import pytest
+
+from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.base import Link, Peer
+from mav_tasks.links.udp import UdpLink
+from mav_tasks.links.url import LinkUrl
+
+HOST = "127.0.0.1"
+
+
+@pytest.fixture
+def other() -> Iterator[socket.socket]:
+    """Somebody else's socket."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind((HOST, 0))
+        sock.settimeout(5.0)
+        yield sock
+
+
+@pytest.fixture
+def listening() -> Iterator[UdpLink]:
+    link = UdpLink(LinkUrl("udpin", HOST, 0))
+    yield link
+    link.close()
+
+
+def address_of(link: UdpLink) -> tuple[str, int]:
+    with socket.socket(fileno=socket.dup(link.fileno())) as same:
+        return cast(tuple[str, int], same.getsockname())
+
+
+def wait_for(link: UdpLink) -> None:
+    assert select.select([link.fileno()], [], [], 5.0)[0], "nothing came"
+
+
+def received(link: UdpLink, count: int) -> list[tuple[Peer, bytes]]:
+    datagrams: list[tuple[Peer, bytes]] = []
+    while len(datagrams) < count:
+        wait_for(link)
+        datagrams += link.receive(64)
+    return datagrams
+
+
+def test_it_is_a_link(listening: UdpLink) -> None:
+    link: Link = listening
+    assert (link.name, link.peers, link.is_local) == (f"udpin:{HOST}:0", (), True)
+
+
+def test_a_datagram_comes_with_its_sender_and_can_be_answered(
+    listening: UdpLink, other: socket.socket
+) -> None:
+    other.sendto(b"hello", address_of(listening))
+    ((peer, data),) = received(listening, 1)
+    assert (peer, data) == (other.getsockname(), b"hello")
+    listening.send(peer, b"answer")
+    assert other.recvfrom(100) == (b"answer", address_of(listening))
+
+
+def test_datagrams_come_in_order_and_no_more_than_asked_for(
+    listening: UdpLink, other: socket.socket
+) -> None:
+    for number in range(5):
+        other.sendto(bytes([number]), address_of(listening))
+    wait_for(listening)
+    first = listening.receive(2)
+    rest = received(listening, 5 - len(first))
+    assert len(first) == 2
+    assert [data for _, data in first + rest] == [bytes([n]) for n in range(5)]
+
+
+def test_without_datagrams_it_gives_none_at_once(listening: UdpLink) -> None:
+    assert listening.receive(64) == []
+    assert listening.lost == 0
+
+
+def test_a_dialling_link_knows_its_peer_beforehand(other: socket.socket) -> None:
+    link = UdpLink(LinkUrl("udpout", HOST, other.getsockname()[1]))
+    assert link.peers == (other.getsockname(),)
+    link.send(link.peers[0], b"first word")
+    data, sender = other.recvfrom(100)
+    assert data == b"first word"
+    other.sendto(b"answer", sender)
+    assert received(link, 1) == [(other.getsockname(), b"answer")]
+    link.close()
+
+
+def test_peers_that_are_pushed_to_are_known_beforehand(other: socket.socket) -> None:
+    port = other.getsockname()[1]
+    link = UdpLink(LinkUrl("udpin", HOST, 0), push=(("localhost", port),))
+    assert link.peers == ((HOST, port),)
+    link.close()
+
+
+@pytest.mark.parametrize(
+    ("push", "local"), [((), True), (((HOST, 9),), True), ((("192.0.2.1", 9),), False)]
+)
+def test_a_link_is_local_if_all_that_it_speaks_to_are(
+    push: tuple[tuple[str, int], ...], local: bool
+) -> None:
+    link = UdpLink(LinkUrl("udpin", HOST, 0), push=push)
+    assert link.is_local is local
+    link.close()
+
+
+def test_a_port_in_use_is_one_clear_error(other: socket.socket) -> None:
+    port = other.getsockname()[1]
+    with pytest.raises(LinkOpenError) as error:
+        UdpLink(LinkUrl("udpin", HOST, port))
+    assert str(error.value) == f"link udpin:{HOST}:{port} cannot be opened: Address already in use"
+
+
+def test_a_host_that_is_none_is_one_clear_error() -> None:
+    with pytest.raises(LinkOpenError, match=r"^link udpin:no host:1 cannot be opened: "):
+        UdpLink(LinkUrl("udpin", "no host", 1))
+
+
+def test_a_peer_that_is_gone_costs_nothing_but_the_datagram(listening: UdpLink) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
+        gone.bind((HOST, 0))
+        nobody = gone.getsockname()
+    for _ in range(3):
+        listening.send(nobody, b"anybody?")
+        listening.receive(64)
+
+
+def test_a_datagram_that_the_system_does_not_take_is_counted(listening: UdpLink) -> None:
+    listening.send((HOST, 9), b"x" * 70_000)
+    assert listening.lost == 1
+
+
+def test_it_says_what_it_is(listening: UdpLink) -> None:
+    assert repr(listening) == f"UdpLink(udpin:{HOST}:0)"

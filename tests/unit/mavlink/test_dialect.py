@@ -1,0 +1,86 @@
+"""What the generated dialect must have beside what pymavlink ships."""
+
+import struct
+
+import pytest
+
+from mav_tasks.mavlink import _dialect
+from mav_tasks.mavlink import messages as m
+
+STATES = 14
+
+
+def test_task_status_is_as_the_contract_draws_it() -> None:
+    assert (m.TaskStatus.id, m.TaskStatus.unpacker.size) == (54000, 104)
+    assert m.TaskStatus.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50s"
+    assert m.TaskStatus.ordered_fieldnames == m.TaskStatus.fieldnames
+    assert struct.calcsize("<5I4f4H10B50s") == 104
+
+
+def test_task_queue_status_is_as_the_contract_draws_it() -> None:
+    assert (m.TaskQueueStatus.id, m.TaskQueueStatus.unpacker.size) == (54001, 78)
+    assert m.TaskQueueStatus.ordered_fieldnames == [
+        "time_boot_ms",
+        "version",
+        "running_id",
+        "next_id",
+        "capacity",
+        "counts",
+        "paused_reason",
+        "flags",
+    ]
+    assert m.TaskQueueStatus.array_lengths[5] == STATES
+
+
+def test_protocol_version_has_the_public_crc_extra() -> None:
+    assert (m.ProtocolVersion.id, m.ProtocolVersion.crc_extra) == (300, 217)
+
+
+@pytest.mark.parametrize(
+    ("message", "extensions"),
+    [
+        (m.MissionCount, ["mission_type", "opaque_id"]),
+        (m.MissionAck, ["mission_type", "opaque_id"]),
+        (
+            m.MissionCurrent,
+            ["total", "mission_state", "mission_mode", "mission_id", "fence_id", "rally_points_id"],
+        ),
+    ],
+)
+def test_mission_messages_carry_the_ids_of_plans(
+    message: type[m.Message], extensions: list[str]
+) -> None:
+    assert message.fieldnames[-len(extensions) :] == extensions
+    assert message.ordered_fieldnames[-len(extensions) :] == extensions  # extensions are not sorted
+
+
+@pytest.mark.parametrize(
+    ("message", "number", "crc_extra"),
+    [  # CRC_EXTRA as pymavlink ships it: an extension field must not change it
+        (m.MissionCount, 44, 221),
+        (m.MissionAck, 47, 153),
+        (m.MissionCurrent, 42, 28),
+        (m.CommandAck, 77, 143),
+        (m.CommandLong, 76, 152),
+        (m.Heartbeat, 0, 50),
+    ],
+)
+def test_extensions_leave_crc_extra_alone(
+    message: type[m.Message], number: int, crc_extra: int
+) -> None:
+    assert (message.id, message.crc_extra) == (number, crc_extra)
+
+
+def test_every_readable_name_stands_for_a_message_of_the_dialect() -> None:
+    ours: list[type[m.Message]] = [
+        kind for name, kind in vars(m).items() if isinstance(kind, type) and name != "Message"
+    ]
+    assert len(ours) > 50
+    assert [kind for kind in ours if m.ALL[kind.id] is not kind] == []
+
+
+def test_our_numbers_are_in_the_range_that_is_free() -> None:
+    messages = sorted(number for number in m.ALL if 54000 <= number < 60000)
+    commands = [number for number in _dialect.enums["MAV_CMD"] if 54000 <= number < 60000]
+    assert messages == [54000, 54001]
+    assert sorted(commands)[:9] == [54000, 54001, 54002, 54003, 54010, 54011, 54012, 54013, 54014]

@@ -1,0 +1,135 @@
+"""Which rates are asked of a vehicle, and when again."""
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.services.interval_requester import (
+    CHECK,
+    MAX_WANTED,
+    SHORTEST,
+    WANTED,
+    IntervalRequester,
+)
+
+
+def asked(requester: IntervalRequester, *, now: float, accepted: bool | None = True) -> list[int]:
+    """Answer requests until there are no more; gives the message ids asked for."""
+    ids: list[int] = []
+    while (request := requester.next_request(now=now)) is not None:
+        ids.append(int(request.param1))
+        requester.answered(accepted=accepted)
+    return ids
+
+
+def hear_everything(
+    requester: IntervalRequester, *, seconds: float, but: int | None = None
+) -> None:
+    for message_id, interval in WANTED.items():
+        if message_id != but:
+            for _ in range(round(seconds / interval)):
+                requester.heard(message_id)
+
+
+def test_a_new_vehicle_is_asked_for_all_that_is_wanted() -> None:
+    assert asked(IntervalRequester(now=0.0), now=0.0) == list(WANTED)
+
+
+def test_the_control_loop_gets_at_least_20_hz() -> None:
+    assert max(WANTED[m.LocalPositionNed.id], WANTED[m.Attitude.id]) <= 1 / 20
+
+
+def test_one_request_at_a_time() -> None:
+    requester = IntervalRequester(now=0.0)
+    first = requester.next_request(now=0.0)
+    assert first is not None
+    assert (first.command, first.param1, first.param2) == (
+        MavCmd.SET_MESSAGE_INTERVAL,
+        m.LocalPositionNed.id,
+        40_000,
+    )
+    assert requester.next_request(now=0.1) is None
+    requester.answered(accepted=True)
+    assert requester.next_request(now=0.2) is not None
+
+
+def test_what_comes_often_enough_is_not_asked_for_again() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    assert requester.next_deadline() == CHECK
+    hear_everything(requester, seconds=CHECK)
+    assert asked(requester, now=CHECK) == []
+    assert requester.next_deadline() == 2 * CHECK
+
+
+def test_what_stays_away_is_asked_for_again() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    hear_everything(requester, seconds=CHECK, but=m.Attitude.id)
+    assert asked(requester, now=CHECK) == [m.Attitude.id]
+
+
+def test_what_was_refused_is_not_asked_for_again() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0, accepted=False)
+    assert asked(requester, now=CHECK) == []
+
+
+def test_what_was_not_answered_is_asked_for_again() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0, accepted=None)
+    frequent = [number for number, interval in WANTED.items() if CHECK / interval >= 2]
+    assert asked(requester, now=CHECK) == frequent
+
+
+def test_after_a_restart_of_the_vehicle_everything_is_asked_for_again() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0, accepted=False)
+    requester.ask_all_again()
+    assert asked(requester, now=0.5) == list(WANTED)
+
+
+def test_a_client_can_make_a_rate_higher_but_not_lower() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    requester.wish(m.Attitude.id, 0.025)
+    requester.wish(m.LocalPositionNed.id, 1.0)
+    request = requester.next_request(now=0.1)
+    assert request is not None
+    assert (request.param1, request.param2) == (m.Attitude.id, 25_000)
+    requester.answered(accepted=True)
+    assert requester.next_request(now=0.1) is None
+
+
+def test_a_client_can_wish_for_what_was_not_wanted() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    requester.wish(105, 0.5)
+    assert asked(requester, now=0.1) == [105]
+
+
+def test_no_client_can_ask_for_more_than_a_vehicle_gives() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    requester.wish(m.Attitude.id, 1e-6)
+    request = requester.next_request(now=0.1)
+    assert request is not None
+    assert request.param2 == SHORTEST * 1e6
+
+
+def test_a_wish_that_the_vehicle_refuses_does_not_cost_what_the_server_needs() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    requester.wish(m.Attitude.id, SHORTEST)
+    intervals = []
+    for accepted in (False, True):
+        request = requester.next_request(now=0.1)
+        assert request is not None
+        intervals.append(request.param2 / 1e6)
+        requester.answered(accepted=accepted)
+    assert intervals == [SHORTEST, WANTED[m.Attitude.id]]
+
+
+def test_wishes_are_bounded() -> None:
+    requester = IntervalRequester(now=0.0)
+    for message_id in range(1000, 2000):
+        requester.wish(message_id, 1.0)
+    assert len(asked(requester, now=0.0)) == MAX_WANTED

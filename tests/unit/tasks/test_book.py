@@ -1,0 +1,138 @@
+"""Tasks are what their events add up to."""
+
+import pytest
+
+from mav_tasks.errors import IllegalTransition
+from mav_tasks.tasks import book as book_module
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import TaskChanged, TaskSubmitted, TaskWithdrawn
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.task import Progress, Task, TaskId
+from tests.unit.tasks.samples import ORIGIN, SOMEBODY, draft
+
+S, R = TaskState, TaskReason
+
+
+def change(
+    book: TaskBook, task_id: int, new: TaskState, *, now: float = 2.0, reason: TaskReason = R.NONE
+) -> Task:
+    return book.change(TaskId(task_id), new, reason=reason, actor="somebody", now=now)
+
+
+def finish(book: TaskBook, task_id: int) -> None:
+    change(book, task_id, S.KILLED, reason=R.STOP)
+
+
+def test_a_submission_becomes_a_queued_task() -> None:
+    book = TaskBook()
+    task = book.submit(draft(priority=8, nonce=77), now=1.5)
+    assert task == Task(
+        id=TaskId(1),
+        vehicle=1,
+        command=54000,
+        goal=draft().goal,
+        priority=8,
+        submitter=SOMEBODY,
+        nonce=77,
+        submitted_at=1.5,
+        state=S.QUEUED,
+        reason=R.NONE,
+        version=1,
+        progress=Progress(),
+    )
+    assert book.take_events() == [TaskSubmitted(task, 1.5)]
+
+
+def test_ids_are_never_used_again() -> None:
+    book = TaskBook(next_id=7)
+    ids = [book.submit(draft(), now=0.0).id]
+    book.withdraw(ids[0], now=0.0)
+    ids.append(book.submit(draft(), now=0.0).id)
+    finish(book, ids[1])
+    ids.append(book.submit(draft(), now=0.0).id)
+    assert ids == [7, 8, 9]
+
+
+def test_every_change_is_an_event_and_a_version() -> None:
+    book = TaskBook()
+    book.submit(draft(), now=1.0)
+    book.take_events()
+    task = change(book, 1, S.STARTING)
+    assert (task.state, task.version) == (S.STARTING, 2)
+    assert book.take_events() == [
+        TaskChanged(TaskId(1), 1, 2, S.QUEUED, S.STARTING, R.NONE, "somebody", 2.0, Progress())
+    ]
+    assert book.take_events() == []
+
+
+def test_a_change_can_bring_progress() -> None:
+    book = TaskBook()
+    book.submit(draft(), now=1.0)
+    progress = Progress(ORIGIN, 0.5, 3.0)
+    book.change(TaskId(1), S.STARTING, reason=R.NONE, actor="server", now=2.0, progress=progress)
+    assert book[TaskId(1)].progress == progress
+
+
+def test_an_illegal_change_leaves_everything_as_it_was() -> None:
+    book = TaskBook()
+    before = book.submit(draft(), now=1.0)
+    with pytest.raises(IllegalTransition):
+        change(book, 1, S.COMPLETED)
+    assert (book[TaskId(1)], book.recorded) == (before, 1)
+
+
+def test_live_progress_is_no_event() -> None:
+    book = TaskBook()
+    book.submit(draft(), now=1.0)
+    book.note_progress(TaskId(1), Progress(ORIGIN, 1.0, 2.0))
+    assert (book[TaskId(1)].progress.done, book[TaskId(1)].version, book.recorded) == (1.0, 1, 1)
+
+
+def test_events_are_numbered_from_1_whether_taken_or_not() -> None:
+    book = TaskBook()
+    book.submit(draft(), now=1.0)
+    book.take_events()
+    book.submit(draft(), now=1.0)
+    change(book, 1, S.STARTING)
+    assert (book.recorded, len(book.take_events())) == (3, 2)
+
+
+def test_a_task_is_durable_when_its_last_event_is() -> None:
+    book = TaskBook()
+    book.submit(draft(), now=1.0)  # event 1
+    book.submit(draft(), now=1.0)  # event 2
+    book.durable = 1
+    assert [book.is_durable(TaskId(n)) for n in (1, 2)] == [True, False]
+    change(book, 1, S.STARTING)  # event 3
+    book.durable = 2
+    assert [book.is_durable(TaskId(n)) for n in (1, 2)] == [False, True]
+    book.durable = 3
+    assert book.is_durable(TaskId(1))
+
+
+def test_a_withdrawn_submission_never_was_a_task() -> None:
+    book = TaskBook()
+    book.submit(draft(), now=1.0)
+    book.take_events()
+    book.withdraw(TaskId(1), now=1.4)
+    assert (book.get(1), book.all()) == (None, ())
+    assert book.take_events() == [TaskWithdrawn(TaskId(1), 1, 1.4)]
+
+
+def test_tasks_are_given_oldest_first_and_by_vehicle() -> None:
+    book = TaskBook()
+    for vehicle in (1, 2, 1):
+        book.submit(draft(vehicle=vehicle), now=0.0)
+    assert [task.id for task in book.all()] == [1, 2, 3]
+    assert [task.id for task in book.of_vehicle(1)] == [1, 3]
+
+
+def test_the_oldest_finished_are_forgotten_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(book_module, "KEPT_FINISHED", 2)
+    book = TaskBook()
+    for _ in range(5):
+        book.submit(draft(), now=0.0)
+    for task_id in (4, 2, 5):
+        finish(book, task_id)
+    assert [task.id for task in book.all()] == [1, 2, 3, 5]
+    assert book.get(4) is None
