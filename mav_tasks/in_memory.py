@@ -48,6 +48,9 @@ class InMemoryServer:
             datagrams = link.receive(len(link.arrived))
             if datagrams:
                 self.pump.handle(Packets(link.name, datagrams), now=now)
+        due = self.engine.next_deadline()
+        if due is not None and due <= now:
+            self.pump.handle_deadline(now=now)
         self.pump.turn(now=now)
 
     def _send(self, outgoing: Outgoing) -> None:

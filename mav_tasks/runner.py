@@ -47,21 +47,23 @@ class Pump:
         """Take one input in; ``turn`` brings out what follows."""
         self.engine.handle(item, now=now)
 
+    def handle_deadline(self, *, now: float) -> None:
+        """Do what the time asks for; ``turn`` brings out what follows."""
+        self.engine.handle_deadline(now=now)
+
     def turn(self, *, now: float) -> None:
-        """Do what is due, and send and store until nothing is left to do."""
-        due = self.engine.next_deadline()
-        if due is not None and due <= now:
-            self.engine.handle_deadline(now=now)
+        """Send and store until nothing is left to do."""
+        noted: list[Event] = []
         while True:
             for outgoing in self.engine.take_packets():
                 self._send(outgoing)
             events = self.engine.take_events()
             if events:
                 self._store.append(events)
-                self._note(events)
+                noted += events
             outcomes = self._store.take_outcomes()
             if not outcomes:
-                return
+                break
             for outcome in outcomes:
                 self.engine.handle(
                     Committed(outcome.through)
@@ -69,6 +71,7 @@ class Pump:
                     else StoreFailed(outcome.text),
                     now=now,
                 )
+        self._note(noted)  # last: whoever waits for an answer does not wait for the log
 
     def send_last_words(self) -> None:
         """Stop every vehicle that is being driven, without asking the engine anything."""
@@ -141,7 +144,10 @@ class Runner:
         self._finish(0)
 
     def _guarded(self, item: Input | None) -> None:
-        """One turn of the pump. If the engine fails, stop the vehicles and end: no zombie."""
+        """One turn of the pump, for an input or (None) for the time.
+
+        If the engine fails, stop the vehicles and end: no zombie.
+        """
         try:
             self._turn(item)
         except Exception:  # whatever our own mistake is, a vehicle must not drive on for it
@@ -156,7 +162,9 @@ class Runner:
         if self._wall_offset is None or abs(offset - self._wall_offset) > WALL_STEP:
             self._wall_offset = offset
             self._pump.handle(WallClock(offset), now=now)
-        if item is not None:
+        if item is None:
+            self._pump.handle_deadline(now=now)
+        else:
             self._pump.handle(item, now=now)
         self._pump.turn(now=now)
         if self._pump.is_over:

@@ -65,6 +65,10 @@ def _refuse_doubles(urls: Sequence[LinkUrl]) -> None:
 
 
 def _log_to_stderr(*, verbose: bool) -> None:
+    # Each event is one line, and under load there are thousands a second: what no line shows is
+    # not looked up for it (logging's own manual, "Optimization").
+    logging._srcfile = None
+    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
     logging.basicConfig(
         stream=sys.stderr,
         level=logging.DEBUG if verbose else logging.INFO,

@@ -30,7 +30,7 @@ class Watch:
     setpoint_period: float = 0.05  # 20 Hz
     motion_fresh: float = 0.3  # no motion on data older than this
     position_lost: float = 1.0  # older data than this pauses the task, POSITION_LOST
-    heartbeat_lost: float = 3.0  # MAVLink guide, "Heartbeat": silent after some missed beats
+    heartbeat_lost: float = 3.5  # silent after three missed beats and some jitter; QGroundControl's
     late_tick: float = 0.5  # a setpoint tick later than this holds the task, LATE
     start_timeout: float = 5.0  # from STARTING to in control
     ask_vehicle: float = 1.0  # arm and mode requests are repeated for at most this long

@@ -84,9 +84,11 @@ class Engine:
             case LinkChanged():
                 self._vehicles.change_link(item, now=now)
             case Committed(through=through):
+                waiting = [vehicle for vehicle in self._vehicles if vehicle.tasks.awaits_commit]
                 self._book.durable = through
                 self._submissions.committed(through, now=now)
-                self._step_vehicles(now=now)
+                for vehicle in waiting:
+                    vehicle.step(now=now)
             case StoreFailed():
                 self._submissions.store_failed()
             case SettingsChanged(settings=settings):
@@ -210,12 +212,6 @@ class Engine:
             self._publisher.publish(events, now=now)
             self._journal += events
         self._publisher.send_statuses(now=now)
-
-    def _step_vehicles(self, *, now: float) -> None:
-        """Let vehicles that wait for nothing but durability begin."""
-        for vehicle in self._vehicles:
-            if vehicle.tasks.begun is None and not vehicle.tasks.is_idle:
-                vehicle.step(now=now)
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings

@@ -40,6 +40,7 @@ class GcsClient:
         self._texts = RateLimit(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
         self._introduced: set[int] = set()
+        self._submitters: dict[Address, Submitter] = {}  # made once: each command asks for it
         self._nonces = nonces
         self._receivers: dict[Address, CommandReceiver] = {}
 
@@ -60,7 +61,13 @@ class GcsClient:
 
     def submitter(self, source: Address) -> Submitter:
         """Give who submits when a packet of ``source`` comes from here."""
-        return Submitter(self.outlet.link, self.endpoint, *source)
+        submitter = self._submitters.get(source)
+        if submitter is None:
+            if len(self._submitters) >= MAX_ADDRESSES:
+                self._submitters.clear()
+            submitter = Submitter(self.outlet.link, self.endpoint, *source)
+            self._submitters[source] = submitter
+        return submitter
 
     def submitted(self, task: Task) -> bool:
         """Whether a task was submitted from this endpoint."""

@@ -5,7 +5,7 @@ wants is given back as a value; the engine sees to it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from mav_tasks.engine.gcs_client import GcsClient, Nonces
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
@@ -21,8 +21,7 @@ from mav_tasks.settings import Settings
 MAX_NONCE_ADDRESSES = 256
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
+class Received(NamedTuple):
     """A packet of a client. ``message`` is None when its id is not in the dialect."""
 
     client: GcsClient

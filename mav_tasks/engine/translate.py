@@ -246,16 +246,15 @@ def _number(
 ) -> float:
     """Give a parameter, or raise a Rejection that names it. NaN is "not given"."""
     value = command.params[index - 1]
+    if low <= value <= high and not (whole and value != int(value)):
+        return value
     label = f"param{index} {name}"
-    if isnan(value):
-        if default is None:
-            raise Rejection(R.BAD_PARAMETER, f"{label} is not given")
-        return default
-    if not low <= value <= high:
-        raise Rejection(R.BAD_PARAMETER, f"{label} {value:g} not in {low:g}..{high:g}")
-    if whole and value != int(value):
-        raise Rejection(R.BAD_PARAMETER, f"{label} {value:g} is not a whole number")
-    return value
+    if not isnan(value):
+        fault = "is not a whole number" if low <= value <= high else f"not in {low:.8g}..{high:.8g}"
+        raise Rejection(R.BAD_PARAMETER, f"{label} {value:.8g} {fault}")
+    if default is None:
+        raise Rejection(R.BAD_PARAMETER, f"{label} is not given")
+    return default
 
 
 def _progress(task: Task) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Hashable
 from dataclasses import replace
 from math import inf
 
+from mav_tasks.engine.authority import Authority
 from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.engine.outlet import Outlet
@@ -27,7 +28,7 @@ from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
-from mav_tasks.tasks.view import STOP, Demand, DemandKind, ModeKind, VehicleView
+from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
 LATE_REQUESTS = 1.5  # s after a STOP, in which requests that left before it may still arrive
 REFUSALS = {
@@ -70,17 +71,14 @@ class Vehicle:
             heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
         )
         self.control.heard(armed=self._monitor.armed, mode=self._monitor.custom_mode)
-        self._arming_allowed = may_arm  # by setting
-        self._may_arm = may_arm  # until somebody disarms or changes the mode
-        self._asked_mode: int | None = None  # by a client, through us
-        self._mode_is_ours = False
+        self._authority = Authority(persona, may_arm=may_arm)
         self._next_tick = inf
         self._was_heard = True
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
-        self._other_controller_at = -inf
-        self._granted: set[Hashable] = set()
         self._own_components: set[int] = set()
+        #: the task server's address inside this vehicle's system
+        self.server_address = self._free_address()
         self._answers: list[Answered] = []
         self.last_words = self._prepare_last_words()
 
@@ -90,14 +88,7 @@ class Vehicle:
     @property
     def server_component(self) -> int:
         """The component id under which the task server appears inside this vehicle's system."""
-        first = self._settings.identity.component_id
-        free = (c for c in range(first, first + 4) if c not in self._own_components)
-        return next(free, first)
-
-    @property
-    def server_address(self) -> Address:
-        """The task server's address inside this vehicle's system."""
-        return Address(self.system_id, self.server_component)
+        return self.server_address.component_id
 
     @property
     def armed(self) -> bool:
@@ -153,31 +144,29 @@ class Vehicle:
             self._begin_stop(now=now)
 
     def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
-        persona = self.persona
-        by_client = mode == self._asked_mode and mode == persona.control_mode
-        ours = by_client or self.control.may_have_set(mode, now=now)
-        self._mode_is_ours = ours
-        self._asked_mode = None
+        booting = self.persona.booting_mode
+        by_us = self.control.may_have_set(mode, now=now)
+        ours = self._authority.mode_changed(mode, by_us=by_us, now=now)
         if self.tasks.is_stopped:
             self._mode_changed_in_spite_of_stop(mode, now=now)
-        elif mode == persona.booting_mode:
+        elif mode == booting:
             self._rebooted(now=now)
-        elif not ours and was_mode != persona.booting_mode:
-            self._may_arm = False
+        elif not ours and was_mode != booting:
+            self._authority.withdraw_arming()
             self._take_over(f"mode changed to {mode}", now=now)
 
     def _mode_changed_in_spite_of_stop(self, mode: int, *, now: float) -> None:
         """A request from before the STOP was late. Later, it is a person at the vehicle."""
         if mode == self.persona.hold_mode:
             return
-        self._may_arm = False
+        self._authority.withdraw_arming()
         if now - self.stopped_at <= LATE_REQUESTS and not self.control.is_engaged:
             self._begin_stop(now=now)
 
     def _disarmed(self, *, now: float) -> None:
         if self.control.phase is Phase.STOPPING or self.control.may_have_disarmed(now=now):
             return
-        self._may_arm = False
+        self._authority.withdraw_arming()
         self._take_over("disarmed", now=now)
 
     def _rebooted(self, *, now: float) -> None:
@@ -187,7 +176,7 @@ class Vehicle:
         self._note("restarted", now=now)
         if not self.tasks.is_stopped:
             if self.control.is_engaged:
-                self._may_arm = False
+                self._authority.withdraw_arming()
             self.control.lose()
             self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
@@ -205,10 +194,16 @@ class Vehicle:
             return
         before = self.server_component
         self._own_components.add(component_id)
+        self.server_address = self._free_address()
         if self.server_component != before:
             self._note(
                 f"component {before} is its own; tasks are at {self.server_component}", now=now
             )
+
+    def _free_address(self) -> Address:
+        first = self._settings.identity.component_id
+        free = (c for c in range(first, first + 4) if c not in self._own_components)
+        return Address(self.system_id, next(free, first))
 
     def move_to(self, outlet: Outlet) -> None:
         """The vehicle is heard at another endpoint now."""
@@ -226,7 +221,7 @@ class Vehicle:
         target = asked if asked in self._own_components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
         if disarms and self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
-            self._may_arm = False
+            self._authority.withdraw_arming()
             self._take_over("disarmed by a client", now=now)
         self.sender.relay(
             packet,
@@ -250,11 +245,11 @@ class Vehicle:
         Our own mode then counts as set by us. Any other one is a takeover, believed when a
         heartbeat shows it; but nothing that we still ask for may work against it.
         """
-        self._asked_mode = mode
+        present_mode = self._monitor.custom_mode
+        self._authority.client_asks(mode, client, present_mode=present_mode, now=now)
         if mode == self.persona.control_mode:
-            self._granted.add(client)
-            self._mode_is_ours = self._mode_is_ours or self._monitor.custom_mode == mode
-        elif self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
+            return
+        if self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
             self._take_over(f"client asks for mode {mode}", now=now)
 
     def may_move(self, client: Hashable, *, now: float) -> bool:
@@ -264,24 +259,24 @@ class Vehicle:
             and self.tasks.begun is None
             and not self.tasks.is_stopped
             and not self.control.is_engaged
-            and client in self._granted
+            and self._authority.has_granted(client)
         )
         if allowed:
-            self._other_controller_at = now
+            self._authority.note_other(now=now)
         return allowed
 
     def sticks_moved(self, *, now: float) -> None:
         """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""
-        self._other_controller_at = now
+        self._authority.note_other(now=now)
         if self.control.phase in (Phase.ASKING_ARM, Phase.CONTROL):
             self.outlet.send(self.control.zero_setpoint(), self._source)
         self._take_over("driven by hand", now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
         """Setpoints or an address like ours, not from us: HOLD once, then let go."""
-        if now - self._other_controller_at > self._settings.watch.other_controller:
+        if self._authority.since_other(now=now) > self._settings.watch.other_controller:
             self._note(f"second controller {who}", now=now)
-        self._other_controller_at = now
+        self._authority.note_other(now=now)
         if self.control.phase is Phase.STOPPING:
             return
         if self.control.is_engaged:
@@ -292,8 +287,7 @@ class Vehicle:
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: zero and HOLD leave in this very step."""
-        self._asked_mode = None
-        self._granted.clear()
+        self._authority.revoke()
         self.stopped_at = now
         killed = self.tasks.stop(clear=clear, actor=actor, now=now)
         self._begin_stop(now=now)
@@ -328,9 +322,9 @@ class Vehicle:
 
         Raises Rejection, and changes nothing, while the begun task could not take the vehicle.
         """
-        seen = replace(self.view(now=now), may_arm=self._arming_allowed)
+        seen = replace(self.view(now=now), may_arm=self._authority.may_arm_again)
         going_on = self.tasks.proceed(seen, actor=actor, now=now)
-        self._may_arm = self._arming_allowed
+        self._authority.restore_arming()
         if not self._is_ticking:
             self.step(now=now)
         return going_on
@@ -375,7 +369,7 @@ class Vehicle:
         begun_before = self.tasks.begun
         demand = STOP if self._is_closing else self.tasks.step(seen, now=now)
         if begun_before is not None and self.tasks.begun is None:
-            self._granted.clear()
+            self._authority.revoke()
         self._follow(demand, seen, now=now)
         self._flush(now=now)
         self._plan_tick(now=now)
@@ -404,14 +398,14 @@ class Vehicle:
         watch = self._settings.watch
         return VehicleView(
             heard=self.is_heard(now=now),
-            mode=self._mode_kind(),
+            mode=self._authority.kind_of(self._monitor.custom_mode),
             armed=self._monitor.armed,
-            may_arm=self._may_arm,
+            may_arm=self._authority.may_arm,
             in_control=self.control.in_control,
             refusal=REFUSALS[self.control.refused],
             motion=self.motion.latest(),
             still=self.motion.is_still(now=now),
-            other_controller=now - self._other_controller_at < watch.other_controller,
+            other_controller=self._authority.since_other(now=now) < watch.other_controller,
         )
 
     def latest_motion(self) -> Motion | None:
@@ -427,14 +421,6 @@ class Vehicle:
         """Take new settings; what is under way keeps the old ones where it must."""
         self._settings = settings
         self.tasks.apply(settings)
-
-    def _mode_kind(self) -> ModeKind:
-        mode = self._monitor.custom_mode
-        if mode == self.persona.hold_mode:
-            return ModeKind.HOLD
-        if mode == self.persona.control_mode and self._mode_is_ours:
-            return ModeKind.OURS
-        return ModeKind.MANUAL if mode == self.persona.manual_mode else ModeKind.OTHER
 
     def _follow(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         match demand.kind:

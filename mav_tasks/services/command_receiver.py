@@ -7,6 +7,7 @@ stays 0, because MAVSDK never counts it up and COMMAND_INT has none. The rules a
 
 from collections import OrderedDict
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult
@@ -19,8 +20,7 @@ REMEMBERED = 256  # packets of one client, for rule 1
 NONCES = 10_000  # remembered for each client address, for rule 2
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(NamedTuple):
     """COMMAND_LONG or COMMAND_INT, on one footing.
 
     ``params`` are param1–param7; of a COMMAND_INT, 5 and 6 are its x and y as plain integers.
@@ -46,8 +46,7 @@ def command_of(message: CommandLong | CommandInt) -> Command:
     return Command(target, message.command, first + last, message.confirmation, None, message)
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """How a command was answered: everything of the ack but to whom."""
 
     command: int

@@ -51,6 +51,8 @@ class _Lane:
 
     in_flight: _Request | None = None
     waiting: deque[_Request] = field(default_factory=deque)
+    owed: int = 0  # acks still to come of commands that an urgent one has pushed aside
+    owed_until: float = 0.0
     quiet_until: float = 0.0  # late acks may still come; nothing is sent meanwhile
 
 
@@ -134,6 +136,9 @@ class CommandSender:
             return  # IN_PROGRESS is no answer yet: the terminal one follows
         if not self._is_meant(ack, lane.in_flight):
             return
+        if lane.owed and now < lane.owed_until:  # the answer to what was pushed aside comes first
+            lane.owed -= 1
+            return
         request, lane.in_flight = lane.in_flight, None
         if request.retry.sent > 1:  # each copy is answered: the others' acks are on their way
             lane.quiet_until = now + LATE / 2
@@ -181,6 +186,7 @@ class CommandSender:
         if urgent:
             if lane.in_flight is not None:
                 self._answer(lane.in_flight, None)
+                lane.owed, lane.owed_until = lane.in_flight.retry.sent, now + LATE
             lane.in_flight = request
             self._send(request, now=now)
             return

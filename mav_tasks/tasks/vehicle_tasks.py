@@ -72,6 +72,12 @@ class VehicleTasks:
         self._queue.capacity = settings.queueing.capacity
         self._executor.apply(settings)
 
+    @property
+    def awaits_commit(self) -> bool:
+        """Whether the next task waits for nothing but its submission being durable."""
+        first = self._queue.first()
+        return first is not None and self.begun is None and not self._book.is_durable(first)
+
     def position(self, task: Task) -> int | None:
         """Give how many tasks run before this one, or None if it does not wait."""
         ahead = self._queue.position(task)

@@ -179,14 +179,24 @@ def test_commands_of_other_ids_and_components_do_not_wait() -> None:
     assert rig.results == [(0.1, "carol", MavResult.ACCEPTED)]
 
 
-def test_an_urgent_command_does_not_wait() -> None:
+def test_an_urgent_command_does_not_wait_and_gets_its_own_answer() -> None:
     rig = Rig()
     rig.relay(1, "alice", 0.0)
     rig.relay(2, "bob", 0.1, urgent=True)
     assert rig.sent == [(0.0, packet(1)), (0.1, packet(2))]
     assert rig.results == [(0.1, "alice", None)]
-    rig.receive(ack(), 0.2)
-    assert rig.results[1:] == [(0.2, "bob", MavResult.ACCEPTED)]
+    rig.receive(ack(result=MavResult.FAILED), 0.2)  # the vehicle's answer to alice
+    assert rig.results[1:] == []
+    rig.receive(ack(), 0.3)
+    assert rig.results[1:] == [(0.3, "bob", MavResult.ACCEPTED)]
+
+
+def test_an_answer_owed_for_long_is_not_waited_for() -> None:
+    rig = Rig()
+    rig.request(command(MODE), 0.0)
+    rig.request(command(MODE), 0.1, urgent=True)
+    rig.receive(ack(MODE), 0.1 + LATE)
+    assert rig.results == [(0.1, None, None), (0.1 + LATE, None, MavResult.ACCEPTED)]
 
 
 def test_what_waits_is_bounded_and_the_rest_is_answered_at_once() -> None:

@@ -1,0 +1,83 @@
+"""Who has a vehicle: ourselves, a client through us, or somebody else. What follows is decided
+elsewhere; this is the memory of who did what to it.
+"""
+
+from collections.abc import Hashable
+from math import inf
+
+from mav_tasks.services.persona import Persona
+from mav_tasks.tasks.view import ModeKind
+
+BY_CLIENT = 2.0  # s after a client asked for a mode, in which a change to it is its doing
+
+
+class Authority:
+    """Permission to arm, whose doing the present mode is, and who else has been driving."""
+
+    def __init__(self, persona: Persona, *, may_arm: bool) -> None:
+        self._persona = persona
+        self._arming_allowed = may_arm  # by setting
+        self._asked_mode = -1  # by a client, through us
+        self._asked_at = -inf
+        self._mode_is_ours = False
+        self._granted: set[Hashable] = set()
+        self._other_at = -inf
+        #: until somebody disarms or changes the mode
+        self.may_arm = may_arm
+
+    def __repr__(self) -> str:
+        return f"Authority(may_arm={self.may_arm}, mode_is_ours={self._mode_is_ours})"
+
+    @property
+    def may_arm_again(self) -> bool:
+        """Whether we may arm once a person has said that all is well."""
+        return self._arming_allowed
+
+    def withdraw_arming(self) -> None:
+        """Somebody else has a hand on the vehicle: arm it no more."""
+        self.may_arm = False
+
+    def restore_arming(self) -> None:
+        """A person said that all is well."""
+        self.may_arm = self._arming_allowed
+
+    def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
+        """A client's mode request goes to the vehicle; our own mode counts as set by us then."""
+        self._asked_mode, self._asked_at = mode, now
+        if mode == self._persona.control_mode:
+            self._granted.add(client)
+            self._mode_is_ours = self._mode_is_ours or present_mode == mode
+
+    def mode_changed(self, mode: int, *, by_us: bool, now: float) -> bool:
+        """The vehicle shows another mode; gives whether it is our, or our clients', doing."""
+        by_client = (
+            mode == self._asked_mode == self._persona.control_mode
+            and now - self._asked_at <= BY_CLIENT
+        )
+        self._asked_mode = -1
+        self._mode_is_ours = by_us or by_client
+        return self._mode_is_ours
+
+    def kind_of(self, mode: int) -> ModeKind:
+        """Give what the present mode means for taking control."""
+        if mode == self._persona.hold_mode:
+            return ModeKind.HOLD
+        if mode == self._persona.control_mode and self._mode_is_ours:
+            return ModeKind.OURS
+        return ModeKind.MANUAL if mode == self._persona.manual_mode else ModeKind.OTHER
+
+    def has_granted(self, client: Hashable) -> bool:
+        """Whether this client has asked for our mode since the last task or STOP."""
+        return client in self._granted
+
+    def revoke(self) -> None:
+        """A task has ended, or STOP: who wants to drive must ask again."""
+        self._granted.clear()
+
+    def note_other(self, *, now: float) -> None:
+        """Somebody else is driving just now."""
+        self._other_at = now
+
+    def since_other(self, *, now: float) -> float:
+        """Give the seconds since somebody else was driving."""
+        return now - self._other_at
