@@ -1,5 +1,6 @@
 """README.md does not promise what is not there: its examples run, its commands are run by tests."""
 
+import os
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from tests.kit.processes import stand
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+CONTRACT = (ROOT / "dialects" / "README.md").read_text(encoding="utf-8")
 
 #: each command of the README, and what runs it
 COMMANDS = {
@@ -21,9 +23,16 @@ COMMANDS = {
 }
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, text: str = README) -> list[str]:
     """Give the fenced blocks of one language."""
-    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+
+
+#: each example by itself, and what it prints; those of the wire contract go on from one another
+EXAMPLES = [
+    *(pytest.param(block, "task 1", id=block.split("\n")[0]) for block in blocks("python")),
+    pytest.param("".join(blocks("python", CONTRACT)), "completed", id="dialects/README.md"),
+]
 
 
 def test_every_command_is_run_somewhere() -> None:
@@ -33,16 +42,21 @@ def test_every_command_is_run_somewhere() -> None:
         assert command.removeprefix("mav-tasks ").strip("./") in (ROOT / where).read_text()
 
 
-@pytest.mark.parametrize("example", blocks("python"), ids=lambda text: text.split("\n")[0])
-def test_example_runs(example: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("example", "printed"), EXAMPLES)
+def test_example_runs(example: str, printed: str, tmp_path: Path) -> None:
     with stand(tmp_path) as it:
         example = example.replace("14560", str(it.client_port))
         example = example.replace("14540", str(it.push_port))
         done = subprocess.run(
-            [sys.executable, "-c", example], capture_output=True, text=True, timeout=50, check=False
+            [sys.executable, "-c", example],
+            capture_output=True,
+            text=True,
+            timeout=50,
+            check=False,
+            env={name: value for name, value in os.environ.items() if name != "MAVLINK20"},
         )
     assert done.returncode == 0, done.stderr
-    assert "task 1" in done.stdout.lower()
+    assert printed in done.stdout.lower()
 
 
 def test_every_path_named_exists() -> None:
