@@ -166,7 +166,7 @@ class Commands:
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
         else:
             vehicle.client_asks_mode(mode, client.key, now=now)
-            vehicle.forward(packet)
+            vehicle.requests.forward(packet)
 
     # STOP, pause, modes
 

@@ -42,7 +42,7 @@ class Displays:
             return
         client.thinner.set_interval(vehicle.system_id, message_id, interval_us)
         for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
-            vehicle.intervals.wish(wished_id, interval)
+            vehicle.requests.intervals.wish(wished_id, interval)
 
     def show_interval(self, asked: Asked) -> None:
         """GET_MESSAGE_INTERVAL: what this client gets."""

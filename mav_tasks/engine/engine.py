@@ -133,7 +133,7 @@ class Engine:
             words
             for vehicle in self._vehicles
             if vehicle.control.is_engaged
-            for words in vehicle.last_words
+            for words in vehicle.requests.last_words
         )
         packets = self._packets.copy()
         self._packets.clear()  # the list itself is shared with every outlet
@@ -198,12 +198,12 @@ class Engine:
                 and target != vehicle.server_address
                 and may_pass(vehicle, client.key, message, now=now)
             ):
-                vehicle.forward(received.packet)
+                vehicle.requests.forward(received.packet)
 
     def _settle(self, *, now: float) -> None:
         """Bring vehicles' answers to clients, and what happened to clients and the journal."""
         for vehicle in self._vehicles:
-            for answered in vehicle.take_answers():
+            for answered in vehicle.requests.take_answers():
                 self._commands.deliver(vehicle, answered, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)

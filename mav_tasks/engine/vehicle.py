@@ -9,22 +9,19 @@ from dataclasses import replace
 from math import inf
 
 from mav_tasks.engine.authority import Authority
-from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_sender import Answered, CommandSender
 from mav_tasks.services.heartbeat import HeartbeatMonitor
-from mav_tasks.services.interval_requester import IntervalRequester
-from mav_tasks.services.offboard import OffboardControl, Phase, Refused, is_request_of
+from mav_tasks.services.offboard import Phase, Refused
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
-from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -55,18 +52,21 @@ class Vehicle:
     ) -> None:
         self.system_id = system_id
         self.persona = persona
-        self.outlet = outlet
         self.tasks = VehicleTasks(system_id, book, settings)
-        self.motion = MotionMonitor(settings.watch)
-        self.intervals = IntervalRequester(now=now)
+        self.requests = VehicleRequests(
+            Address(system_id, AUTOPILOT),
+            persona,
+            outlet,
+            source=Address(settings.identity.system_id, settings.identity.component_id),
+            watch=settings.watch,
+            now=now,
+        )
+        self.control = self.requests.control
         self.last_heartbeat: Packet | None = None
         self.last_seq = 0  # of the autopilot's packets
         self._book = book
         self._settings = settings
-        self._source = Address(settings.identity.system_id, settings.identity.component_id)
-        self._target = Address(system_id, AUTOPILOT)
-        self.sender = CommandSender(self._source)
-        self.control = OffboardControl(self._target, persona, self.sender, settings.watch)
+        self._motion = MotionMonitor(settings.watch)
         self._monitor = HeartbeatMonitor(
             heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
         )
@@ -79,8 +79,6 @@ class Vehicle:
         self._own_components: set[int] = set()
         #: the task server's address inside this vehicle's system
         self.server_address = self._free_address()
-        self._answers: list[Answered] = []
-        self.last_words = self._prepare_last_words()
 
     def __repr__(self) -> str:
         return f"Vehicle({self.system_id}, {self.control!r}, {self.tasks!r})"
@@ -104,8 +102,7 @@ class Vehicle:
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:
         """Take in a message that the server itself makes use of."""
         if isinstance(message, m.CommandAck):
-            self.sender.receive(message, component=component_id, now=now)
-            self._flush(now=now)
+            self.requests.receive(message, component=component_id, now=now)
             self._ask_for_rates(now=now)
         elif component_id != AUTOPILOT:
             if isinstance(message, m.Heartbeat):
@@ -114,8 +111,8 @@ class Vehicle:
             self._receive_heartbeat(message, now=now)
         elif isinstance(message, m.Attitude | m.LocalPositionNed):
             # read after a delay, it may have come at any time since
-            self.motion.receive(message, now=min(now, self._next_tick))
-            if self.motion.rebooted:
+            self._motion.receive(message, now=min(now, self._next_tick))
+            if self._motion.rebooted:
                 self._rebooted(now=now)
             if not self._is_ticking and not self.tasks.is_idle:
                 self.step(now=now)
@@ -171,8 +168,8 @@ class Vehicle:
 
     def _rebooted(self, *, now: float) -> None:
         """Its frame may be another one now, and nothing of ours is in force there."""
-        self.motion.forget()
-        self.intervals.ask_all_again()
+        self._motion.forget()
+        self.requests.intervals.ask_all_again()
         self._note("restarted", now=now)
         if not self.tasks.is_stopped:
             if self.control.is_engaged:
@@ -205,17 +202,12 @@ class Vehicle:
         free = (c for c in range(first, first + 4) if c not in self._own_components)
         return Address(self.system_id, next(free, first))
 
-    def move_to(self, outlet: Outlet) -> None:
-        """The vehicle is heard at another endpoint now."""
-        self.outlet = outlet
-        self.last_words = self._prepare_last_words()
-
     # what clients ask for, beyond tasks
 
     def relay(
         self, packet: Packet, message: m.Message, origin: Hashable, *, command: int, now: float
     ) -> None:
-        """Forward a client's command; its answer comes from ``take_answers``."""
+        """Forward a client's command; its answer comes from ``requests``."""
         asked = getattr(message, "target_component", 0)
         # an autopilot answers for every component that is not there, and does as it was told
         target = asked if asked in self._own_components else AUTOPILOT
@@ -223,21 +215,9 @@ class Vehicle:
         if disarms and self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
             self._authority.withdraw_arming()
             self._take_over("disarmed by a client", now=now)
-        self.sender.relay(
-            packet,
-            message,
-            origin,
-            component=target,
-            command=command,
-            now=now,
-            give_up_after=self._settings.watch.forward_answer,
-            urgent=disarms,
+        self.requests.relay(
+            packet, message, origin, component=target, command=command, urgent=disarms, now=now
         )
-        self._flush(now=now)
-
-    def forward(self, packet: Packet) -> None:
-        """Pass on a packet that no answer is kept for."""
-        self.outlet.inject(packet)
 
     def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
         """Note that a client's mode request goes to the vehicle through us.
@@ -269,7 +249,7 @@ class Vehicle:
         """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""
         self._authority.note_other(now=now)
         if self.control.phase in (Phase.ASKING_ARM, Phase.CONTROL):
-            self.outlet.send(self.control.zero_setpoint(), self._source)
+            self.requests.send_zero()
         self._take_over("driven by hand", now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
@@ -280,8 +260,8 @@ class Vehicle:
         if self.control.phase is Phase.STOPPING:
             return
         if self.control.is_engaged:
-            self.outlet.send(self.control.zero_setpoint(), self._source)
-            self.outlet.send(self.control.hold_request(), self._source)
+            self.requests.send_zero()
+            self.requests.send_hold()
         if self.tasks.begun is not None or self.control.is_engaged:
             self._take_over(f"second controller {who}", now=now)
 
@@ -296,7 +276,7 @@ class Vehicle:
     def _begin_stop(self, *, now: float) -> None:
         self.control.begin_stop(now=now)
         self._next_tick = now + self._settings.watch.setpoint_period
-        self._flush(now=now)
+        self.requests.flush(now=now)
 
     def hold(self, *, actor: str, now: float) -> TaskId | None:
         """A client wants HOLD: zeros and the mode at once; a task and its queue pause."""
@@ -307,7 +287,7 @@ class Vehicle:
         if not self.tasks.is_idle:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.control.begin_release(now=now)
-        self._flush(now=now)
+        self.requests.flush(now=now)
         self._next_tick = now + self._settings.watch.setpoint_period
         return paused
 
@@ -345,11 +325,11 @@ class Vehicle:
 
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do."""
-        deadline = min(self._next_tick, self.sender.next_deadline() or inf)
+        deadline = min(self._next_tick, self.requests.next_deadline() or inf)
         if not self._was_heard:  # nothing is asked of one that cannot answer
             return deadline
         silent_at = self._monitor.heard_at + self._settings.watch.heartbeat_lost + 1e-3
-        return min(deadline, self.intervals.next_deadline(), silent_at)
+        return min(deadline, self.requests.intervals.next_deadline(), silent_at)
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due: the setpoint tick, repeats, rates, silence."""
@@ -357,10 +337,10 @@ class Vehicle:
         if fell_silent:
             self._was_heard = False
             self._note("silent", now=now)
-        self.sender.handle_deadline(now=now)
+        self.requests.handle_deadline(now=now)
         if now >= self._next_tick or fell_silent:
             self.step(now=now)
-        self._flush(now=now)
+        self.requests.flush(now=now)
         self._ask_for_rates(now=now)
 
     def step(self, *, now: float) -> None:
@@ -371,7 +351,7 @@ class Vehicle:
         if begun_before is not None and self.tasks.begun is None:
             self._authority.revoke()
         self._follow(demand, seen, now=now)
-        self._flush(now=now)
+        self.requests.flush(now=now)
         self._plan_tick(now=now)
 
     def check_late(self, *, now: float) -> None:
@@ -382,7 +362,7 @@ class Vehicle:
         begun = self.tasks.begun
         late = now - self._next_tick > self._settings.watch.late_tick
         if late and begun is not None and begun.state is TaskState.EXECUTING:
-            self.outlet.send(self.control.zero_setpoint(), self._source)
+            self.requests.send_zero()
             self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
@@ -403,19 +383,10 @@ class Vehicle:
             may_arm=self._authority.may_arm,
             in_control=self.control.in_control,
             refusal=REFUSALS[self.control.refused],
-            motion=self.motion.latest(),
-            still=self.motion.is_still(now=now),
+            motion=self._motion.latest(),
+            still=self._motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,
         )
-
-    def latest_motion(self) -> Motion | None:
-        """Give the last measured motion."""
-        return self.motion.latest()
-
-    def take_answers(self) -> list[Answered]:
-        """Give the answers to clients' commands since the last call."""
-        answers, self._answers = self._answers, []
-        return answers
 
     def apply(self, settings: Settings) -> None:
         """Take new settings; what is under way keeps the old ones where it must."""
@@ -435,50 +406,9 @@ class Vehicle:
             case DemandKind.STOP:
                 self.control.stop(still=seen.still, heard=seen.heard, now=now)
 
-    def _flush(self, *, now: float) -> None:
-        """Move what the services want sent to the way out, and their answers to who asked."""
-        setpoints = self.control.take_messages()
-        outgoing, answers = self.sender.take()
-        if self.control.phase is Phase.STOPPING:  # HOLD also stops what does not follow setpoints
-            outgoing += setpoints
-        else:  # in our mode a zero comes before arming
-            outgoing = [*setpoints, *outgoing]
-        for item in outgoing:
-            if isinstance(item, Packet):
-                self.outlet.inject(item)
-            else:
-                self.outlet.send(item, self._source)
-        for answer in answers:
-            self._dispatch(answer, now=now)
-
     def _ask_for_rates(self, *, now: float) -> None:
-        """Ask for the next message interval, unless nobody is there to be asked."""
-        if not self._was_heard:
-            return
-        request = self.intervals.next_request(now=now)
-        if request is not None:
-            request.target_system, request.target_component = self._target
-            self.sender.request(request, now=now, give_up_after=self._settings.watch.ask_vehicle)
-            self._flush(now=now)
-
-    def _dispatch(self, answer: Answered, *, now: float) -> None:
-        if answer.origin is not None:
-            self._answers.append(answer)
-        elif is_request_of(answer):
-            self.control.answered(answer, now=now)
-        elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:
-            ack = answer.ack
-            self.intervals.answered(
-                accepted=None if ack is None else ack.result == MavResult.ACCEPTED
-            )
+        if self._was_heard:  # nothing is asked of one that cannot answer
+            self.requests.ask_for_rates(now=now)
 
     def _note(self, text: str, *, now: float) -> None:
         self._book.record(VehicleNoted(self.system_id, text, now))
-
-    def _prepare_last_words(self) -> tuple[Outgoing, ...]:
-        """Zero and HOLD as packets, for an exit on which nothing can be computed any more."""
-        queue: list[Outgoing] = []
-        spare = self.outlet.sibling(queue)
-        spare.send(self.control.zero_setpoint(), self._source)
-        spare.send(self.control.hold_request(), self._source)
-        return tuple(queue)

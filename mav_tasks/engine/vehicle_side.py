@@ -114,7 +114,7 @@ class VehicleSide:
             return None
         if packet.component_id == AUTOPILOT:
             vehicle.last_seq = packet.seq
-        vehicle.intervals.heard(packet.message_id)
+        vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
                 vehicle.last_heartbeat = packet
@@ -197,7 +197,7 @@ class VehicleSide:
         outlets = self._links[link].outlets
         if peer not in outlets and len(outlets) >= MAX_PEERS:
             return False
-        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
+        vehicle.requests.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
         self._router.learn(vehicle.system_id, (link, peer))
         return True
 

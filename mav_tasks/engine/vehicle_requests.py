@@ -1,0 +1,144 @@
+"""What is sent to one vehicle, and its answers: setpoints, our commands, those of clients, rates.
+
+It decides nothing but the order in which things leave.
+"""
+
+from collections.abc import Hashable
+
+from mav_tasks.engine.inputs import Outgoing
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.interval_requester import IntervalRequester
+from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
+from mav_tasks.services.persona import Persona
+from mav_tasks.settings import Watch
+
+
+class VehicleRequests:
+    """The way out to one vehicle, and our hold on it."""
+
+    def __init__(
+        self,
+        target: Address,
+        persona: Persona,
+        outlet: Outlet,
+        *,
+        source: Address,
+        watch: Watch,
+        now: float,
+    ) -> None:
+        self._target = target
+        self._source = source
+        self._watch = watch
+        self._outlet = outlet
+        self._sender = CommandSender(source)
+        self._answers: list[Answered] = []
+        self.control = OffboardControl(target, persona, self._sender, watch)
+        self.intervals = IntervalRequester(now=now)
+        #: zero and HOLD as packets, for an exit on which nothing can be computed any more
+        self.last_words = self._prepare_last_words()
+
+    def move_to(self, outlet: Outlet) -> None:
+        """The vehicle is heard at another endpoint now."""
+        self._outlet = outlet
+        self.last_words = self._prepare_last_words()
+
+    def receive(self, ack: m.CommandAck, *, component: int, now: float) -> None:
+        """Take an answer of the vehicle."""
+        self._sender.receive(ack, component=component, now=now)
+        self.flush(now=now)
+
+    def forward(self, packet: Packet) -> None:
+        """Pass on a client's packet that no answer is kept for."""
+        self._outlet.inject(packet)
+
+    def relay(
+        self,
+        packet: Packet,
+        message: m.Message,
+        origin: Hashable,
+        *,
+        component: int,
+        command: int,
+        urgent: bool,
+        now: float,
+    ) -> None:
+        """Forward a client's command; its answer comes from ``take_answers``."""
+        self._sender.relay(
+            packet,
+            message,
+            origin,
+            component=component,
+            command=command,
+            now=now,
+            give_up_after=self._watch.forward_answer,
+            urgent=urgent,
+        )
+        self.flush(now=now)
+
+    def send_zero(self) -> None:
+        """Send one zero setpoint, whoever the vehicle follows."""
+        self._outlet.send(self.control.zero_setpoint(), self._source)
+
+    def send_hold(self) -> None:
+        """Ask for HOLD once, and wait for no answer."""
+        self._outlet.send(self.control.hold_request(), self._source)
+
+    def ask_for_rates(self, *, now: float) -> None:
+        """Ask for the next message interval that is due, if one is."""
+        request = self.intervals.next_request(now=now)
+        if request is not None:
+            request.target_system, request.target_component = self._target
+            self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
+            self.flush(now=now)
+
+    def next_deadline(self) -> float | None:
+        """Give when a command is to be repeated or given up."""
+        return self._sender.next_deadline()
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Repeat and give up what is due; ``flush`` sends it."""
+        self._sender.handle_deadline(now=now)
+
+    def flush(self, *, now: float) -> None:
+        """Move what the services want sent to the way out, and their answers to who asked."""
+        setpoints = self.control.take_messages()
+        outgoing, answers = self._sender.take()
+        if self.control.phase is Phase.STOPPING:  # HOLD also stops what does not follow setpoints
+            outgoing += setpoints
+        else:  # in our mode a zero comes before arming
+            outgoing = [*setpoints, *outgoing]
+        for item in outgoing:
+            if isinstance(item, Packet):
+                self._outlet.inject(item)
+            else:
+                self._outlet.send(item, self._source)
+        for answer in answers:
+            self._dispatch(answer, now=now)
+
+    def take_answers(self) -> list[Answered]:
+        """Give the answers to clients' commands since the last call."""
+        answers, self._answers = self._answers, []
+        return answers
+
+    def _dispatch(self, answer: Answered, *, now: float) -> None:
+        if answer.origin is not None:
+            self._answers.append(answer)
+        elif is_request_of(answer):
+            self.control.answered(answer, now=now)
+        elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:
+            ack = answer.ack
+            self.intervals.answered(
+                accepted=None if ack is None else ack.result == MavResult.ACCEPTED
+            )
+
+    def _prepare_last_words(self) -> tuple[Outgoing, ...]:
+        queue: list[Outgoing] = []
+        spare = self._outlet.sibling(queue)
+        spare.send(self.control.zero_setpoint(), self._source)
+        spare.send(self.control.hold_request(), self._source)
+        return tuple(queue)
