@@ -26,15 +26,17 @@ DEFAULT_VEHICLES = ["udpout:127.0.0.1:14580"]
 @app.command()
 def serve(
     client: Annotated[
-        list[str], typer.Option(help="Link for clients; may be given several times.")
+        list[str],
+        typer.Option(metavar="URL", help="Link for clients, as udpin:host:port; repeatable."),
     ] = DEFAULT_CLIENTS,
     push: Annotated[
         list[str],
-        typer.Option(help="Address at which a client listens: QGroundControl, MAVSDK scripts."),
+        typer.Option(metavar="HOST:PORT", help="Where a client listens, unasked; repeatable."),
     ] = DEFAULT_PUSH,
     no_push: Annotated[bool, typer.Option("--no-push", help="Push to nobody.")] = False,
     vehicle: Annotated[
-        list[str], typer.Option(help="Link to vehicles; may be given several times.")
+        list[str],
+        typer.Option(metavar="URL", help="Link to vehicles, as udpout:host:port; repeatable."),
     ] = DEFAULT_VEHICLES,
     arming: Annotated[
         str,
@@ -43,7 +45,6 @@ def serve(
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Allow links that other machines can reach.")
     ] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Log in more detail.")] = False,
 ) -> None:
     """Run the task server: clients on UDP 14560, the rover on 14580."""
     from mav_tasks.serve import serve as run  # noqa: PLC0415
@@ -55,7 +56,6 @@ def serve(
             vehicles=vehicle,
             arming=arming,
             insecure=insecure,
-            verbose=verbose,
         )
     )
 
@@ -65,7 +65,7 @@ def serve(
     add_help_option=False,
 )
 def sim(context: typer.Context) -> None:
-    """Run simulated rovers on UDP 14580; options are rover_sim's (--help shows them)."""
+    """Run simulated rovers on UDP 14580."""
     sys.stdout.flush()
     # The simulated rover is a program of its own: nothing of the server is in its process.
     os.execv(sys.executable, [sys.executable, "-m", "rover_sim", *context.args])

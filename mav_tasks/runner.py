@@ -24,7 +24,13 @@ from mav_tasks.engine.inputs import (
 )
 from mav_tasks.links.base import Link
 from mav_tasks.store import Kept, Store
-from mav_tasks.tasks.events import Event, ServerStopped, SubmissionRefused, VehicleNoted
+from mav_tasks.tasks.events import (
+    Event,
+    QueuePaused,
+    ServerStopped,
+    SubmissionRefused,
+    VehicleNoted,
+)
 
 log = logging.getLogger("mav_tasks")
 
@@ -80,7 +86,7 @@ class Pump:
 
     def _note(self, events: list[Event]) -> None:
         for event in events:
-            noteworthy = isinstance(event, SubmissionRefused | VehicleNoted)
+            noteworthy = isinstance(event, SubmissionRefused | VehicleNoted | QueuePaused)
             log.log(logging.WARNING if noteworthy else logging.INFO, "%s", event)
             if isinstance(event, ServerStopped):
                 self.is_over = True

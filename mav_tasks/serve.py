@@ -22,7 +22,6 @@ def serve(
     vehicles: Sequence[str],
     arming: str,
     insecure: bool,
-    verbose: bool,
 ) -> int:
     """Run until a signal; gives the exit code. UsageError says what the operator can mend."""
     if arming not in ARMING:
@@ -37,7 +36,7 @@ def serve(
             refuse_insecure(url)
         for host, port in pushed:
             refuse_insecure(LinkUrl("udpout", host, port))
-    _log_to_stderr(verbose=verbose)
+    log_to_stderr()
     # Pushing from the first client link: who answers is served from the socket it was called by.
     client_links = [
         UdpLink(url, push=pushed if number == 0 else ()) for number, url in enumerate(client_urls)
@@ -46,7 +45,7 @@ def serve(
     for link in client_links:
         sys.stdout.write(f"mav-tasks: clients on {link.name}\n")
     for link in vehicle_links:
-        sys.stdout.write(f"mav-tasks: vehicles on {link.name}\n")
+        sys.stdout.write(f"mav-tasks: vehicles on {link.name}, waiting for the first heartbeat\n")
     sys.stdout.flush()
     return asyncio.run(_run(settings, client_links, vehicle_links))
 
@@ -64,13 +63,14 @@ def _refuse_doubles(urls: Sequence[LinkUrl]) -> None:
         seen.add(url)
 
 
-def _log_to_stderr(*, verbose: bool) -> None:
+def log_to_stderr() -> None:
+    """Write the log where the operator sees it."""
     # Each event is one line, and under load there are thousands a second: what no line shows is
     # not looked up for it (logging's own manual, "Optimization").
     logging._srcfile = None
     logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
     logging.basicConfig(
         stream=sys.stderr,
-        level=logging.DEBUG if verbose else logging.INFO,
+        level=logging.INFO,
         format="%(asctime)s %(levelname)s %(message)s",
     )

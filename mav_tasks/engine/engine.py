@@ -227,10 +227,10 @@ class Engine:
 
     def _note_stopped(self, *, now: float) -> None:
         assert self._stop_by is not None
-        stands = not any(vehicle.control.is_engaged for vehicle in self._vehicles)
-        if not self._stopped and (stands or now >= self._stop_by):
+        rolling = tuple(v.system_id for v in self._vehicles if v.control.is_engaged)
+        if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True
-            self._book.record(ServerStopped(now))
+            self._book.record(ServerStopped(rolling, now))
 
 
 def _target(message: m.Message) -> Address:

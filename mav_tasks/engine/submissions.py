@@ -12,7 +12,7 @@ from mav_tasks.services.command_receiver import NonceReused, Repeat
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.task import Task, describe
 
 R = TaskReason
 
@@ -88,7 +88,7 @@ class Submissions:
         """The submission is durable: acknowledge it with the task's id, and tell of it."""
         asked.answer(MavResult.ACCEPTED, task.id)
         asked.client.statuses.changed(task.id)
-        words = f"Task {task.id} queued: {translate.describe(task.goal)}"
+        words = f"Task {task.id} queued: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, asked.vehicle.server_address, now=now)
 
     def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:

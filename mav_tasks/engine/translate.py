@@ -13,6 +13,7 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     TaskChanged,
+    TaskWaits,
     VehicleNoted,
     VehicleSeen,
 )
@@ -27,6 +28,7 @@ from mav_tasks.tasks.task import (
     Rotate,
     Submitter,
     Task,
+    describe,
 )
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
@@ -45,6 +47,15 @@ RESULT_OF: dict[int, MavResult] = {
     R.DISARMED: MavResult.TEMPORARILY_REJECTED,
     R.VEHICLE_SILENT: MavResult.FAILED,
     R.NOT_SUPPORTED_BY_VEHICLE: MavResult.UNSUPPORTED,
+}
+
+#: what the person who reads that a task waits may do about it
+WAITS_FOR = {
+    R.VEHICLE_SILENT: "the rover is silent",
+    R.OTHER_CONTROLLER: "somebody else drives",
+    R.WRONG_MODE: "wrong mode, set HOLD",
+    R.NO_POSITION: "no position",
+    R.DISARMED: "disarmed; arm, or continue",
 }
 
 UNIT_METRES = 1  # TASK_UNIT
@@ -152,6 +163,8 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
             return event.vehicle, MavSeverity.NOTICE, text
+        case TaskWaits(task_id=task_id, reason=reason):
+            return event.vehicle, MavSeverity.NOTICE, f"Task {task_id} waits: {WAITS_FOR[reason]}"
         case QueuePaused(reason=TaskReason.STOPPED):
             return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"
         case QueuePaused():
@@ -163,15 +176,6 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         case VehicleNoted(text=text):
             return event.vehicle, MavSeverity.WARNING, f"Vehicle {event.vehicle} {text}"
     return None
-
-
-def describe(goal: Goal) -> str:
-    """Give a goal in the words and units of its command."""
-    match goal:
-        case Move(distance=distance):
-            return f"move {distance:g} m"
-        case Rotate(angle=angle):
-            return f"rotate {degrees(angle):.6g} deg"
 
 
 def message_id_of(command: Command) -> int:
@@ -226,12 +230,10 @@ def _priority_of(command: Command) -> int:
 
 def _refuse_not_yet(command: Command) -> None:
     """What this version cannot honour is refused, never left out in silence."""
-    for index, name in ((5, "run after"), (6, "start delay")):
+    for index, name in ((3, "(unused)"), (5, "run after"), (6, "start delay")):
         value = command.params[index - 1]
         if not (isnan(value) or value == 0.0):
-            raise Rejection(
-                R.BAD_PARAMETER, f"param{index} {name}: not supported in this version, must be 0"
-            )
+            raise Rejection(R.BAD_PARAMETER, f"param{index} {name}: must be 0 in this version")
 
 
 def _number(

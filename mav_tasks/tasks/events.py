@@ -6,8 +6,8 @@ where events are stored or logged. ``actor`` is a client, or "server".
 
 from dataclasses import dataclass
 
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Progress, Task, TaskId
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.task import Progress, Task, TaskId, describe
 
 SERVER = "server"
 
@@ -22,8 +22,8 @@ class TaskSubmitted:
     def __str__(self) -> str:
         task = self.task
         return (
-            f"task {task.id} submitted by {task.submitter}: {task.goal} "
-            f"for vehicle {task.vehicle}, priority {task.priority}"
+            f"task {task.id} of vehicle {task.vehicle}: {describe(task.goal)}, "
+            f"priority {task.priority}, from {task.submitter}"
         )
 
 
@@ -42,8 +42,22 @@ class TaskChanged:
     progress: Progress
 
     def __str__(self) -> str:
-        why = f" ({self.reason.name})" if self.reason else ""
-        return f"task {self.task_id} {self.new.name.lower()}{why} by {self.actor}"
+        why = f": {words_of(self.reason)}" if self.reason else ""
+        who = "" if self.actor == SERVER else f", by {self.actor}"
+        return f"task {self.task_id} {self.new.name.lower()}{why}{who}"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskWaits:
+    """The next task of a vehicle cannot begin, for a reason that was not there before."""
+
+    task_id: TaskId
+    vehicle: int
+    reason: TaskReason
+    at: float
+
+    def __str__(self) -> str:
+        return f"task {self.task_id} waits: {words_of(self.reason)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +84,7 @@ class SubmissionRefused:
     at: float
 
     def __str__(self) -> str:
-        return f"command {self.command} of {self.actor} refused ({self.reason.name}): {self.text}"
+        return f"command {self.command} of {self.actor} refused: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +97,9 @@ class QueuePaused:
     at: float
 
     def __str__(self) -> str:
-        return f"queue of vehicle {self.vehicle} paused ({self.reason.name}) by {self.actor}"
+        if self.reason is TaskReason.STOPPED:
+            return f"STOP of vehicle {self.vehicle} by {self.actor}: nothing runs until continued"
+        return f"queue of vehicle {self.vehicle} paused: {words_of(self.reason)}, by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,17 +140,25 @@ class VehicleNoted:
 
 @dataclass(frozen=True, slots=True)
 class ServerStopped:
-    """The orderly end: every vehicle stands, or the time allowed for it is over."""
+    """The orderly end: every vehicle stands in HOLD, or the time allowed for it is over.
 
+    ``unconfirmed`` are the vehicles that had been told, but were not seen to stand in HOLD yet.
+    """
+
+    unconfirmed: tuple[int, ...]
     at: float
 
     def __str__(self) -> str:
-        return "server stopped"
+        if not self.unconfirmed:
+            return "server stopped: no vehicle is being driven"
+        names = ", ".join(map(str, self.unconfirmed))
+        return f"server stopped: vehicle {names} told to stop, not yet seen standing in HOLD"
 
 
 Event = (
     TaskSubmitted
     | TaskChanged
+    | TaskWaits
     | TaskWithdrawn
     | SubmissionRefused
     | QueuePaused

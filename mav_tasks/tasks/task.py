@@ -1,6 +1,7 @@
 """What a task is: frozen values. SI units and radians; angles clockwise from north."""
 
 from dataclasses import dataclass
+from math import degrees
 from typing import NewType
 
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
@@ -44,6 +45,15 @@ class Rotate:
 
 
 Goal = Move | Rotate
+
+
+def describe(goal: Goal) -> str:
+    """Give a goal in words, and in the units of its command."""
+    match goal:
+        case Move(distance=distance):
+            return f"move {distance:g} m"
+        case Rotate(angle=angle):
+            return f"rotate {degrees(angle):.6g} deg"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import SERVER, QueueContinued, QueuePaused
+from mav_tasks.tasks.events import SERVER, QueueContinued, QueuePaused, TaskWaits
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import TaskQueue
@@ -31,7 +31,8 @@ class VehicleTasks:
         self._queue = TaskQueue(settings.queueing.capacity)
         self._executor = Executor(book, settings)
         self._paused = TaskReason.NONE
-        self._blocker = TaskReason.NONE
+        self._blocker = TaskReason.NONE  # why the next task does not begin
+        self._blocked: TaskId | None = None  # which task that was
 
     def __repr__(self) -> str:
         return f"VehicleTasks({self.vehicle}, {self._queue!r}, {self._paused.name}, {self.begun!r})"
@@ -127,8 +128,9 @@ class VehicleTasks:
             blocker = start_blocker(seen, watch=self._settings.watch, now=now)
             if blocker:
                 raise Rejection(blocker, f"cannot continue: {words_of(blocker)}")
-        elif begun is not None and begun.state is TaskState.HELD and not self._paused:
-            raise Rejection(R.WRONG_STATE, f"task {begun.id} is held: {words_of(begun.reason)}")
+        elif begun is not None and begun.state is TaskState.HELD:
+            words = f"task {begun.id} is held ({words_of(begun.reason)}): STOP ends it"
+            raise Rejection(R.WRONG_STATE, words)
         if self._paused:
             self._paused = R.NONE
             self._book.record(QueueContinued(self.vehicle, actor, now))
@@ -172,12 +174,18 @@ class VehicleTasks:
         first = self._queue.first()
         if first is None or self._paused:
             return
-        self._blocker = start_blocker(seen, watch=self._settings.watch, now=now)
+        self._note_blocker(first, start_blocker(seen, watch=self._settings.watch, now=now), now=now)
         if self._blocker or not self._book.is_durable(first):
             return
         task = self._book[first]
         self._queue.remove(task)
         self._executor.begin(task, actor=SERVER, now=now)
+
+    def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
+        """Keep why the next task does not begin, and tell of it once each time that it changes."""
+        if blocker and (first, blocker) != (self._blocked, self._blocker):
+            self._book.record(TaskWaits(first, self.vehicle, blocker, now))
+        self._blocked, self._blocker = first, blocker
 
     def _after_end(self, task: Task, *, now: float) -> None:
         """After a failure that had moved the vehicle, somebody should look before the next."""
