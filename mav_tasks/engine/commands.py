@@ -29,26 +29,40 @@ R = TaskReason
 
 #: command ids set aside for tasks
 OUR_COMMANDS = range(54000, 54050)
-#: commands that move a vehicle or let it be moved: none passes while STOP is latched
+#: commands that a vehicle follows in the mode in which we drive it: a second source
 MOVING = frozenset(
     {
         MavCmd.NAV_WAYPOINT,
         17,  # NAV_LOITER_UNLIM
         18,  # NAV_LOITER_TURNS
         19,  # NAV_LOITER_TIME
-        MavCmd.NAV_RETURN_TO_LAUNCH,
-        MavCmd.NAV_LAND,
         MavCmd.NAV_TAKEOFF,
+        32,  # DO_FOLLOW
+        33,  # DO_FOLLOW_REPOSITION
         34,  # DO_ORBIT
         115,  # CONDITION_YAW
         MavCmd.DO_REPOSITION,
         213,  # NAV_SET_YAW_SPEED
         MavCmd.DO_MOTOR_TEST,
-        MavCmd.MISSION_START,
+        43000,  # GUIDED_CHANGE_SPEED
+        43002,  # GUIDED_CHANGE_HEADING
     }
 )
-#: of these, those that a vehicle follows in the mode in which we drive it: a second source
-SAME_MODE = MOVING - {MavCmd.NAV_RETURN_TO_LAUNCH, MavCmd.NAV_LAND, MavCmd.MISSION_START}
+#: all that passes while STOP is latched, besides disarming: what only asks. Of the others nobody
+#: can list all that arm, change the mode or move (DO_AUX_FUNCTION alone does each).
+ASKING = frozenset(
+    {
+        MavCmd.REQUEST_MESSAGE,
+        MavCmd.REQUEST_PROTOCOL_VERSION,
+        MavCmd.REQUEST_AUTOPILOT_CAPABILITIES,
+        MavCmd.GET_HOME_POSITION,
+        521,  # REQUEST_CAMERA_INFORMATION
+        522,  # REQUEST_CAMERA_SETTINGS
+        525,  # REQUEST_STORAGE_INFORMATION
+        527,  # REQUEST_CAMERA_CAPTURE_STATUS
+        528,  # REQUEST_FLIGHT_INFORMATION
+    }
+)
 
 
 class _Asker(NamedTuple):
@@ -240,10 +254,10 @@ def _check_relay(asked: Asked, *, now: float) -> None:
     """Refuse what would move a stopped vehicle, or drive one that a task drives."""
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
-    arms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] != 0.0
-    if vehicle.tasks.is_stopped and (arms or number in MOVING):
+    disarms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] == 0.0
+    if vehicle.tasks.is_stopped and not disarms and number not in ASKING:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
-    if number in SAME_MODE and not vehicle.may_move(asked.client.key, now=now):
+    if number in MOVING and not vehicle.may_move(asked.client.key, now=now):
         raise Rejection(R.NOT_ALLOWED, f"command {number}: not while tasks drive")
     if number == MavCmd.DO_CHANGE_SPEED and isnan(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle

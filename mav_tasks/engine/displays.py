@@ -62,9 +62,7 @@ class Displays:
                 self._show_tasks(asked, now=now)
             case m.TaskQueueStatus.id:
                 client.uses_dialect = True
-                counts = [0] * 14
-                for task in self._book.of_vehicle(vehicle.system_id):
-                    counts[task.state] += 1
+                counts = self._book.counts(vehicle.system_id)
                 status = translate.queue_status(
                     vehicle.tasks, counts, version=self._book.recorded, now=now
                 )

@@ -16,6 +16,7 @@ from mav_tasks.services.task_status import TaskStatusSender
 from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
 
+MAX_NONCE_ADDRESSES = 256  # MAVLink addresses whose nonces are remembered, over all endpoints
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 
 Nonces = dict[Address, OrderedDict[int, Pending]]
@@ -80,6 +81,8 @@ class GcsClient:
         if receiver is None:
             if len(self._receivers) >= MAX_ADDRESSES:
                 del self._receivers[next(iter(self._receivers))]
+            if len(self._nonces) >= MAX_NONCE_ADDRESSES and source not in self._nonces:
+                del self._nonces[next(iter(self._nonces))]
             nonces = self._nonces.setdefault(source, OrderedDict())
             receiver = self._receivers[source] = CommandReceiver(nonces)
         return receiver

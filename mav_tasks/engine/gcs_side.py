@@ -18,8 +18,6 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatSender
 from mav_tasks.settings import Settings
 
-MAX_NONCE_ADDRESSES = 256
-
 
 class Received(NamedTuple):
     """A packet of a client. ``message`` is None when its id is not in the dialect."""
@@ -145,5 +143,3 @@ class GcsSide:
             if others:
                 longest_silent = min(others, key=lambda client: client.heard_at)
                 del self._clients[longest_silent.key]
-        while len(self._nonces) > MAX_NONCE_ADDRESSES:
-            del self._nonces[next(iter(self._nonces))]

@@ -44,8 +44,12 @@ def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, n
 
 def _is_finite(message: m.Message) -> bool:
     """Whether no number in it would make an autopilot abort, even in a field that is ignored."""
-    values = message.to_dict().values()
-    return all(isfinite(value) for value in values if isinstance(value, float))
+    return all(
+        isfinite(number)
+        for value in message.to_dict().values()
+        for number in (value if isinstance(value, list) else [value])
+        if isinstance(number, float)
+    )
 
 
 def _off_centre(message: m.ManualControl | m.RcChannelsOverride) -> bool:

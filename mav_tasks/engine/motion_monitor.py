@@ -68,7 +68,12 @@ class MotionMonitor:
         self.rebooted = False
 
     def _is_newer(self, message: Attitude | LocalPositionNed) -> bool:
-        last = self._last_boot_ms.get(message.id, message.time_boot_ms)
+        last = self._last_boot_ms.get(message.id)
+        if last is None:
+            self._last_boot_ms[message.id] = message.time_boot_ms
+            return True
+        if last == message.time_boot_ms:
+            return False  # the same again, by a net or an estimator that repeats it
         back = (last - message.time_boot_ms) & 0xFFFFFFFF  # the field overflows after 49 days
         if 0 < back < 0x80000000:
             if back < REBOOT:

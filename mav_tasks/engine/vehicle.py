@@ -27,7 +27,7 @@ from mav_tasks.tasks.task import TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
-LATE_REQUESTS = 1.5  # s after a STOP, in which requests that left before it may still arrive
+LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -70,7 +70,7 @@ class Vehicle:
         self._monitor = HeartbeatMonitor(
             heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
         )
-        self.control.heard(armed=self._monitor.armed, mode=self._monitor.custom_mode)
+        self.control.heard(armed=self._monitor.armed, mode=self._monitor.custom_mode, now=now)
         self._authority = Authority(persona, may_arm=may_arm)
         self._next_tick = inf
         self._was_heard = True
@@ -121,14 +121,15 @@ class Vehicle:
         was_armed, was_mode = self._monitor.armed, self._monitor.custom_mode
         self._monitor.receive(heartbeat, now=now)
         armed, mode = self._monitor.armed, self._monitor.custom_mode
-        self.control.heard(armed=armed, mode=mode)
+        self.control.heard(armed=armed, mode=mode, now=now)
         if not self._was_heard:
             self._heard_again(now=now)
         if mode != was_mode:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
             self._disarmed(now=now)
-        if armed and mode == self.persona.manual_mode and self.control.phase is Phase.ASKING_MODE:
+        by_hand = self.persona.manual_mode in (was_mode, mode)
+        if armed and by_hand and self.control.phase is Phase.ASKING_MODE:
             self._take_over("armed to be driven by hand", now=now)
         if not self._is_ticking:
             self.step(now=now)
@@ -164,6 +165,7 @@ class Vehicle:
         if self.control.phase is Phase.STOPPING or self.control.may_have_disarmed(now=now):
             return
         self._authority.withdraw_arming()
+        self._zero_what_is_kept()
         self._take_over("disarmed", now=now)
 
     def _rebooted(self, *, now: float) -> None:
@@ -185,6 +187,11 @@ class Vehicle:
         if self.tasks.begun is not None and self.tasks.paused is not TaskReason.TAKEOVER:
             self._note(f"taken over: {what}", now=now)
             self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
+
+    def _zero_what_is_kept(self) -> None:
+        """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
+        if self.control.phase in (Phase.ASKING_ARM, Phase.CONTROL):
+            self.requests.send_zero()
 
     def _note_component(self, component_id: int, *, now: float) -> None:
         if component_id in self._own_components:
@@ -212,8 +219,9 @@ class Vehicle:
         # an autopilot answers for every component that is not there, and does as it was told
         target = asked if asked in self._own_components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
-        if disarms and self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
+        if disarms and self.control.is_engaged and self.control.phase is not Phase.STOPPING:
             self._authority.withdraw_arming()
+            self._zero_what_is_kept()
             self._take_over("disarmed by a client", now=now)
         self.requests.relay(
             packet, message, origin, component=target, command=command, urgent=disarms, now=now
@@ -248,8 +256,7 @@ class Vehicle:
     def sticks_moved(self, *, now: float) -> None:
         """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""
         self._authority.note_other(now=now)
-        if self.control.phase in (Phase.ASKING_ARM, Phase.CONTROL):
-            self.requests.send_zero()
+        self._zero_what_is_kept()
         self._take_over("driven by hand", now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:

@@ -97,7 +97,7 @@ class VehicleSide:
             if message is None:  # what cannot be verified changes nothing
                 return None
         if self._is_intruder(packet):
-            self._note_intruder(packet, message, now=now)
+            self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.vehicles.get(packet.system_id)
         if vehicle is None:
@@ -157,6 +157,8 @@ class VehicleSide:
         """A first heartbeat: from an autopilot that we can drive, it is a new vehicle."""
         if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
             return None
+        if packet.system_id in (0, self._our_address.system_id):
+            return None  # 0 would address every vehicle, and our own id is no vehicle's
         persona = persona_of(heartbeat)
         if persona is None:
             self._note_once(
@@ -204,11 +206,14 @@ class VehicleSide:
     def _is_intruder(self, packet: Packet) -> bool:
         return packet.source == self._our_address or packet.message_id in SETPOINTS
 
-    def _note_intruder(self, packet: Packet, message: m.Message | None, *, now: float) -> None:
+    def _note_intruder(
+        self, link: str, packet: Packet, message: m.Message | None, *, now: float
+    ) -> None:
         """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
         target = getattr(message, "target_system", 0)
         for vehicle in self:
-            if target in (0, vehicle.system_id):
+            place = self._router.place_of(vehicle.system_id)
+            if target in (0, vehicle.system_id) and place is not None and place[0] == link:
                 vehicle.second_controller(packet.source, now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:

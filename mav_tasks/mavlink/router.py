@@ -18,7 +18,3 @@ class Router:
     def place_of(self, system_id: int) -> Place | None:
         """Give where a system was heard."""
         return self._places.get(system_id)
-
-    def systems(self) -> list[int]:
-        """Give all systems known."""
-        return list(self._places)

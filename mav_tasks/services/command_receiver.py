@@ -17,7 +17,7 @@ SAME_PACKET = 5.0  # s, the very same packet again: the same answer (rule 1)
 CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters: the same task (rule 3)
 SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce: the same task (rule 5)
 REMEMBERED = 256  # packets of one client, for rule 1
-NONCES = 10_000  # remembered for each client address, for rule 2
+NONCES = 2_000  # remembered for each client address, for rule 2
 
 
 class Command(NamedTuple):

@@ -19,6 +19,7 @@ from mav_tasks.services.retry import Retry
 
 REPEAT = 0.25  # s, between our own repeats
 LATE = 0.4  # s, during which acks of a command given up are still expected
+KEPT_LANES = 16  # beyond these, idle ones are forgotten
 MAX_WAITING = 16  # commands of one id; more are answered "busy" at once
 
 
@@ -157,6 +158,14 @@ class CommandSender:
                 lane.waiting.remove(request)
                 self._answer(request, None)
             self._advance(lane, now=now)
+        if len(self._lanes) > KEPT_LANES:
+            self._forget_idle_lanes(now)
+
+    def _forget_idle_lanes(self, now: float) -> None:
+        """Keep no lane that means nothing any more: a client can name 65,536 of them."""
+        for key, lane in list(self._lanes.items()):
+            if lane.in_flight is None and not lane.waiting and now >= lane.quiet_until:
+                del self._lanes[key]
 
     def next_deadline(self) -> float | None:
         """Give when ``handle_deadline`` has something to do."""
@@ -182,6 +191,8 @@ class CommandSender:
         return Address(ack.target_system, ack.target_component).reaches(asker)
 
     def _enqueue(self, request: _Request, *, now: float, urgent: bool) -> None:
+        if len(self._lanes) > KEPT_LANES:
+            self._forget_idle_lanes(now)
         lane = self._lanes.setdefault(request.lane, _Lane())
         if urgent:
             if lane.in_flight is not None:

@@ -25,6 +25,8 @@ RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show H
 #: s after a request was last sent in which what it asks for may still come true: a copy of it may
 #: be late on the net. Longer, and a person who does the same would be taken for it.
 LATE = 0.3
+UNANSWERED = 0.3  # s after which a request without an answer was heard, or lost
+AWAITED = 1.5  # s, the longest until a 1 Hz heartbeat shows what a disarming has done
 
 
 class Phase(Enum):
@@ -65,6 +67,10 @@ class OffboardControl:
         self._watch = watch
         self._armed = False
         self._mode = -1
+        #: whether a heartbeat shows what became of the last mode or disarm request of ours
+        self._is_settled = True
+        self._settles_at = -inf  # a heartbeat from then on was sent after the request was heard
+        self._last_was_awaited = False  # the latest heartbeat was the first to show it
         self._outgoing: list[Message] = []
         self._ask_until = -inf  # our mode or arming is asked for until then
         self._ask_again_at: float | None = None  # a refused request is repeated then
@@ -90,27 +96,40 @@ class OffboardControl:
 
     @property
     def _in_our_mode(self) -> bool:
-        return self._mode == self._persona.control_mode
+        return self._is_settled and self._mode == self._persona.control_mode
+
+    @property
+    def _in_hold(self) -> bool:
+        return self._is_settled and self._mode == self._persona.hold_mode
 
     def may_have_set(self, mode: int, *, now: float) -> bool:
         """Whether a change to this mode can be our own doing."""
         self._note_requests(now)
-        if mode == self._persona.hold_mode:
-            return now - self._hold_at <= LATE
-        return mode == self._persona.control_mode and now - self._control_at <= LATE
+        if mode not in (self._persona.hold_mode, self._persona.control_mode):
+            return False
+        asked_at = self._hold_at if mode == self._persona.hold_mode else self._control_at
+        return now - asked_at <= LATE or (self._last_was_awaited and asked_at > -inf)
 
     def may_have_disarmed(self, *, now: float) -> bool:
         """Whether a disarming just seen can be our own doing."""
         self._note_requests(now)
-        return now - self._disarm_at <= LATE
+        since = now - self._disarm_at
+        return since <= LATE or (self._last_was_awaited and since <= AWAITED)
 
     def take_messages(self) -> list[Message]:
         """Give the setpoints to send since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 
-    def heard(self, *, armed: bool, mode: int) -> None:
-        """Take in what a HEARTBEAT of the vehicle says."""
+    def heard(self, *, armed: bool, mode: int, now: float) -> None:
+        """Take in what a HEARTBEAT of the vehicle says.
+
+        One that may have left before our last request was heard proves nothing about it: at 1 Hz
+        the last known mode is up to a second old.
+        """
+        self._last_was_awaited = not self._is_settled
+        if now >= self._settles_at:
+            self._is_settled = True
         if self._armed and not armed:
             self.we_armed = False
         self._armed = armed
@@ -119,6 +138,7 @@ class OffboardControl:
     def answered(self, answer: Answered, *, now: float) -> None:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
         if answer.ack is not None and answer.ack.result == MavResult.ACCEPTED:
+            self._settles_at = min(self._settles_at, now)
             return
         asked = {
             Phase.ASKING_MODE: MavCmd.DO_SET_MODE,
@@ -192,7 +212,9 @@ class OffboardControl:
                     self._release_until = now + STAND_UNSEEN
                 if still or now >= self._release_until:
                     self.begin_release(now=now)
-            case Phase.RELEASING if self._mode == self._persona.hold_mode:
+            case Phase.STOPPING:  # continued before it was confirmed
+                self.begin_release(now=now)
+            case Phase.RELEASING if self._in_hold:
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self._end_release(disarm=disarm, now=now)
             case Phase.RELEASING if now >= self._ask_until and not self._in_our_mode:
@@ -211,6 +233,7 @@ class OffboardControl:
         self.phase = Phase.RELEASING
         self.refused = None
         self._ask_until = now + RELEASE_LIMIT
+        self._unsettle(now)
         self._send_setpoint(0.0, 0.0)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
@@ -220,6 +243,7 @@ class OffboardControl:
             self._sender.cancel(self._target.component_id, command, now=now)
         self.phase = Phase.STOPPING
         self.refused = None
+        self._unsettle(now)
         self._send_setpoint(0.0, 0.0)
         self._request_hold(now=now, again_after=STOP_REPEAT)
 
@@ -232,7 +256,7 @@ class OffboardControl:
         self._note_requests(now)
         if self.phase is not Phase.STOPPING:
             return
-        if heard and still and self._mode == self._persona.hold_mode:
+        if heard and still and self._in_hold:
             self._withdraw_requests()
             self.phase = Phase.IDLE
             return
@@ -290,6 +314,7 @@ class OffboardControl:
 
     def _ask_mode(self, *, now: float) -> None:
         self._control_at = now
+        self._unsettle(now)
         self._request(
             self._mode_request(self._persona.control_mode), until=self._ask_until, now=now
         )
@@ -302,6 +327,7 @@ class OffboardControl:
         if disarm and self.we_armed and self._armed:
             self.phase = Phase.DISARMING
             self._disarm_at = now
+            self._unsettle(now)
             disarming = self._command(MavCmd.COMPONENT_ARM_DISARM, 0.0)
             self._request(disarming, until=now + self._watch.ask_vehicle, now=now, urgent=True)
         else:
@@ -312,6 +338,11 @@ class OffboardControl:
         self._next_hold_at = now + again_after
         until = now + self._watch.ask_vehicle
         self._request(self.hold_request(), until=until, now=now, urgent=True)
+
+    def _unsettle(self, now: float) -> None:
+        """What the next heartbeats say may be from before the request that leaves now."""
+        self._is_settled = False
+        self._settles_at = now + UNANSWERED
 
     def _request(
         self, command: CommandLong, *, until: float, now: float, urgent: bool = False

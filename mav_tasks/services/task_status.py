@@ -7,6 +7,7 @@ for. It keeps ids only; what is sent is the state at the time of sending.
 from mav_tasks.services.statustext import RateLimit
 
 BURST = 20
+MOST = 1000  # tasks whose news waits to be told to one client
 SHORTEST = 0.05  # s between reports of one task to one client
 
 
@@ -24,6 +25,8 @@ class TaskStatusSender:
     def changed(self, task_id: int) -> None:
         """Note that a task's state changed; telling it twice before it is sent counts once."""
         self._changed[task_id] = None
+        if len(self._changed) > MOST:  # the oldest news; a request still shows that task
+            del self._changed[next(iter(self._changed))]
 
     def set_interval(self, interval: float | None, *, now: float) -> None:
         """Stream active tasks every ``interval`` seconds; None: not at all."""

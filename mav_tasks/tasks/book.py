@@ -7,9 +7,10 @@ Events are numbered from 1; the store reports back up to which number they are d
 from collections import deque
 from dataclasses import replace
 
+from mav_tasks.errors import Rejection
 from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
-from mav_tasks.tasks.task import Draft, Progress, Task, TaskId
+from mav_tasks.tasks.task import MAX_TASK_ID, Draft, Progress, Task, TaskId
 
 KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
 
@@ -22,6 +23,7 @@ class TaskBook:
         self._tasks: dict[TaskId, Task] = {}
         self._last_event: dict[TaskId, int] = {}
         self._finished: deque[TaskId] = deque()
+        self._counts: dict[int, list[int]] = {}  # by vehicle, then by state
         self._events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
         self.durable = 0  # number of the last event known to be durable
@@ -40,12 +42,17 @@ class TaskBook:
         """Give every task that is kept, oldest first."""
         return tuple(self._tasks.values())
 
-    def of_vehicle(self, vehicle: int) -> list[Task]:
-        """Give the tasks of one vehicle, oldest first."""
-        return [task for task in self._tasks.values() if task.vehicle == vehicle]
+    def counts(self, vehicle: int) -> list[int]:
+        """Give how many tasks of a vehicle are in each state; the index is the TaskState."""
+        return list(self._counts.get(vehicle, [0] * len(TaskState)))
 
     def submit(self, draft: Draft, *, now: float) -> Task:
-        """Turn a draft into a queued task with an id never used before."""
+        """Turn a draft into a queued task with an id never used before.
+
+        Rejection(QUOTA) when there are none left: a float32 parameter could not name it.
+        """
+        if self._next_id > MAX_TASK_ID:
+            raise Rejection(TaskReason.QUOTA, "no task id is left")
         task = Task(
             id=TaskId(self._next_id),
             vehicle=draft.vehicle,
@@ -58,6 +65,7 @@ class TaskBook:
         )
         self._next_id += 1
         self._tasks[task.id] = task
+        self._count(task, 1)
         self.record(TaskSubmitted(task, now))
         self._last_event[task.id] = self.recorded
         return task
@@ -83,6 +91,8 @@ class TaskBook:
             progress=old.progress if progress is None else progress,
         )
         self._tasks[task_id] = task
+        self._count(old, -1)
+        self._count(task, 1)
         self.record(
             TaskChanged(
                 task_id=task_id,
@@ -108,6 +118,7 @@ class TaskBook:
     def withdraw(self, task_id: TaskId, *, now: float) -> None:
         """Take back a submission that did not become durable in time."""
         task = self._tasks.pop(task_id)
+        self._count(task, -1)
         del self._last_event[task_id]
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
 
@@ -129,5 +140,8 @@ class TaskBook:
         self._finished.append(task_id)
         if len(self._finished) > KEPT_FINISHED:
             oldest = self._finished.popleft()
-            del self._tasks[oldest]
+            self._count(self._tasks.pop(oldest), -1)
             del self._last_event[oldest]
+
+    def _count(self, task: Task, change: int) -> None:
+        self._counts.setdefault(task.vehicle, [0] * len(TaskState))[task.state] += change

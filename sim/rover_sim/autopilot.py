@@ -188,8 +188,8 @@ class Autopilot:
         return True
 
     def _announce(self, now: float) -> None:
-        """A heartbeat at once when mode or arming changed: clients wait for it."""
-        if self._flight.announce():
+        """A heartbeat at once when mode or arming changed, if this autopilot does so."""
+        if self._flight.announce() and self._persona.announces_changes:
             self._send(messages.Heartbeat.id, now)
 
     def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:

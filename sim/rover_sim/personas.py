@@ -34,6 +34,7 @@ class Persona:
     flight_sw_version: int  # AUTOPILOT_VERSION: major, minor, patch, type, a byte each
     firmware_hash: bytes  # AUTOPILOT_VERSION.flight_custom_version, 8 bytes
     parameters: tuple[Parameter, ...]
+    announces_changes: bool  # a HEARTBEAT at once when mode or arming changes, or only each second
 
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Give the mode of a number, or None if there is no such mode."""
@@ -55,6 +56,7 @@ ARDUPILOT = Persona(
     flight_sw_version=4 << 24 | 6 << 16 | 3 << 8 | 255,  # 4.6.3, official
     firmware_hash=b"3fc7011a",
     parameters=ARDUPILOT_PARAMETERS,
+    announces_changes=False,  # observed: 1 Hz
 )
 
 PERSONAS: Mapping[str, Persona] = {ARDUPILOT.name: ARDUPILOT}

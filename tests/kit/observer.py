@@ -181,7 +181,7 @@ class Observer:
     def _see_heartbeat(self, now: float, message: Any) -> None:
         armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
         if self.armed and not armed and now - self._disarm_at > OWN_REQUEST:
-            self._take_over(now, zeros=0)
+            self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
         if mode != self.mode:
             self._zero_in_mode = False
             by_us = mode == HOLD and now - self._hold_at < OWN_REQUEST

@@ -1,6 +1,7 @@
 """The virtual world of the scenarios: server, rovers and clients on one net, always observed."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import degrees, hypot, remainder
 from typing import TypeVar
 
@@ -14,7 +15,7 @@ from mav_tasks.tasks.task import Task, TaskId
 from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
 from rover_sim.kinematic import KinematicBody
-from rover_sim.personas import Mode
+from rover_sim.personas import ARDUPILOT, Mode, Persona
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.client import ACK, FakeClient
@@ -25,6 +26,13 @@ E = TypeVar("E")
 
 LOOK = 0.02  # s of virtual time between two looks at what a test waits for
 STANDS = 0.01  # m/s and rad/s
+
+
+MODE_COMMAND, SETPOINT = 76, 84  # COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED
+
+#: shows each change at once, so that a scenario's times are those of the server alone; what a
+#: second of not knowing does is test_one_hertz's
+PROMPT = replace(ARDUPILOT, announces_changes=True)
 
 
 def kinematic_body(start: Pose) -> Body:
@@ -47,6 +55,7 @@ class World(VirtualWorld):
         store: Store | None = None,
         rovers: int = 1,
         body: Callable[[Pose], Body] = kinematic_body,
+        persona: Persona = PROMPT,
     ) -> None:
         self.seed = seed
         self.watched = ObservedNet(seed=seed, conditions=conditions or Conditions())
@@ -58,7 +67,7 @@ class World(VirtualWorld):
         self.observers: list[Observer] = []
         for number in range(1, rovers + 1):
             start = Pose(east=3.0 * (number - 1))
-            vehicle = make_vehicle(body(start), system_id=number, now=0.0)
+            vehicle = make_vehicle(body(start), system_id=number, now=0.0, persona=persona)
             link = self.net.link(f"rover{number}")
             observer = self.watched.observers[link.name] = Observer(number)
             self.rovers.append(vehicle)
@@ -148,6 +157,21 @@ class World(VirtualWorld):
 
         self.watched.loses = loses
         return lost
+
+    def lose_next_towards(self, name: str, count: int) -> list[int]:
+        """Lose the next datagrams to a rover; gives a list that is empty once all are lost."""
+        left = [count]
+
+        def loses(source: str, target: str, data: bytes) -> bool:
+            if target != name or not left or data[7] not in (MODE_COMMAND, SETPOINT):
+                return False
+            left[0] -= 1
+            if left[0] == 0:
+                left.clear()
+            return True
+
+        self.watched.loses = loses
+        return left
 
     def from_vehicle_side(self, data: bytes, *, peer: str = "stranger") -> None:
         """Let a datagram reach the server's vehicle link."""
@@ -240,12 +264,12 @@ class ObservedNet(MemoryNet):
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Show what the server sends to a rover."""
-        if self.loses(source, target, data):
-            return
         if source == VEHICLE_LINK and target in self.observers:
             self.observers[target].sent(self.now, data)
         elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
             self.observers[f"rover{data[5]}"].answered(self.now, data)
+        if self.loses(source, target, data):
+            return
         super().send(source, target, data)
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:

@@ -1,6 +1,7 @@
 """A simulated rover in virtual time with clients on its link; no socket, no sleep."""
 
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from typing import TypeVar
 
 from mav_tasks.mavlink import messages as m
@@ -11,8 +12,11 @@ from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import BodyState, Pose
 from rover_sim.kinematic import KinematicBody
+from rover_sim.personas import ARDUPILOT
 from rover_sim.vehicle import make_vehicle
 
+#: shows each change at once, so that a test need not wait for the next second
+PROMPT = replace(ARDUPILOT, announces_changes=True)
 CLIENT = Address(250, 191)
 ROVER = Address(1, 1)
 ORIGIN = Pose()
@@ -34,7 +38,7 @@ class Rig:
     def __init__(self, *, start: Pose = ORIGIN, slip: float = 0.3, wait: float = READY) -> None:
         self.now = 1000.0
         body = KinematicBody(start=start, slip=slip, seed=None)
-        self.vehicle = make_vehicle(body, system_id=1, now=self.now)
+        self.vehicle = make_vehicle(body, system_id=1, persona=PROMPT, now=self.now)
         self.autopilot = self.vehicle.autopilot
         self.heard: list[Message] = []
         self._decoder = Decoder()

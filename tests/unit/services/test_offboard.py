@@ -9,7 +9,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandLong, Message, SetPositionTargetLocalNed
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_sender import CommandSender
-from mav_tasks.services.offboard import OffboardControl, Phase, Refused
+from mav_tasks.services.offboard import UNANSWERED, OffboardControl, Phase, Refused
 from mav_tasks.services.persona import ARDUPILOT
 from mav_tasks.settings import Watch
 
@@ -32,7 +32,8 @@ class Rig:
     def hear(self, *, armed: bool | None = None, mode: int | None = None) -> None:
         self.armed = self.armed if armed is None else armed
         self.mode = self.mode if mode is None else mode
-        self.control.heard(armed=self.armed, mode=self.mode)
+        # late enough to have been sent after the last request was heard
+        self.control.heard(armed=self.armed, mode=self.mode, now=self.now + UNANSWERED)
 
     @property
     def phase(self) -> Phase:

@@ -2,12 +2,12 @@
 
 import pytest
 
-from mav_tasks.errors import IllegalTransition
+from mav_tasks.errors import IllegalTransition, Rejection
 from mav_tasks.tasks import book as book_module
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Progress, Task, TaskId
+from mav_tasks.tasks.task import MAX_TASK_ID, Progress, Task, TaskId
 from tests.unit.tasks.samples import ORIGIN, SOMEBODY, draft
 
 S, R = TaskState, TaskReason
@@ -119,12 +119,23 @@ def test_a_withdrawn_submission_never_was_a_task() -> None:
     assert book.take_events() == [TaskWithdrawn(TaskId(1), 1, 1.4)]
 
 
-def test_tasks_are_given_oldest_first_and_by_vehicle() -> None:
+def test_tasks_are_given_oldest_first_and_counted_by_vehicle_and_state() -> None:
     book = TaskBook()
     for vehicle in (1, 2, 1):
         book.submit(draft(vehicle=vehicle), now=0.0)
+    book.change(TaskId(3), TaskState.STARTING, reason=TaskReason.NONE, actor="x", now=1.0)
     assert [task.id for task in book.all()] == [1, 2, 3]
-    assert [task.id for task in book.of_vehicle(1)] == [1, 3]
+    counts = [0] * len(TaskState)
+    counts[TaskState.QUEUED] = counts[TaskState.STARTING] = 1
+    assert (book.counts(1), sum(book.counts(2)), sum(book.counts(9))) == (counts, 1, 0)
+
+
+def test_when_the_ids_are_used_up_nothing_more_is_taken() -> None:
+    book = TaskBook(next_id=MAX_TASK_ID)
+    assert book.submit(draft(), now=0.0).id == MAX_TASK_ID
+    with pytest.raises(Rejection) as refusal:
+        book.submit(draft(), now=0.0)
+    assert refusal.value.reason == TaskReason.QUOTA
 
 
 def test_the_oldest_finished_are_forgotten_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:

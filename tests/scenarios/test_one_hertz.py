@@ -1,0 +1,181 @@
+"""A real ArduPilot says its mode and arming once a second and no sooner: nothing old is believed.
+
+The last HEARTBEAT may be a second old, so what it shows can be from before our last request.
+"""
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.links.memory import Conditions
+from mav_tasks.tasks.events import QueuePaused
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.client import ACCEPTED, AUTO, HOLD, set_mode
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+
+@pytest.fixture
+def world(make_world: MakeWorld) -> World:
+    return make_world(persona=ARDUPILOT)
+
+
+def test_three_tasks_are_driven_and_the_rover_is_handed_back(world: World) -> None:
+    world.client.move(1.0, priority=3)
+    world.run(0.2)
+    world.client.rotate(90, priority=5)
+    world.client.move(0.5, priority=8)
+    world.until_idle(tasks=3)
+    assert near_pose(world.pose(), (1.5, 0.0, 90.0), metres=0.04)
+    world.until(lambda: not world.rover.autopilot.armed, within=3)
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.1, 0.3, 0.5, 0.9, 1.3])
+def test_a_task_right_after_the_last_is_no_takeover(world: World, pause: float) -> None:
+    world.client.move(0.3)
+    world.until(lambda: world.state(1)[0] is S.COMPLETED, within=20)
+    world.run(pause)
+    world.client.move(0.3)
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert world.events(QueuePaused) == []
+
+
+@pytest.mark.parametrize("after", [0.1, 0.3, 0.5, 1.3])
+@pytest.mark.parametrize("how", ["pause", "hold"])
+def test_continue_soon_after_a_pause_goes_on_to_the_same_end(
+    world: World, how: str, after: float
+) -> None:
+    world.client.move(1.5)
+    world.until_state(1, S.EXECUTING)
+    world.run(1.0)
+    if how == "pause":
+        world.client.pause()
+    else:
+        world.client.command(176, 1, HOLD, target=(1, 1))
+    world.run(after)
+    world.client.proceed()
+    world.until_idle(tasks=1)
+    assert near_pose(world.pose(), (1.5, 0.0, 0.0))
+    assert [e.reason for e in world.events(QueuePaused)] == [R.OPERATOR]
+
+
+@pytest.mark.parametrize("after", [0.1, 0.3, 0.5, 1.5])
+def test_continue_soon_after_stop_lets_the_next_task_run(world: World, after: float) -> None:
+    world.client.move(20)
+    world.until_state(1, S.EXECUTING)
+    waiting = world.client.move(0.3)
+    world.run(1.0)
+    world.client.stop()
+    world.run(after)
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert waiting.task_id == 2
+    assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
+
+
+def test_continue_before_stop_is_confirmed_still_sees_it_through(world: World) -> None:
+    world.operator_mode(Mode.AUTO)
+    world.operator_arm(True)
+    world.run(3.0)
+    world.client.stop()
+    world.run(0.2)
+    world.client.proceed()
+    world.until(world.stands, within=4)
+    world.until(lambda: world.control() == "IDLE", within=4)
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("deed", ["STOP", "HOLD"])
+def test_an_old_hold_is_not_taken_for_the_answer(world: World, deed: str) -> None:
+    """HOLD was seen; AUTO was set since, and the next heartbeat has not shown it yet."""
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(2.5)
+    assert world.client.command(176, 1, AUTO, target=(1, 1)) is not None
+    world.run(0.1)
+    lost = world.lose_next_towards("rover1", 2)  # zero and HOLD
+    if deed == "STOP":
+        world.client.stop()
+    else:
+        world.client.command(176, 1, HOLD, target=(1, 1))
+    world.until(world.stands, within=6)
+    world.run(3.0)
+    assert lost == []
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("who", ["client", "operator"])
+def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
+    world: World, who: str
+) -> None:
+    world.client.move(20, speed=1.0)
+    world.until_state(1, S.EXECUTING)
+    world.run(3.0)
+    if who == "client":
+        assert world.client.command(400, 0, target=(1, 1)).message.command == 400
+    else:
+        world.operator_arm(False)
+    world.until(world.stands, within=6)
+    where = world.pose()
+    world.operator_arm(True)
+    world.run(4.0)
+    assert near_pose(world.pose(), where)
+    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+
+
+def test_a_rover_armed_by_hand_while_its_mode_is_asked_for_is_not_driven(world: World) -> None:
+    world.client.move(1.0)
+    world.until_state(1, S.STARTING)
+    world.operator_arm(True)
+    world.run(4.0)
+    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert near_pose(world.pose(), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
+    bad = Conditions(delay=0.005, jitter=0.08, loss=0.1, duplication=0.05)
+    world = make_world(seed=seed, conditions=bad, persona=ARDUPILOT)
+    patient = tuple(k * 0.5 for k in range(10))
+    world.client.move(0.6, repeats=patient, nonce=1)
+    world.run(1.0)
+    world.client.rotate(45, repeats=patient, nonce=2)
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_while_stopped_only_what_asks_and_what_disarms_passes(world: World) -> None:
+    world.client.stop()
+    world.run(2.0)
+    for command in (218, 262, 252, 222, 183, 187, 32, 33, 43000, 300, 20, 2600, 185, 246):
+        sent = world.client.command(command, 1, target=(1, 1))
+        world.run(0.6)
+        assert sent.ack is not None
+        assert (sent.ack.result, sent.ack.result_param2) == (1, R.STOPPED), command
+    disarm = world.client.command(400, 0, target=(1, 1))
+    world.run(0.6)
+    assert disarm.ack is not None
+    assert disarm.ack.result == ACCEPTED
+
+
+@pytest.mark.parametrize("system_id", [0, 250])
+def test_a_heartbeat_of_everybody_or_of_ourselves_makes_no_vehicle(
+    world: World, system_id: int
+) -> None:
+    mav = common.MAVLink(None, srcSystem=system_id, srcComponent=1)
+    world.from_vehicle_side(common.MAVLink_heartbeat_message(10, 3, 1, 4, 4, 3).pack(mav))
+    world.run(1.0)
+    assert [v.system_id for v in world.server.engine.snapshot(now=world.now).vehicles] == [1]
+
+
+def test_mode_requests_by_the_old_message_are_heeded_too(world: World) -> None:
+    world.client.move(2.0)
+    world.until_state(1, S.EXECUTING)
+    world.run(1.0)
+    world.client.send(set_mode(HOLD))
+    world.until(world.stands, within=4)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
