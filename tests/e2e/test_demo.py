@@ -1,6 +1,8 @@
 """./tools/demo, as the README has it."""
 
+import os
 import re
+import signal
 import subprocess
 from pathlib import Path
 
@@ -9,7 +11,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def demo(*options: str) -> subprocess.CompletedProcess[str]:
+def demo(
+    *options: str, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run ./tools/demo to its end."""
     return subprocess.run(
         [str(ROOT / "tools/demo"), *options],
@@ -17,6 +21,7 @@ def demo(*options: str) -> subprocess.CompletedProcess[str]:
         text=True,
         timeout=120,
         check=False,
+        env=environment,
     )
 
 
@@ -44,3 +49,32 @@ def test_the_window_cannot_be_had_in_virtual_time() -> None:
     done = demo("--gui", "--fast")
     assert done.returncode == 2
     assert "--gui" in done.stdout
+
+
+@pytest.mark.timeout(60)
+def test_a_part_that_cannot_run_is_named_at_once(tmp_path: Path) -> None:
+    (tmp_path / "pybullet.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    for options in (("--body", "bullet"), ("--fast", "--body", "bullet")):
+        done = demo(*options, environment=environment)
+        assert done.returncode == 2, done.stdout + done.stderr
+        assert "mav-tasks[sim]" in done.stdout.strip().splitlines()[-1]
+        assert "Traceback" not in done.stderr
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("after", [0.3, 4.0])
+def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
+    running = subprocess.Popen(
+        [str(ROOT / "tools/demo"), "--body", "kinematic"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    with pytest.raises(subprocess.TimeoutExpired):
+        running.wait(after)
+    os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to all of the group
+    output, _ = running.communicate(timeout=20)
+    assert running.returncode in (130, -signal.SIGINT)
+    assert "Traceback" not in output

@@ -27,6 +27,17 @@ def test_the_first_starts_at_once_and_then_the_more_urgent_runs_first(world: Wor
     assert near_pose(world.pose(), (2.0, 1.5, 90.0), metres=0.04)
 
 
+def test_of_those_that_wait_a_later_one_overtakes_if_it_is_more_urgent(world: World) -> None:
+    world.client.move(0.5, priority=3)
+    world.run(0.1)
+    world.client.move(-0.5, priority=5)
+    world.client.rotate(90, priority=8)
+    world.until_idle(tasks=3)
+
+    finished = [e.task_id for e in world.events(TaskChanged) if e.new is S.COMPLETED]
+    assert finished == [1, 3, 2]
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_all_of_it_is_done_in_order_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
     world = make_world(seed=seed, conditions=BAD_NET)

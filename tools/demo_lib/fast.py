@@ -34,6 +34,7 @@ def drive(screen: Screen, *, body: str, seed: int) -> tuple[ThirdParty, list[Pla
     world.watch(follow)
     if not world.run_until(lambda: member.party.is_over, within=TIME_LIMIT):
         screen.say(f"gave up after {TIME_LIMIT:.0f} s of virtual time")
+    screen.update(member.party)
     vehicle.body.close()
     return member.party, track
 

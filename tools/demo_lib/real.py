@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -40,14 +40,19 @@ def drive(screen: Screen, *, body: str, gui: bool, seed: int) -> tuple[ThirdPart
         server = [sys.executable, "-m", "mav_tasks.cli", "serve"]
         server += ["--client", f"udpin:127.0.0.1:{client_port}"]
         server += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
-        with process(rover, Path(folder) / "rover.log"), process(server, Path(folder) / "log"):
+        with (
+            process(rover, Path(folder) / "rover.log") as check_rover,
+            process(server, Path(folder) / "server.log") as check_server,
+        ):
             screen.say(f"rover: {body} body on UDP {rover_port}; server on UDP {client_port}")
-            screen.say("a QGroundControl on this machine sees the rover now")
-            party = _watch(screen, client_port, truth_file)
+            screen.say("a QGroundControl on this machine will see the rover")
+            party = _watch(screen, client_port, truth_file, (check_rover, check_server))
         return party, read_track(truth_file)
 
 
-def _watch(screen: Screen, port: int, truth_file: Path) -> ThirdParty:
+def _watch(
+    screen: Screen, port: int, truth_file: Path, checks: tuple[Callable[[], None], ...]
+) -> ThirdParty:
     link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=255)
     try:
         party = ThirdParty(link.mav, lambda: read_track(truth_file)[-1], screen.say)
@@ -65,6 +70,8 @@ def _watch(screen: Screen, port: int, truth_file: Path) -> ThirdParty:
             if now >= next_refresh:
                 next_refresh = now + REFRESH
                 screen.update(party)
+                for check in checks:
+                    check()
         screen.update(party)
         return party
     finally:
@@ -72,14 +79,22 @@ def _watch(screen: Screen, port: int, truth_file: Path) -> ThirdParty:
 
 
 @contextmanager
-def process(command: list[str], log: Path) -> Iterator[None]:
-    """Run a process while the block runs; afterwards ask it to end, and see that it did."""
+def process(command: list[str], log: Path) -> Iterator[Callable[[], None]]:
+    """Run a process while the block runs; afterwards ask it to end, and see that it did.
+
+    Gives a check that raises DemoError, with the process's last words, once it is gone.
+    """
     with log.open("wb") as output:
         running = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
-    try:
-        yield
+
+    def check() -> None:
         if running.poll() is not None:
-            raise DemoError(f"{' '.join(command[1:3])} ended early: {_last_line(log)}")
+            name, code = " ".join(command[1:3]), running.returncode
+            raise DemoError(f"{name} ended early, exit code {code}: {_last_line(log)}")
+
+    try:
+        yield check
+        check()
     finally:
         if running.poll() is None:
             running.send_signal(signal.SIGTERM)

@@ -63,7 +63,7 @@ def _table(tasks: list[Seen]) -> Table:
             str(task.task_id or "-"),
             f"{leg.name} {leg.amount:g} {leg.unit}",
             str(leg.priority),
-            STATES[task.state] + ("" if over or task.state >= EXECUTING else ahead),
+            (STATES[task.state] if task.state else "-") + ("" if over else ahead),
             ProgressBar(total=100, completed=task.progress, width=24),
         )
     return table

@@ -127,8 +127,9 @@ class ThirdParty:
                 self._positions += 1
             case "COMMAND_ACK" if message.command in (TASK_MOVE, TASK_ROTATE):
                 self._take_ack(message)
-            case "STATUSTEXT":
-                self.say(f"rover says: {message.text}")
+            case "STATUSTEXT" if not message.text.startswith("Task "):  # TASK_STATUS says it
+                who = "server" if message.get_srcComponent() == TASK_SERVER else "rover"
+                self.say(f"{who} says: {message.text}")
             case "UNKNOWN_54000":
                 self._take_status(message)
 

@@ -111,6 +111,6 @@ def test_a_change_of_mode_is_seen_with_the_next_beat_and_no_sooner() -> None:
             if isinstance(message, m.Heartbeat):
                 seen.append((now, message.custom_mode))
     assert [late - early for (early, _), (late, _) in pairwise(seen)] == pytest.approx(
-        [1.0] * (len(seen) - 1)
+        [1.0] * (len(seen) - 1), abs=0.03
     )
     assert [mode for at, mode in seen if at > 90 * 0.025] == [4, 4]
