@@ -6,8 +6,7 @@
     ├── UsageError            the operator can mend it: one clear line, exit code 2
     │   ├── LinkUrlError      a link URL that says nothing we can open
     │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
-    │   ├── InsecureLinkError a link beyond loopback without a key
-    │   └── MissingExtraError an optional package is not installed
+    │   └── InsecureLinkError a link beyond loopback without a key
     ├── Rejection             a request refused: reason code and words for the client
     ├── StoreError            the journal cannot be read or written
     └── IllegalTransition     our own mistake: a move that the lifecycle table lacks
@@ -34,10 +33,6 @@ class LinkOpenError(UsageError):
 
 class InsecureLinkError(UsageError):
     """A link reachable from other machines, without a signing key."""
-
-
-class MissingExtraError(UsageError):
-    """An optional dependency is missing; the text names the extra to install."""
 
 
 class Rejection(MavTasksError):

@@ -151,7 +151,7 @@ class Vehicle:
             self._rebooted(now=now)
         elif not ours and was_mode != booting:
             self._authority.withdraw_arming()
-            self._take_over(f"mode changed to {mode}", now=now)
+            self._take_over(f"mode is {self.persona.mode_name(mode)}", now=now)
 
     def _mode_changed_in_spite_of_stop(self, mode: int, *, now: float) -> None:
         """A request from before the STOP was late. Later, it is a person at the vehicle."""
@@ -238,7 +238,7 @@ class Vehicle:
         if mode == self.persona.control_mode:
             return
         if self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
-            self._take_over(f"client asks for mode {mode}", now=now)
+            self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
 
     def may_move(self, client: Hashable, *, now: float) -> bool:
         """Whether a client's motion message may pass; one that does makes tasks wait."""

@@ -46,7 +46,7 @@ class IntervalRequester:
         A wish never costs the server what it needs itself: what is refused falls back to that.
         """
         interval = max(interval, SHORTEST)
-        if message_id not in self._wanted and len(self._wanted) >= MAX_WANTED:
+        if message_id not in self._wanted and not self._has_room():
             return
         if interval < self._wanted.get(message_id, float("inf")):
             self._wanted[message_id] = interval
@@ -92,6 +92,17 @@ class IntervalRequester:
     def next_deadline(self) -> float:
         """Give when the rates are looked at again."""
         return self._check_at
+
+    def _has_room(self) -> bool:
+        """Forget a wish that the vehicle refused, if there are too many: it may be for nothing."""
+        if len(self._wanted) < MAX_WANTED:
+            return True
+        refused = next((i for i in self._refused if i not in WANTED), None)
+        if refused is None:
+            return False
+        self._refused.remove(refused)
+        del self._wanted[refused]
+        return True
 
     def _check(self, now: float) -> None:
         seconds = CHECK + now - self._check_at

@@ -1,5 +1,6 @@
 """How an autopilot wants to be spoken to: modes, setpoint masks. Recognised from its HEARTBEAT."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, PositionTargetTypemask
@@ -19,6 +20,11 @@ class Persona:
     booting_mode: int  # left without anybody's doing
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
+    mode_names: Mapping[int, str]
+
+    def mode_name(self, mode: int) -> str:
+        """Give a custom_mode in words, as ground stations show it."""
+        return self.mode_names.get(mode, f"mode {mode}")
 
 
 #: ArduPilot Rover. With the yaw rate unmasked it turns on the spot, and vx < 0 reverses; a pure
@@ -39,6 +45,22 @@ ARDUPILOT = Persona(
         | T.YAW_IGNORE
     ),
     setpoint_frame=MavFrame.BODY_NED,
+    mode_names={
+        0: "MANUAL",
+        1: "ACRO",
+        3: "STEERING",
+        4: "HOLD",
+        5: "LOITER",
+        6: "FOLLOW",
+        7: "SIMPLE",
+        8: "DOCK",
+        9: "CIRCLE",
+        10: "AUTO",
+        11: "RTL",
+        12: "SMART_RTL",
+        15: "GUIDED",
+        16: "INITIALISING",
+    },
 )
 
 

@@ -27,6 +27,7 @@ SPACING = 3.0  # m between rovers, side by side
 KINEMATIC_SLIP = 0.3  # as the pybullet rover's
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
 USAGE_ERROR = 2  # exit status, as argparse's own
+MAX_FRICTION = 5.0  # rubber on anything stays below
 ABORTED = 134  # as a shell reports SIGABRT, which is how a SITL goes
 
 
@@ -87,8 +88,16 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     add("--speed", default="real", help="'real', or simulated seconds per second")
     add("--truth", metavar="FILE", help="append the true poses at 10 Hz as CSV")
     values = parser.parse_args(arguments)
-    if values.count < 1 or not 1 <= values.system_id <= 256 - values.count:
-        parser.error("system ids must lie within 1..255")
+    if values.count < 1:
+        parser.error("--count must be 1 or more")
+    if not 1 <= values.system_id <= 256 - values.count:
+        parser.error("--system-id, and of the last of --count rovers, must lie within 1..255")
+    if not 0.0 < values.friction <= MAX_FRICTION:
+        parser.error(f"--friction must be above 0, at most {MAX_FRICTION:g}")
+    if not 0.0 <= values.friction_variation < 1.0:
+        parser.error("--friction-variation must be 0 or more, below 1")
+    if values.friction_variation and values.seed is None:
+        parser.error("--friction-variation draws by chance: it needs --seed")
     if not 0 <= values.port <= 65535:
         parser.error("--port must lie within 0..65535")
     try:

@@ -16,6 +16,8 @@ from typing import Any
 
 import pytest
 
+from rover_sim.__main__ import read_options
+
 pytestmark = pytest.mark.interop
 
 ROOT = Path(__file__).parents[2]
@@ -236,9 +238,22 @@ def test_missing_pybullet_is_one_clear_line(tmp_path: Path) -> None:
     assert "--body kinematic" in line
 
 
-def test_bad_options_are_refused() -> None:
-    for bad in (("--count", "0"), ("--system-id", "255", "--count", "2"), ("--speed", "never")):
-        result = subprocess.run(
-            command(*bad), env=environment(), capture_output=True, timeout=LIMIT, check=False
-        )
-        assert result.returncode == 2
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--count", "0"), "--count"),
+        (("--system-id", "255", "--count", "2"), "--system-id"),
+        (("--speed", "never"), "--speed"),
+        (("--friction", "-1"), "--friction"),
+        (("--friction", "nan"), "--friction"),
+        (("--friction-variation", "0.3"), "--seed"),
+        (("--friction-variation", "1.5", "--seed", "1"), "--friction-variation"),
+    ],
+)
+def test_bad_options_are_refused_by_name(
+    options: tuple[str, ...], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        read_options(options)
+    assert ended.value.code == 2
+    assert named in capsys.readouterr().err.splitlines()[-1]

@@ -133,3 +133,13 @@ def test_wishes_are_bounded() -> None:
     for message_id in range(1000, 2000):
         requester.wish(message_id, 1.0)
     assert len(asked(requester, now=0.0)) == MAX_WANTED
+
+
+def test_wishes_for_what_no_vehicle_has_do_not_use_up_the_room() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    for message_id in range(1000, 2000):
+        requester.wish(message_id, 1.0)
+    asked(requester, now=0.0, accepted=False)
+    requester.wish(m.VfrHud.id + 1, 1.0)
+    assert asked(requester, now=0.0) == [m.VfrHud.id + 1]
