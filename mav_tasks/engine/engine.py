@@ -164,8 +164,12 @@ class Engine:
         from_vehicles = self._vehicles.owns(item.link)
         if not from_vehicles and not self._gcs.owns(item.link):
             return
+        counts = self._vehicles.counts if from_vehicles else self._gcs.counts
         for peer, data in item.datagrams:
-            for packet in split_datagram(data):
+            packets = split_datagram(data)
+            if len(packets) != 1 or len(packets[0].raw) != len(data):
+                counts.noise += len(data) - sum(len(packet.raw) for packet in packets)
+            for packet in packets:
                 if not from_vehicles:
                     received = self._gcs.receive(item.link, peer, packet, now=now)
                     if received is not None:

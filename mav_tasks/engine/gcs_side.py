@@ -12,7 +12,7 @@ from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.codec import Decoder, Packer, target_of
+from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatSender
@@ -46,9 +46,9 @@ class GcsSide:
         return iter(self._clients.values())
 
     @property
-    def counts(self) -> str:
-        """One line on what could be decoded."""
-        return str(self._decoder.counts)
+    def counts(self) -> DecodeCounts:
+        """What came in on these links."""
+        return self._decoder.counts
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Take a link into use, or out of it."""
@@ -80,6 +80,8 @@ class GcsSide:
             message = self._decoder.decode(packet)
             if message is None:
                 return None
+        else:
+            self.counts.unknown += 1
         client = self._clients.get((link, peer))
         if client is None:
             if message is None:  # unverified bytes make nobody a client

@@ -12,7 +12,7 @@ from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.codec import Decoder, Packer
+from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
 from mav_tasks.mavlink.enums import MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Router
@@ -62,9 +62,9 @@ class VehicleSide:
         return iter(self.vehicles.values())
 
     @property
-    def counts(self) -> str:
-        """One line on what could be decoded."""
-        return str(self._decoder.counts)
+    def counts(self) -> DecodeCounts:
+        """What came in on these links."""
+        return self._decoder.counts
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Take a link into use, or out of it."""
@@ -96,6 +96,8 @@ class VehicleSide:
             message = self._decoder.decode(packet)
             if message is None:  # what cannot be verified changes nothing
                 return None
+        elif packet.message_id not in m.ALL:
+            self.counts.unknown += 1
         if self._is_intruder(packet):
             self._note_intruder(link, packet, message, now=now)
             return None

@@ -20,11 +20,12 @@ _HEADER = Struct("<BBBBBBHB")  # of MAVLink 2, without the magic byte
 
 @dataclass(slots=True)
 class DecodeCounts:
-    """What a decoder met; packets each."""
+    """What came in, as far as it was looked at."""
 
-    decoded: int = 0
-    unknown: int = 0  # message id not in the dialect
-    corrupt: int = 0  # CRC or length wrong
+    decoded: int = 0  # packets
+    unknown: int = 0  # packets, message id not in the dialect
+    corrupt: int = 0  # packets, CRC or length wrong
+    noise: int = 0  # bytes that belong to no packet
 
 
 class Decoder:

@@ -3,8 +3,8 @@
 Rules about what the server does are judged when a packet leaves it, against what had reached it by
 then: a bad net is not its fault. protocol.md, sections 6 and 7:
 
-- a setpoint is finite; one that moves goes only to a rover seen armed and in our mode, after a zero
-  in that mode, on position and attitude not older than 0.3 s
+- a setpoint is finite; one that moves, whoever sent it, goes only to a rover seen armed; ours only
+  in our mode, after a zero in that mode, on position and attitude not older than 0.3 s
 - order: mode, zero, arm, motion; no arming in any other mode
 - our mode is taken only from HOLD, from itself, or from MANUAL while disarmed
 - motion comes at 20 Hz: no gap without a zero, no burst
@@ -12,9 +12,13 @@ then: a bad net is not its fault. protocol.md, sections 6 and 7:
   until somebody continues
 - after a takeover no more setpoints (one zero where the rover was not yet told by its mode)
 - never two sources of motion
+
+One rule is judged by the truth at the rover, when a moving setpoint of ours arrives there: it is
+armed and in our mode, unless what changed that could not be known yet.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
@@ -29,6 +33,7 @@ GAP = 0.12  # s between setpoints while driving: 20 Hz, one tick missed
 BURST = 4  # moving setpoints in 0.1 s
 ENGAGED = 0.2  # s since the last setpoint: the server is driving
 OWN_REQUEST = 3.0  # s in which a change to HOLD or disarmed follows from our own request
+KNOWN = 0.5  # s since the server heard of it: no setpoint from before is on its way any more
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
 
@@ -51,6 +56,8 @@ class Observer:
     system_id: int = 1
     #: a test that stops the server's clock expects a gap
     expects_gaps: bool = False
+    #: whether the rover is really armed and in our mode
+    is_ready: Callable[[], bool] = lambda: True
     #: seen so by the server
     armed: bool = False
     mode: int = -1
@@ -64,6 +71,7 @@ class Observer:
     _zeros_left: int = 0
     _before_continue: tuple[bool, bool] | None = None
     _zero_in_mode: bool = False
+    _unready_since: float | None = None  # of heartbeats that say so, one after the other
     _position_at: float = -1e9
     _attitude_at: float = -1e9
     _setpoint_at: float = -1e9
@@ -147,6 +155,8 @@ class Observer:
         self.reached.append((now, message.get_msgId()))
         if message.get_type() in SETPOINTS and _moves(message):
             source = (message.get_srcSystem(), message.get_srcComponent())
+            if source == SERVER and not self.is_ready() and self._is_known_unready(now):
+                self._violation(now, "moving setpoint at a rover known not to be ready for it")
             if self._last_source is not None:
                 at, before = self._last_source
                 if before != source and now - at < TWO_SOURCES:
@@ -188,6 +198,13 @@ class Observer:
             if self.mode == GUIDED and not by_us:
                 self._take_over(now, zeros=0)
         self.armed, self.mode = armed, mode
+        if armed and mode == GUIDED:
+            self._unready_since = None
+        elif self._unready_since is None:
+            self._unready_since = now
+
+    def _is_known_unready(self, now: float) -> bool:
+        return self._unready_since is not None and now - self._unready_since > KNOWN
 
     def _take_over(self, now: float, *, zeros: int) -> None:
         """Somebody else has the rover; of interest only while the server is driving."""
@@ -203,6 +220,8 @@ class Observer:
         if not all(isfinite(value) for value in values):
             self._violation(now, f"setpoint not finite: {message}")
         moves = _moves(message)
+        if moves and not self.armed:
+            self._violation(now, "moving setpoint to a rover not seen armed")
         if (message.get_srcSystem(), message.get_srcComponent()) != SERVER:
             if moves and now - self._setpoint_at < ENGAGED:
                 self._violation(now, "a client's setpoint while the server drives")
@@ -222,8 +241,6 @@ class Observer:
         self._moved_last = moves
 
     def _check_motion(self, now: float) -> None:
-        if not self.armed:
-            self._violation(now, "moving setpoint to a rover not seen armed")
         if self.mode != GUIDED:
             self._violation(now, f"moving setpoint in mode {self.mode}")
         elif not self._zero_in_mode:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import degrees, hypot, remainder
 from typing import TypeVar
 
@@ -40,6 +41,11 @@ def kinematic_body(start: Pose) -> Body:
     return KinematicBody(start=start, slip=0.1, seed=None)
 
 
+def is_ready_to_be_driven(rover: Vehicle) -> bool:
+    """Whether a rover is really armed and in the mode in which setpoints drive it."""
+    return rover.autopilot.armed and rover.autopilot.mode is Mode.GUIDED
+
+
 class World(VirtualWorld):
     """One server, one rover (or more) and one client (or more).
 
@@ -69,7 +75,9 @@ class World(VirtualWorld):
             start = Pose(east=3.0 * (number - 1))
             vehicle = make_vehicle(body(start), system_id=number, now=0.0, persona=persona)
             link = self.net.link(f"rover{number}")
-            observer = self.watched.observers[link.name] = Observer(number)
+            observer = self.watched.observers[link.name] = Observer(
+                number, is_ready=partial(is_ready_to_be_driven, vehicle)
+            )
             self.rovers.append(vehicle)
             self.observers.append(observer)
             party = RoverParty(vehicle, link)

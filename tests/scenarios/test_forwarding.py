@@ -8,12 +8,14 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
     GET_INTERVAL,
     GUIDED,
+    HOLD,
     IDS,
     REQUEST,
     SET_INTERVAL,
@@ -24,7 +26,7 @@ from tests.kit.client import (
     FakeClient,
     setpoint,
 )
-from tests.kit.world import World
+from tests.kit.world import SETPOINT, World
 from tests.scenarios.conftest import MakeWorld
 
 ATTITUDE, POSITION = 30, 32
@@ -395,6 +397,39 @@ def test_a_clients_setpoints_pass_once_it_has_asked_for_our_mode(world: World) -
     world.client.mode(GUIDED)
     world.run(3)
     assert world.truth.forward_speed > 0.3
+
+
+def test_a_clients_setpoints_do_not_reach_a_rover_that_is_not_armed(world: World) -> None:
+    """It would keep the last one, and drive off when armed."""
+    world.client.mode(GUIDED)
+    world.run(0.5)
+    world.client.stream(setpoint(0.5), rate=10)
+    world.run(2)
+    world.client.end_streams()
+    assert SETPOINT not in [kind for _, kind in world.observer.reached]
+    world.operator_arm(True)
+    world.run(2)
+    assert world.stands()
+
+
+def test_a_clients_stream_does_not_move_a_rover_that_is_being_handed_back(world: World) -> None:
+    driver = world.add_client("driver")
+    world.operator_mode(Mode.HOLD)
+    world.operator_arm(True)
+    world.run(0.5)
+    driver.mode(GUIDED)
+    world.run(0.2)
+    driver.stream(setpoint(0.5), rate=10)
+    world.run(2)
+    assert not world.stands()
+    world.fault(Faults(refuse_mode=True))
+    world.client.mode(HOLD)
+    world.run(0.1)
+    at = world.now
+    world.run(2)
+    assert world.control() == "RELEASING"
+    assert "move" not in world.observer.sent_since(at)
+    assert world.stands()
 
 
 def test_a_clients_stream_does_not_drive_the_instant_a_task_ends(world: World) -> None:

@@ -3,6 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -83,6 +84,28 @@ def test_no_motion_on_data_older_than_0_3_s(driving: World) -> None:
     world.fault(Faults())
     world.until_idle(tasks=2)
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
+
+
+@pytest.mark.parametrize("kind", [POSITION, ATTITUDE])
+def test_data_that_the_net_repeats_are_not_fresh(driving: World, kind: int) -> None:
+    world = driving
+    last: list[bytes] = []
+
+    def keeps(source: str, target: str, data: bytes) -> bool:
+        if (source, target, data[7]) == ("rover1", VEHICLE_LINK, kind):
+            last[:] = [data]
+        return False
+
+    world.watched.loses = keeps
+    world.run(0.2)
+    world.fault(Faults(withheld=frozenset({kind})))
+    at = world.now
+    for _ in range(30):
+        world.from_vehicle_side(last[0], peer="rover1")
+        world.run(0.05)
+    assert "move" in world.observer.sent_since(at)
+    assert "move" not in world.observer.sent_since(at + 0.35)
+    assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
 
 
 def test_a_position_frozen_at_rest_fails_as_stuck_before_it_gets_far(world: World) -> None:
@@ -178,6 +201,24 @@ def test_a_task_that_was_paused_when_the_rover_rebooted_is_held(driving: World) 
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
+def test_a_reboot_that_only_the_rovers_clock_tells_of_holds_the_task_too(driving: World) -> None:
+    world = driving
+    world.client.pause()
+    world.run(4)
+
+    def loses(source: str, target: str, data: bytes) -> bool:
+        return source == "rover1" and data[7] == HEARTBEAT
+
+    world.watched.loses = loses
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(1.5)
+    world.operator_mode(Mode.HOLD)  # as it was before
+    world.run(0.1)
+    world.watched.loses = lambda *_: False
+    world.run(3)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+
+
 @pytest.mark.parametrize("late", [0.55, 1.0, 2.5])
 def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: float) -> None:
     world = driving
@@ -212,6 +253,18 @@ def test_a_tick_that_is_a_little_late_changes_nothing(driving: World) -> None:
     world.suspend_server(0.1)
     world.run(0.5)
     assert world.state(1)[0] is S.EXECUTING
+
+
+def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: World) -> None:
+    world = driving
+    world.observer.expects_gaps = True
+    world.suspend_server(0.1)
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    world.suspend_server(0.35)
+    at = world.now
+    world.run(0.2)
+    assert world.state(1)[0] is S.EXECUTING
+    assert set(world.observer.sent_since(at)) == {"zero"}
 
 
 def test_heartbeats_lost_singly_change_nothing(driving: World) -> None:

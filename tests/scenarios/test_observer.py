@@ -62,6 +62,10 @@ class Story:
         self.observer.answered(self.now, packed(ack, ROVER))
         return self
 
+    def really_unready(self) -> "Story":
+        self.observer.is_ready = lambda: False
+        return self
+
     def driving(self) -> "Story":
         """A rover that we have taken as we should, and that we drive."""
         self.rover(HOLD, armed=False).position()
@@ -111,6 +115,14 @@ SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
     "not armed": (
         "not seen armed",
         lambda s: s.rover(GUIDED, armed=False).position().moves(0.0).later(0.05).moves(),
+    ),
+    "a client's, not armed": (
+        "not seen armed",
+        lambda s: s.rover(GUIDED, armed=False).sends(setpoint(0.5), CLIENT),
+    ),
+    "really not ready": (
+        "known not to be ready",
+        lambda s: s.really_unready().rover(HOLD, armed=True).later(0.6).moves(),
     ),
     "other mode": ("in mode 10", lambda s: s.rover(AUTO, armed=True).position().moves()),
     "no zero first": (

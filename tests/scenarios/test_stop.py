@@ -5,7 +5,8 @@ from collections.abc import Callable
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.links.memory import Conditions
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Conditions, MemoryNet
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -26,9 +27,10 @@ from tests.kit.client import (
     sticks,
 )
 from tests.kit.store import LateStore
-from tests.kit.world import World
+from tests.kit.world import MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
+HEARTBEAT, POSITION = 0, 32
 BRAKING = 3.5  # s, from the speeds driven here to a stand
 
 
@@ -207,6 +209,33 @@ def test_stop_overtaken_by_a_clients_mode_request(
     assert world.pose() == where
 
 
+@pytest.mark.parametrize("mode", [AUTO, GUIDED])
+@pytest.mark.parametrize("late", [1.0, 3.0])
+def test_a_mode_request_from_before_stop_that_comes_when_all_is_over_is_undone(
+    world: World, mode: int, late: float
+) -> None:
+    held: list[bytes] = []
+
+    def holds_up(source: str, target: str, data: bytes) -> bool:
+        if target != "rover1" or data[7] != MODE_COMMAND or held:
+            return False
+        held.append(data)
+        return True
+
+    world.operator_arm(True)
+    world.run(1)
+    world.watched.loses = holds_up
+    world.client.mode(mode)
+    world.run(0.05)
+    world.client.stop()
+    world.run(late)
+    assert stands_in_hold(world)
+    MemoryNet.send(world.watched, VEHICLE_LINK, "rover1", held[0])  # it left before: not judged
+    world.run(BRAKING)
+    assert mode in [beat.custom_mode for beat in world.client.of_type("HEARTBEAT")]
+    assert stands_in_hold(world)
+
+
 MOTION_OF_CLIENTS = [
     setpoint(1.0),
     common.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5),
@@ -266,10 +295,11 @@ def test_hold_by_a_client_does_not_end_a_stop_that_is_under_way(world: World) ->
     assert world.paused() is R.STOPPED
 
 
-def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World) -> None:
+@pytest.mark.parametrize("silence", [4.0, 4.1, 4.2])  # HOLD is sent every 0.25 s
+def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World, silence: float) -> None:
     drive(world)
     world.fault(Faults(silent=True, deaf=True))
-    world.run(4)
+    world.run(silence)
     stop = world.client.stop()
     world.run(1)
     assert stop.answer == (FAILED, R.VEHICLE_SILENT)
@@ -286,6 +316,22 @@ def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World) -> None:
     assert world.observer.sent_since(at)[:2] == ["HOLD", "zero"]
     world.fault(Faults())
     world.until(lambda: stands_in_hold(world), within=BRAKING)
+
+
+def test_a_stop_is_not_confirmed_by_a_rover_whose_heartbeats_do_not_come(world: World) -> None:
+    """HOLD was seen; whether it still is in HOLD when it is seen to stand nobody knows."""
+    drive(world)
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    world.client.stop()
+    world.run(1.5)
+    world.fault(Faults(withheld=frozenset({HEARTBEAT, POSITION})))
+    world.run(4)
+    world.fault(Faults(withheld=frozenset({HEARTBEAT})))
+    world.run(2)
+    assert world.stands()
+    assert world.control() == "STOPPING"
+    world.fault(Faults())
+    world.until(lambda: stands_in_hold(world), within=2)
 
 
 def test_when_only_we_cannot_hear_it_the_rover_is_stopped_all_the_same(world: World) -> None:

@@ -13,6 +13,8 @@ from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
+    FAILED,
+    GUIDED,
     HOLD,
     MANUAL,
     TEMPORARILY_REJECTED,
@@ -77,6 +79,21 @@ def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) ->
     told = world.client.texts()
     assert "Task 1 paused: takeover" in told
     assert world.client.statuses(1)[-1].why == (S.PAUSED, R.TAKEOVER)
+
+
+@pytest.mark.parametrize(
+    "way", ["setpoints of a second server", "setpoints of anybody", "our own address"]
+)
+def test_the_last_that_we_say_beside_a_second_controller_is_zero_and_hold(
+    driving: World, way: str
+) -> None:
+    world = driving
+    at = world.now
+    WAYS[way](world)
+    world.run(3)
+    sent = world.observer.sent_since(at)
+    assert sent[-2:] == ["zero", "HOLD"]
+    assert sent.count("HOLD") == 1
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -258,6 +275,24 @@ def test_sticks_for_one_rover_do_not_take_over_another(make_world: MakeWorld) ->
     world.client.send(sticks(x=500, system=2))
     world.run(0.3)
     assert [t.state for t in world.tasks()] == [S.EXECUTING, S.PAUSED]
+
+
+def test_our_mode_set_by_somebody_else_long_after_a_client_asked_for_it_in_vain_is_not_ours(
+    world: World,
+) -> None:
+    world.fault(Faults(refuse_mode=True))
+    asked = world.client.mode(GUIDED)
+    world.run(3)
+    world.operator_mode(Mode.GUIDED)
+    world.run(0.5)
+    at = world.now
+    world.client.move(1)
+    world.run(3)
+    world.client.request_status(1)
+    world.run(0.1)
+    assert asked.result == FAILED
+    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.WRONG_MODE)
+    assert world.observer.sent_since(at) == []
 
 
 @pytest.mark.parametrize("arming", ["server", "operator"])

@@ -78,6 +78,15 @@ def test_what_was_overtaken_on_the_way_is_dropped() -> None:
     assert (motion.pose.north, made.rebooted) == (5.0, False)
 
 
+def test_the_same_again_is_not_news() -> None:
+    made = monitor((1.0, position(ms=1000)), (1.0, attitude(ms=1000)))
+    made.receive(position(ms=1000), now=1.2)
+    made.receive(attitude(ms=1000), now=1.2)
+    motion = made.latest()
+    assert motion is not None
+    assert motion.at == 1.0
+
+
 def test_a_clock_that_goes_far_back_is_a_restart() -> None:
     made = monitor((0.0, position(ms=60_000)), (0.0, attitude(ms=60_000)))
     made.receive(position(ms=500), now=1.0)

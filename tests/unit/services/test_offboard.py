@@ -331,3 +331,11 @@ def test_after_a_takeover_not_one_thing_more_is_sent() -> None:
     for _ in range(60):
         rig.tick()
     assert (rig.story(), rig.phase, rig.control.we_armed) == ([], Phase.IDLE, False)
+
+
+def test_what_was_not_sent_yet_at_a_takeover_is_not_sent_after_it() -> None:
+    rig = Rig().in_control()
+    rig.control.drive(0.5, 0.0)
+    rig.control.lose()
+    rig.tick()
+    assert rig.story() == []
