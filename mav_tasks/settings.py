@@ -17,6 +17,7 @@ class Driving:
     max_turn_rate: float = radians(90)  # rad/s, a faster wish is refused
     max_distance: float = 10_000.0  # m, a longer move is refused
     max_turn: float = radians(3600)  # rad, a longer rotation is refused
+    max_duration: float = 3600.0  # s, a longer drive at constant velocity is refused
     acceleration: float = 0.5  # m/s², of the setpoints; also the deceleration planned for
     turn_acceleration: float = radians(90)  # rad/s², the same for turning
     arrival_distance: float = 0.01  # m, a move is done within this of its end
@@ -41,6 +42,7 @@ class Watch:
     commit: float = 0.4  # a submission not durable by then is withdrawn
     forward_answer: float = 0.4  # a forwarded command not answered by then is refused
     shutdown: float = 0.8  # to stop the vehicles in an orderly end
+    stop_unconfirmed: float = 5.0  # cancelled, but not seen to stand by then: held
     still_speed: float = 0.03  # m/s, measured, below which a vehicle stands
     still_turn_rate: float = radians(2)  # rad/s, the same
     still_time: float = 0.3  # below both for this long: stands still
@@ -48,9 +50,14 @@ class Watch:
 
 @dataclass(frozen=True, slots=True)
 class Queueing:
-    """Bounds on what may wait."""
+    """What may wait, and in which order."""
 
     capacity: int = 1000  # waiting tasks for each vehicle
+    quota: int = 500  # waiting tasks of each client
+    aging: float = 60.0  # s of waiting that count as one priority; 0: none
+    #: priorities by which a waiting task must be more urgent to interrupt the running one; 0: none
+    preemption_gap: int = 0
+    preemption_rest: float = 2.0  # s that a task runs at the least before it is interrupted
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,5 +91,11 @@ class Settings:
     clients: Clients = field(default_factory=Clients)
     #: who arms: "server", "operator", or "auto" = server where the vehicle link is loopback
     arming: str = "auto"
+    #: whether standard commands and modes addressed to the autopilot become tasks, too
+    claim: bool = True
+    #: what a "go to" that changes the mode does: "queue", or run at once, "now"
+    guided: str = "queue"
     #: after a failed task that had moved: "pause" the queue or "continue"
     on_failure: str = "pause"
+    #: after an unclean end, or a long one: "pause" the queues or "continue"
+    on_restart: str = "pause"

@@ -11,8 +11,10 @@ from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.goals import becomes_task, marks_of, place_in
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.submissions import Submissions
+from mav_tasks.engine.task_control import TaskControl
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -22,8 +24,10 @@ from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.services.command_sender import Answered
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Draft, GoTo, Marks, Submitter
 
 R = TaskReason
 
@@ -35,14 +39,14 @@ MOVING = frozenset(
         MavCmd.NAV_WAYPOINT,
         17,  # NAV_LOITER_UNLIM
         18,  # NAV_LOITER_TURNS
-        19,  # NAV_LOITER_TIME
+        MavCmd.NAV_LOITER_TIME,
         MavCmd.NAV_TAKEOFF,
         32,  # DO_FOLLOW
         33,  # DO_FOLLOW_REPOSITION
         34,  # DO_ORBIT
-        115,  # CONDITION_YAW
+        MavCmd.CONDITION_YAW,
         MavCmd.DO_REPOSITION,
-        213,  # NAV_SET_YAW_SPEED
+        MavCmd.NAV_SET_YAW_SPEED,
         MavCmd.DO_MOTOR_TEST,
         43000,  # GUIDED_CHANGE_SPEED
         43002,  # GUIDED_CHANGE_HEADING
@@ -82,13 +86,23 @@ class Commands:
         vehicles: VehicleSide,
         book: TaskBook,
         submissions: Submissions,
+        control: TaskControl,
         displays: Displays,
+        settings: Settings,
     ) -> None:
+        self._settings = settings
         self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
         self._submissions = submissions
+        self._control = control
         self._displays = displays
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        self._submissions.apply(settings)
+        self._control.apply(settings)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """See to a client's command."""
@@ -116,8 +130,15 @@ class Commands:
         at_server = component == asked.vehicle.server_component
         if component in (0, AUTOPILOT) or at_server:
             match asked.command.command:
-                case MavCmd.TASK_MOVE | MavCmd.TASK_ROTATE:
-                    self._submissions.submit(asked, now=now)
+                case number if becomes_task(number) and (at_server or self._claims(number)):
+                    self._take_in(asked, now=now)
+                    return
+                case number if self._control.handles(number):
+                    asked.client.uses_dialect = asked.client.uses_dialect or number in OUR_COMMANDS
+                    asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
+                    return
+                case MavCmd.NAV_TAKEOFF:  # in examples for every kind of vehicle: nothing to do
+                    asked.answer(MavResult.ACCEPTED)
                     return
                 case MavCmd.DO_PAUSE_CONTINUE:
                     asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
@@ -143,6 +164,27 @@ class Commands:
         else:  # also to a component never heard of: an autopilot does what that is told
             _check_relay(asked, now=now)
             _relay(asked, now=now)
+
+    def _claims(self, command: int) -> bool:
+        """Whether a command to the autopilot itself is ours to see to."""
+        return command in OUR_COMMANDS or self._settings.claim
+
+    def _take_in(self, asked: Asked, *, now: float) -> None:
+        """A command that asks for a task; or, without a place, for a pause."""
+        is_reposition = asked.command.command == MavCmd.DO_REPOSITION
+        if is_reposition and asked.command.frame is None and place_in(asked.command) is None:
+            asked.answer(MavResult.ACCEPTED, asked.vehicle.pause(actor=asked.actor, now=now) or 0)
+        else:
+            self._submissions.submit(asked, now=now)
+
+    def cancel_latest(
+        self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
+    ) -> None:
+        """COMMAND_CANCEL: nothing acknowledges it; the task's own status tells."""
+        vehicle = self._vehicles.vehicles.get(message.target_system)
+        if vehicle is not None:
+            submitter = client.submitter(packet.source)
+            self._control.cancel_latest(vehicle, submitter, message.command, now=now)
 
     def deliver(self, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
         """Bring a vehicle's answer, or its silence, to the client that asked."""
@@ -178,9 +220,23 @@ class Commands:
         elif vehicle.tasks.is_stopped:
             words = "STOP is latched: continue first"
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+        elif self._is_return(vehicle, mode):
+            draft = _return_home(vehicle, client.submitter(packet.source), Marks())
+            try:
+                self._submissions.run_unasked(vehicle, draft, actor=actor, now=now)
+            except Rejection as refusal:
+                client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
         else:
             vehicle.client_asks_mode(mode, client.key, now=now)
             vehicle.requests.forward(packet)
+
+    def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
+        """Whether a mode is the return that we drive ourselves: towards a home that is known."""
+        return (
+            self._settings.claim
+            and mode == vehicle.persona.return_mode
+            and vehicle.home is not None
+        )
 
     # STOP, pause, modes
 
@@ -246,8 +302,19 @@ class Commands:
             return
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        if self._is_return(vehicle, mode):
+            submitter = asked.client.submitter(asked.packet.source)
+            draft = _return_home(vehicle, submitter, marks_of(asked.command, asked.packet.raw))
+            self._submissions.run_now(asked, draft, now=now)
+            return
         vehicle.client_asks_mode(mode, asked.client.key, now=now)
         _relay(asked, now=now)
+
+
+def _return_home(vehicle: Vehicle, submitter: Submitter, marks: Marks) -> Draft:
+    """What the mode RTL asks for."""
+    command = MavCmd.NAV_RETURN_TO_LAUNCH
+    return Draft(vehicle.system_id, command, GoTo(None), submitter, marks=marks)
 
 
 def _check_relay(asked: Asked, *, now: float) -> None:

@@ -112,7 +112,7 @@ class Displays:
         )
         if task_id == 0:
             first = max(0, translate.first_index_of(asked.command))
-            for waiting in asked.vehicle.tasks.waiting[first : first + PAGE]:
+            for waiting in asked.vehicle.tasks.page(first, PAGE):
                 send(waiting)
         elif self._book.get(task_id) is None:
             raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")

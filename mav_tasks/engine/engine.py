@@ -5,6 +5,7 @@ journal what happened and ``take_packets`` the links what to send. Time comes in
 monotonic seconds, never going back.
 """
 
+from math import inf
 from typing import assert_never
 
 from mav_tasks.engine.commands import Commands
@@ -27,6 +28,7 @@ from mav_tasks.engine.motion_gate import may_pass
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
+from mav_tasks.engine.task_control import TaskControl
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -36,6 +38,9 @@ from mav_tasks.services.command_receiver import command_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, ServerStopped
+from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.recollection import Recollection
+from mav_tasks.tasks.restored import Restored
 
 EVERYBODY = Address(0, 0)
 SETUP_SIGNING = 256
@@ -47,25 +52,40 @@ CLAIMED = frozenset({m.RequestDataStream.id, SETUP_SIGNING})
 class Engine:
     """The task server without its sockets, its clock and its disk."""
 
-    def __init__(self, settings: Settings, *, now: float) -> None:
+    def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._journal: list[Event] = []
         self._book = TaskBook()
+        self._fleet = Fleet(self._book, settings)
+        if restored is not None:
+            self._fleet.restore(restored, now=now)
         packer = Packer()
         self._gcs = GcsSide(queue=self._packets, packer=packer, settings=settings, now=now)
         self._vehicles = VehicleSide(
-            queue=self._packets, packer=packer, book=self._book, settings=settings
+            queue=self._packets,
+            packer=packer,
+            book=self._book,
+            fleet=self._fleet,
+            settings=settings,
         )
-        self._submissions = Submissions(self._gcs, self._book, settings)
+        recollection = Recollection(self._book)
+        if restored is not None:
+            recollection.restore(restored.tasks, now=now)
+        self._submissions = Submissions(self._gcs, self._book, recollection, settings)
         displays = Displays(self._vehicles, self._book)
         self._commands = Commands(
-            self._gcs, self._vehicles, self._book, self._submissions, displays
+            self._gcs,
+            self._vehicles,
+            self._book,
+            self._submissions,
+            TaskControl(self._book, settings),
+            displays,
+            settings,
         )
         self._publisher = Publisher(self._gcs, self._vehicles, self._book, displays)
         self._stop_by: float | None = None
         self._stopped = False
-        self._wall_offset = 0.0
         #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``:
         #: what the runner sends when the engine itself has failed
         self.last_words: tuple[Outgoing, ...] = ()
@@ -94,7 +114,7 @@ class Engine:
             case SettingsChanged(settings=settings):
                 self._apply(settings)
             case WallClock(offset=offset):
-                self._wall_offset = offset
+                self._fleet.room.set_wall_offset(offset, now=now)
             case Shutdown():
                 self._shut_down(now=now)
             case _:
@@ -107,15 +127,18 @@ class Engine:
             self._publisher.next_deadline(),
             self._vehicles.next_deadline(),
             self._submissions.next_deadline(),
+            self._fleet.room.next_deadline(),
             None if self._stopped else self._stop_by,
         ]
-        return min((d for d in deadlines if d is not None), default=None)
+        due = min((d for d in deadlines if d is not None), default=inf)
+        return None if due == inf else due
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due by now; may come late, or for nothing."""
         self._vehicles.check_late(now=now)
         self._vehicles.handle_deadline(now=now)
         self._submissions.handle_deadline(now=now)
+        self._fleet.room.handle_deadline(now=now)
         self._settle(now=now)
         self._publisher.handle_deadline(now=now)
 
@@ -187,6 +210,8 @@ class Engine:
         self._publisher.welcome(client, now=now)
         if isinstance(message, m.CommandLong | m.CommandInt):
             self._commands.receive(client, packet, command_of(message), now=now)
+        elif isinstance(message, m.CommandCancel):
+            self._commands.cancel_latest(client, packet, message, now=now)
         elif isinstance(message, m.SetMode):
             self._commands.set_mode(client, packet, message, now=now)
         elif packet.message_id not in CLAIMED:
@@ -209,6 +234,10 @@ class Engine:
         for vehicle in self._vehicles:
             for answered in vehicle.requests.take_answers():
                 self._commands.deliver(vehicle, answered, now=now)
+        for system_id in self._fleet.room.take_woken():
+            woken = self._vehicles.vehicles.get(system_id)
+            if woken is not None:
+                woken.wake(now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
         events = self._book.take_events()
@@ -219,9 +248,10 @@ class Engine:
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
+        self._fleet.apply(settings)
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
-        self._submissions.apply(settings)
+        self._commands.apply(settings)
 
     def _shut_down(self, *, now: float) -> None:
         self._submissions.close()

@@ -16,7 +16,6 @@ from mav_tasks.services.task_status import TaskStatusSender
 from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
 
-MAX_NONCE_ADDRESSES = 256  # MAVLink addresses whose nonces are remembered, over all endpoints
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 
 Nonces = dict[Address, OrderedDict[int, Pending]]
@@ -26,7 +25,7 @@ class GcsClient:
     """One endpoint that listens, and perhaps commands."""
 
     def __init__(
-        self, outlet: Outlet, *, settings: Clients, nonces: Nonces, is_configured: bool, now: float
+        self, outlet: Outlet, *, settings: Clients, is_configured: bool, now: float
     ) -> None:
         self.outlet = outlet
         self.heard_at = now
@@ -42,7 +41,6 @@ class GcsClient:
         self._text_id = 0
         self._introduced: set[int] = set()
         self._submitters: dict[Address, Submitter] = {}  # made once: each command asks for it
-        self._nonces = nonces
         self._receivers: dict[Address, CommandReceiver] = {}
 
     def __repr__(self) -> str:
@@ -81,10 +79,7 @@ class GcsClient:
         if receiver is None:
             if len(self._receivers) >= MAX_ADDRESSES:
                 del self._receivers[next(iter(self._receivers))]
-            if len(self._nonces) >= MAX_NONCE_ADDRESSES and source not in self._nonces:
-                del self._nonces[next(iter(self._nonces))]
-            nonces = self._nonces.setdefault(source, OrderedDict())
-            receiver = self._receivers[source] = CommandReceiver(nonces)
+            receiver = self._receivers[source] = CommandReceiver()
         return receiver
 
     def heard(self, source: Address, *, now: float) -> None:

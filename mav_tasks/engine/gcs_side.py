@@ -7,7 +7,7 @@ wants is given back as a value; the engine sees to it.
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from mav_tasks.engine.gcs_client import GcsClient, Nonces
+from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
@@ -38,7 +38,6 @@ class GcsSide:
         self._settings = settings
         self._decoder = Decoder()
         self._links: set[str] = set()
-        self._nonces: Nonces = {}
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
         self.heartbeat = HeartbeatSender(now=now)
 
@@ -131,7 +130,6 @@ class GcsSide:
         client = GcsClient(
             Outlet(link, peer, self._queue, self._packer),
             settings=self._settings.clients,
-            nonces=self._nonces,
             is_configured=is_configured,
             now=now,
         )

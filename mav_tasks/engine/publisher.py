@@ -9,7 +9,7 @@ from mav_tasks.mavlink.enums import MavState
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import component_heartbeat
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import Event, TaskChanged, TaskWaits
+from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskWaits
 from mav_tasks.tasks.task import TaskId
 
 
@@ -46,7 +46,7 @@ class Publisher:
                 vehicle = self._vehicles.vehicles.get(system_id)
                 if vehicle is not None:
                     self._gcs.tell(text, severity, vehicle.server_address, now=now)
-            if isinstance(event, TaskChanged | TaskWaits):
+            if isinstance(event, TaskChanged | TaskModified | TaskAdvanced | TaskWaits):
                 self.note_change(event.task_id)
 
     def note_change(self, task_id: TaskId) -> None:

@@ -2,29 +2,38 @@
 
 from functools import partial
 
-from mav_tasks.engine import translate
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.goals import wish_of
+from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.enums import MavResult, MavSeverity
-from mav_tasks.services.command_receiver import NonceReused, Repeat
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Task, describe
+from mav_tasks.tasks.recollection import Known, Recollection, Rule
+from mav_tasks.tasks.task import Draft, Task, TaskId, describe
 
 R = TaskReason
+
+CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS
+PARAM2_FLAGS = 1  # index of DO_REPOSITION's flags
 
 
 class Submissions:
     """What becomes a task, and whether it may be said so yet."""
 
-    def __init__(self, gcs: GcsSide, book: TaskBook, settings: Settings) -> None:
+    def __init__(
+        self, gcs: GcsSide, book: TaskBook, recollection: Recollection, settings: Settings
+    ) -> None:
         self._gcs = gcs
         self._book = book
+        self._recollection = recollection
         self._settings = settings
         self._gate = CommitGate()
+        self._undecided: set[TaskId] = set()  # taken in, and not durable yet
         self._store_is_away = False
         self._is_closing = False
 
@@ -54,29 +63,70 @@ class Submissions:
         self._gate.handle_deadline(now=now)
 
     def submit(self, asked: Asked, *, now: float) -> None:
-        """Queue the task that a command asks for; Rejection says why not."""
-        command = asked.command
+        """Take in the task that a command asks for; Rejection says why not."""
+        command, vehicle = asked.command, asked.vehicle
         asked.client.uses_dialect = True
-        nonce = translate.nonce_of(command)
-        try:
-            repeat = asked.receiver.same_submission(command, nonce=nonce, now=now)
-        except NonceReused:
-            raise Rejection(R.NONCE_REUSED, f"nonce {nonce} was used for something else") from None
-        if repeat is not None:
-            self._answer_repeat(asked, repeat, now=now)
+        wish = wish_of(command, asked.packet.raw, self._settings.driving, now=now)
+        draft = Draft(
+            vehicle.system_id,
+            command.command,
+            wish.goal,
+            asked.client.submitter(asked.packet.source),
+            wish.terms,
+            wish.marks,
+        )
+        known = self._recollection.known(
+            draft, confirmation=command.confirmation, origin=vehicle.origin, now=now
+        )
+        if known is not None:
+            self._answer_repeat(asked, known, now=now)
             return
+        self._check_open()
+        if self._is_for_now(asked):
+            task = vehicle.run_now(draft, actor=asked.actor, now=now)
+        else:
+            task = vehicle.tasks.submit(draft, now=now)
+        self._await_commit(asked, task, now=now)
+
+    def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
+        """Take in a task that runs at once; Rejection says why not."""
+        known = self._recollection.known(
+            draft, confirmation=0, origin=asked.vehicle.origin, now=now
+        )
+        if known is not None:
+            self._answer_repeat(asked, known, now=now)
+            return
+        self._check_open()
+        task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
+        self._await_commit(asked, task, now=now)
+
+    def run_unasked(self, vehicle: Vehicle, draft: Draft, *, actor: str, now: float) -> None:
+        """The same for what no acknowledgement is expected of."""
+        known = self._recollection.known(draft, confirmation=0, origin=vehicle.origin, now=now)
+        if known is None:
+            self._check_open()
+            task = vehicle.run_now(draft, actor=actor, now=now)
+            self._recollection.remember(task, at=now, now=now)
+
+    def _check_open(self) -> None:
         if self._is_closing:
             raise Rejection(R.RATE_LIMITED, "the server is shutting down")
-        draft = translate.draft_of(
-            command,
-            asked.vehicle.system_id,
-            asked.client.submitter(asked.packet.source),
-            self._settings.driving,
-        )
         if self._store_is_away:
             raise Rejection(R.STORE_UNAVAILABLE, "the store is away: not accepted")
-        task = asked.vehicle.tasks.submit(draft, now=now)
-        asked.receiver.remember_submission(asked.pending, nonce=nonce)
+
+    def _is_for_now(self, asked: Asked) -> bool:
+        """Whether this is a "go to" at the autopilot that is to have effect at once."""
+        command = asked.command
+        return (
+            self._settings.guided == "now"
+            and command.command == MavCmd.DO_REPOSITION
+            and command.target.component_id == AUTOPILOT
+            and int(command.params[PARAM2_FLAGS]) & CHANGE_MODE == CHANGE_MODE
+        )
+
+    def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
+        self._recollection.remember(task, at=now, now=now)
+        self._undecided.add(task.id)
         self._gate.hold(
             self._book.recorded,
             give_up_at=now + self._settings.watch.commit,
@@ -86,26 +136,28 @@ class Submissions:
 
     def _accept(self, asked: Asked, task: Task, *, now: float) -> None:
         """The submission is durable: acknowledge it with the task's id, and tell of it."""
+        self._undecided.discard(task.id)
         asked.answer(MavResult.ACCEPTED, task.id)
         asked.client.statuses.changed(task.id)
         words = f"Task {task.id} queued: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, asked.vehicle.server_address, now=now)
 
     def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:
-        asked.receiver.forget_submission(asked.pending, nonce=task.nonce)
+        self._undecided.discard(task.id)
+        self._recollection.forget(task)
         self._store_is_away = True
         current = self._book.get(task.id)
-        if current is not None and asked.vehicle.tasks.position(current) is not None:
+        if current is not None and asked.vehicle.tasks.waits(current):
             asked.vehicle.tasks.withdraw(current, now=now)
         refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
         self._book.record(asked.refuse(refusal, now=now))
 
-    def _answer_repeat(self, asked: Asked, repeat: Repeat, *, now: float) -> None:
+    def _answer_repeat(self, asked: Asked, known: Known, *, now: float) -> None:
         """The same submission again: the same answer, or none yet if it has none yet."""
-        answer = repeat.first.answer
-        if answer is None:
+        if known.task_id in self._undecided:
             return
-        asked.answer(MavResult(answer.result), answer.result_param2)
-        if repeat.same_payload:
-            words = f"same command again: still task {answer.result_param2}"
+        asked.answer(MavResult.ACCEPTED, known.task_id)
+        if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL):
+            what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
+            words = f"same {what} again: still task {known.task_id}"
             asked.tell(words, MavSeverity.INFO, now=now)

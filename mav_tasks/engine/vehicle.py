@@ -9,6 +9,7 @@ from dataclasses import replace
 from math import inf
 
 from mav_tasks.engine.authority import Authority
+from mav_tasks.engine.frame_monitor import FrameMonitor, Seen
 from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicle_requests import VehicleRequests
@@ -23,7 +24,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.task import Draft, GlobalPlace, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
@@ -46,13 +47,14 @@ class Vehicle:
         persona: Persona,
         outlet: Outlet,
         book: TaskBook,
+        tasks: VehicleTasks,
         settings: Settings,
         may_arm: bool,
         now: float,
     ) -> None:
         self.system_id = system_id
         self.persona = persona
-        self.tasks = VehicleTasks(system_id, book, settings)
+        self.tasks = tasks
         self.requests = VehicleRequests(
             Address(system_id, AUTOPILOT),
             persona,
@@ -67,6 +69,7 @@ class Vehicle:
         self._book = book
         self._settings = settings
         self._motion = MotionMonitor(settings.watch)
+        self._frame = FrameMonitor()
         self._monitor = HeartbeatMonitor(
             heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
         )
@@ -114,8 +117,18 @@ class Vehicle:
             self._motion.receive(message, now=min(now, self._next_tick))
             if self._motion.rebooted:
                 self._rebooted(now=now)
+            self._receive_of_frame(message, now=now)
             if not self._is_ticking and not self.tasks.is_idle:
                 self.step(now=now)
+        elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt):
+            self._receive_of_frame(message, now=now)
+
+    def _receive_of_frame(self, message: Seen, *, now: float) -> None:
+        self._frame.receive(message, now=now)
+        if self._frame.changed:
+            self._frame.changed = False
+            self._note("has another origin", now=now)
+            self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
     def _receive_heartbeat(self, heartbeat: m.Heartbeat, *, now: float) -> None:
         was_armed, was_mode = self._monitor.armed, self._monitor.custom_mode
@@ -171,6 +184,7 @@ class Vehicle:
     def _rebooted(self, *, now: float) -> None:
         """Its frame may be another one now, and nothing of ours is in force there."""
         self._motion.forget()
+        self._frame.forget()
         self.requests.intervals.ask_all_again()
         self._note("restarted", now=now)
         if not self.tasks.is_stopped:
@@ -244,7 +258,7 @@ class Vehicle:
         """Whether a client's motion message may pass; one that does makes tasks wait."""
         allowed = (
             self.armed
-            and self.tasks.begun is None
+            and not self.tasks.is_driving
             and not self.tasks.is_stopped
             and not self.control.is_engaged
             and self._authority.has_granted(client)
@@ -298,6 +312,51 @@ class Vehicle:
         self._next_tick = now + self._settings.watch.setpoint_period
         return paused
 
+    def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
+        """Call a task off; if it is the begun one, zeros leave in this very step."""
+        begun = self.tasks.begun
+        is_begun = begun is not None and begun.id == task.id
+        self.tasks.cancel(task, kill=kill, reason=TaskReason.CANCELLED, actor=actor, now=now)
+        if is_begun:
+            self.step(now=now)
+
+    def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
+        """Call off what waits, or everything."""
+        self.tasks.clear(begun_too=begun_too, actor=actor, now=now)
+        if begun_too and self.control.is_engaged:
+            self.step(now=now)
+
+    def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
+        """Change the terms of a task."""
+        self.tasks.modify(task, terms, actor=actor, now=now)
+
+    def release(self, task: Task, *, again: bool, actor: str, now: float) -> None:
+        """Let a held task go on; Rejection while it could not take the vehicle."""
+        seen = self.view(now=now)
+        self.tasks.release(task, again=again, seen=seen, actor=actor, now=now)
+        self.wake(now=now)
+
+    def skip(self, task: Task, *, actor: str, now: float) -> None:
+        """End a held task."""
+        self.tasks.cancel(task, kill=False, reason=TaskReason.SKIPPED, actor=actor, now=now)
+        self.wake(now=now)
+
+    def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
+        """Take a task in that runs at once, before what runs and what waits."""
+        task = self.tasks.run_now(draft, actor=actor, now=now)
+        self.step(now=now)
+        return task
+
+    @property
+    def origin(self) -> GlobalPlace | None:
+        """Where the vehicle's local frame begins on earth, if that is known."""
+        return self._frame.origin
+
+    @property
+    def home(self) -> GlobalPlace | None:
+        """Where the vehicle returns to, if it has said so."""
+        return self._frame.home
+
     def pause(self, *, actor: str, now: float) -> TaskId | None:
         """Let task and queue stand; zeros leave in this very step."""
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
@@ -350,6 +409,11 @@ class Vehicle:
         self.requests.flush(now=now)
         self._ask_for_rates(now=now)
 
+    def wake(self, *, now: float) -> None:
+        """Look at the tasks unless that is about to be done: another may be ready now."""
+        if not self._is_ticking:
+            self.step(now=now)
+
     def step(self, *, now: float) -> None:
         """Let the tasks say what they demand, and do it."""
         seen = self.view(now=now)
@@ -393,12 +457,13 @@ class Vehicle:
             motion=self._motion.latest(),
             still=self._motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,
+            frame=self._frame.frame(),
+            home=self._frame.home,
         )
 
     def apply(self, settings: Settings) -> None:
         """Take new settings; what is under way keeps the old ones where it must."""
         self._settings = settings
-        self.tasks.apply(settings)
 
     def _follow(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         match demand.kind:
@@ -410,7 +475,9 @@ class Vehicle:
                 self.control.release(still=seen.still, disarm=False, now=now)
             case DemandKind.HAND_BACK:
                 self.control.release(still=seen.still, disarm=True, now=now)
-            case DemandKind.STOP:
+            case DemandKind.HALT if self.control.phase is not Phase.STOPPING:
+                self._begin_stop(now=now)
+            case DemandKind.STOP | DemandKind.HALT:
                 self.control.stop(still=seen.still, heard=seen.heard, now=now)
 
     def _ask_for_rates(self, *, now: float) -> None:

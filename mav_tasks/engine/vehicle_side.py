@@ -21,6 +21,7 @@ from mav_tasks.services.persona import persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
+from mav_tasks.tasks.fleet import Fleet
 
 MAX_PEERS = 256  # endpoints on one vehicle link
 
@@ -30,7 +31,16 @@ SETPOINTS = frozenset(
 )
 #: what the server itself makes use of; everything else is forwarded unread
 USED = frozenset(
-    {m.Heartbeat.id, m.Attitude.id, m.LocalPositionNed.id, m.CommandAck.id} | SETPOINTS
+    {
+        m.Heartbeat.id,
+        m.Attitude.id,
+        m.LocalPositionNed.id,
+        m.GlobalPositionInt.id,
+        m.GpsGlobalOrigin.id,
+        m.HomePosition.id,
+        m.CommandAck.id,
+    }
+    | SETPOINTS
 )
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
 
@@ -46,11 +56,18 @@ class VehicleSide:
     """The vehicles by system id, and the vehicle links."""
 
     def __init__(
-        self, *, queue: list[Outgoing], packer: Packer, book: TaskBook, settings: Settings
+        self,
+        *,
+        queue: list[Outgoing],
+        packer: Packer,
+        book: TaskBook,
+        fleet: Fleet,
+        settings: Settings,
     ) -> None:
         self._queue = queue
         self._packer = packer
         self._book = book
+        self._fleet = fleet
         self._settings = settings
         self._decoder = Decoder()
         self._links: dict[str, _Link] = {}
@@ -183,6 +200,7 @@ class VehicleSide:
             persona=persona,
             outlet=outlet,
             book=self._book,
+            tasks=self._fleet.of(packet.system_id),
             settings=self._settings,
             may_arm=self._settings.arming == "server"
             or (self._settings.arming == "auto" and link.is_local),

@@ -19,15 +19,19 @@ class MavCmd(IntEnum):
     """MAV_CMD, as far as the server or the simulated rover tells one from another."""
 
     NAV_WAYPOINT = 16
+    NAV_LOITER_TIME = 19
     NAV_RETURN_TO_LAUNCH = 20
     NAV_LAND = 21
     NAV_TAKEOFF = 22
+    NAV_DELAY = 93
+    CONDITION_YAW = 115
     DO_SET_MODE = 176
     DO_CHANGE_SPEED = 178
     DO_SET_HOME = 179
     DO_REPOSITION = 192
     DO_PAUSE_CONTINUE = 193
     DO_MOTOR_TEST = 209
+    NAV_SET_YAW_SPEED = 213
     PREFLIGHT_REBOOT_SHUTDOWN = 246
     MISSION_START = 300
     COMPONENT_ARM_DISARM = 400
@@ -55,11 +59,14 @@ class MavFrame(IntEnum):
     LOCAL_NED = 1
     MISSION = 2
     GLOBAL_RELATIVE_ALT = 3
+    LOCAL_ENU = 4
     GLOBAL_INT = 5
     GLOBAL_RELATIVE_ALT_INT = 6
     LOCAL_OFFSET_NED = 7
     BODY_NED = 8
     BODY_OFFSET_NED = 9
+    GLOBAL_TERRAIN_ALT = 10
+    GLOBAL_TERRAIN_ALT_INT = 11
     BODY_FRD = 12
     LOCAL_FRD = 20
 
@@ -173,3 +180,15 @@ class PositionTargetTypemask(IntFlag):
     FORCE_SET = 512
     YAW_IGNORE = 1024
     YAW_RATE_IGNORE = 2048
+
+
+class TaskProperty(IntEnum):
+    """TASK_PROPERTY of our dialect: what TASK_MODIFY changes."""
+
+    PRIORITY = 1
+    START_DELAY = 2
+    DEADLINE = 3
+    RUN_AFTER = 4
+    PREEMPTIBLE = 5
+    PREEMPTIVE = 6
+    START_UTC = 7

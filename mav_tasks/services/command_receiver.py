@@ -1,23 +1,19 @@
 """Commands of one client: told apart from their own repeats, and answered exactly once each.
 
-MAVLink guide, "Command Protocol". DEVIATION: a repeat is recognised although ``confirmation``
-stays 0, because MAVSDK never counts it up and COMMAND_INT has none. The rules are those of
-``dialects/README.md``, "The same task twice".
+MAVLink guide, "Command Protocol". The very same packet again is given the same answer; which
+submissions are the same task is the task domain's to say (``tasks/recollection.py``).
 """
 
 from collections import OrderedDict
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong
 
-SAME_PACKET = 5.0  # s, the very same packet again: the same answer (rule 1)
-CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters: the same task (rule 3)
-SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce: the same task (rule 5)
-REMEMBERED = 256  # packets of one client, for rule 1
-NONCES = 2_000  # remembered for each client address, for rule 2
+SAME_PACKET = 5.0  # s, the very same packet again: the same answer
+REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
+REMEMBERED = 256  # packets of one client
 
 
 class Command(NamedTuple):
@@ -78,39 +74,21 @@ class Pending:
         self.answer: Answer | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Repeat:
-    """A command that is the same as one before; ``same_payload`` says that rule 5 found it."""
-
-    first: Pending
-    same_payload: bool = False
-
-
-class NonceReused(Exception):
-    """A nonce came again with another payload (rule 2)."""
-
-
 class CommandReceiver:
-    """The memory of one client's commands.
+    """The memory of one client's commands."""
 
-    ``nonces`` is shared by all endpoints of one MAVLink address: a client that comes back from
-    another port is still the same.
-    """
-
-    def __init__(self, nonces: OrderedDict[int, Pending]) -> None:
+    def __init__(self) -> None:
         self._packets: OrderedDict[bytes, Pending] = OrderedDict()
-        self._last_of_command: dict[int, Pending] = {}
-        self._nonces = nonces
 
     def same_packet(self, packet: bytes, *, now: float) -> Pending | None:
-        """Give the command that this very packet brought in before (rule 1)."""
+        """Give the command that this very packet brought in before."""
         pending = self._packets.get(packet)
         if pending is not None and now - pending.at <= SAME_PACKET:
             return pending
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
-        """Take a command in, for rule 1."""
+        """Take a command in."""
         pending = Pending(command, packet, now)
         self._packets.pop(packet, None)
         self._packets[packet] = pending
@@ -123,51 +101,12 @@ class CommandReceiver:
         a repeat of it whose ack was lost."""
         return any(
             pending.at < before
-            and now - pending.at <= SAME_PAYLOAD
+            and now - pending.at <= REPEATED
             and pending.answer is not None
             and pending.answer.result == MavResult.ACCEPTED
             and _equal(pending.command, command)
             for pending in self._packets.values()
         )
-
-    def same_submission(self, command: Command, *, nonce: int, now: float) -> Repeat | None:
-        """Give the submission that this one repeats (rules 2, 3, 5), or None if it is new.
-
-        Raises NonceReused. A submission that was refused is forgotten: it may be tried again.
-        """
-        if nonce:
-            known = self._nonces.get(nonce)
-            if known is None:
-                return None
-            if not _equal(known.command, command):
-                raise NonceReused
-            return Repeat(known)
-        last = self._last_of_command.get(command.command)
-        if last is None or not _equal(last.command, command):
-            return None
-        age = now - last.at
-        if command.confirmation > 0 and age <= CONFIRMED:
-            return Repeat(last)
-        if age <= SAME_PAYLOAD:
-            last.at = now
-            return Repeat(last, same_payload=True)
-        return None
-
-    def remember_submission(self, pending: Pending, *, nonce: int) -> None:
-        """Keep a submission that was accepted for processing, for rules 2, 3 and 5."""
-        if nonce:
-            self._nonces[nonce] = pending
-            if len(self._nonces) > NONCES:
-                self._nonces.popitem(last=False)
-        else:
-            self._last_of_command[pending.command.command] = pending
-
-    def forget_submission(self, pending: Pending, *, nonce: int) -> None:
-        """Forget a submission that was refused in the end."""
-        if self._nonces.get(nonce) is pending:
-            del self._nonces[nonce]
-        if self._last_of_command.get(pending.command.command) is pending:
-            del self._last_of_command[pending.command.command]
 
 
 def _equal(one: Command, other: Command) -> bool:

@@ -17,6 +17,7 @@ class Persona:
     control_mode: int  # custom_mode in which setpoints are followed
     hold_mode: int  # custom_mode in which the vehicle stands
     manual_mode: int
+    return_mode: int  # drives back to where it was armed
     booting_mode: int  # left without anybody's doing
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
@@ -34,6 +35,7 @@ ARDUPILOT = Persona(
     control_mode=15,  # GUIDED
     hold_mode=4,
     manual_mode=0,
+    return_mode=11,  # RTL
     booting_mode=16,  # INITIALISING
     setpoint_mask=int(
         T.X_IGNORE

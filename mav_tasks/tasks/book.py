@@ -5,12 +5,20 @@ Events are numbered from 1; the store reports back up to which number they are d
 """
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 
 from mav_tasks.errors import Rejection
-from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted, TaskWithdrawn
+from mav_tasks.tasks.events import (
+    Event,
+    TaskAdvanced,
+    TaskChanged,
+    TaskModified,
+    TaskSubmitted,
+    TaskWithdrawn,
+)
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
-from mav_tasks.tasks.task import MAX_TASK_ID, Draft, Progress, Task, TaskId
+from mav_tasks.tasks.task import MAX_TASK_ID, Draft, Progress, Submitter, Task, TaskId, Terms
 
 KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
 
@@ -23,6 +31,7 @@ class TaskBook:
         self._tasks: dict[TaskId, Task] = {}
         self._last_event: dict[TaskId, int] = {}
         self._finished: deque[TaskId] = deque()
+        self._live: dict[tuple[Submitter, int, int], dict[TaskId, None]] = {}
         self._counts: dict[int, list[int]] = {}  # by vehicle, then by state
         self._events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
@@ -46,8 +55,20 @@ class TaskBook:
         """Give how many tasks of a vehicle are in each state; the index is the TaskState."""
         return list(self._counts.get(vehicle, [0] * len(TaskState)))
 
-    def submit(self, draft: Draft, *, now: float) -> Task:
-        """Turn a draft into a queued task with an id never used before.
+    def restore(self, tasks: Iterable[Task], *, next_id: int) -> None:
+        """Take over the tasks of an earlier run, all of them durable."""
+        self._next_id = next_id
+        for task in tasks:
+            self._tasks[task.id] = task
+            self._last_event[task.id] = 0
+            self._count(task, 1)
+            if task.state in TERMINAL:
+                self._finished.append(task.id)
+            else:
+                self._note_live(task)
+
+    def submit(self, draft: Draft, *, state: TaskState = TaskState.QUEUED, now: float) -> Task:
+        """Turn a draft into a task with an id never used before.
 
         Rejection(QUOTA) when there are none left: a float32 parameter could not name it.
         """
@@ -58,14 +79,16 @@ class TaskBook:
             vehicle=draft.vehicle,
             command=draft.command,
             goal=draft.goal,
-            priority=draft.priority,
             submitter=draft.submitter,
-            nonce=draft.nonce,
+            marks=draft.marks,
             submitted_at=now,
+            terms=draft.terms,
+            state=state,
         )
         self._next_id += 1
         self._tasks[task.id] = task
         self._count(task, 1)
+        self._note_live(task)
         self.record(TaskSubmitted(task, now))
         self._last_event[task.id] = self.recorded
         return task
@@ -108,8 +131,24 @@ class TaskBook:
         )
         self._last_event[task_id] = self.recorded
         if new in TERMINAL:
+            self._forget_live(task)
             self._finish(task_id)
         return task
+
+    def modify(self, task_id: TaskId, terms: Terms, *, actor: str, now: float) -> Task:
+        """Change the terms of a task that is not over."""
+        old = self._tasks[task_id]
+        task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
+        self.record(TaskModified(task_id, task.vehicle, task.version, terms, actor, now))
+        self._last_event[task_id] = self.recorded
+        return task
+
+    def advance(self, task_id: TaskId, progress: Progress, *, now: float) -> None:
+        """Keep that a task has begun its next leg."""
+        old = self._tasks[task_id]
+        task = replace(old, progress=progress, version=old.version + 1)
+        self._tasks[task_id] = task
+        self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now))
 
     def note_progress(self, task_id: TaskId, progress: Progress) -> None:
         """Keep live progress, for status only: no event, no new version."""
@@ -119,8 +158,14 @@ class TaskBook:
         """Take back a submission that did not become durable in time."""
         task = self._tasks.pop(task_id)
         self._count(task, -1)
+        self._forget_live(task)
         del self._last_event[task_id]
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
+
+    def latest(self, submitter: Submitter, command: int, *, vehicle: int) -> Task | None:
+        """Give a client's latest task of a command that is not over."""
+        live = self._live.get((submitter, command, vehicle))
+        return self._tasks[next(reversed(live))] if live else None
 
     def record(self, event: Event) -> None:
         """Append an event to the journal."""
@@ -142,6 +187,17 @@ class TaskBook:
             oldest = self._finished.popleft()
             self._count(self._tasks.pop(oldest), -1)
             del self._last_event[oldest]
+
+    def _note_live(self, task: Task) -> None:
+        key = task.submitter, task.command, task.vehicle
+        self._live.setdefault(key, {})[task.id] = None
+
+    def _forget_live(self, task: Task) -> None:
+        key = task.submitter, task.command, task.vehicle
+        live = self._live[key]
+        del live[task.id]
+        if not live:
+            del self._live[key]
 
     def _count(self, task: Task, change: int) -> None:
         self._counts.setdefault(task.vehicle, [0] * len(TaskState))[task.state] += change

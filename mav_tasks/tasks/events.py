@@ -7,7 +7,7 @@ where events are stored or logged. ``actor`` is a client, or "server".
 from dataclasses import dataclass
 
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-from mav_tasks.tasks.task import Progress, Task, TaskId, describe
+from mav_tasks.tasks.task import Progress, Task, TaskId, Terms, describe
 
 SERVER = "server"
 
@@ -45,6 +45,35 @@ class TaskChanged:
         why = f": {words_of(self.reason)}" if self.reason else ""
         who = "" if self.actor == SERVER else f", by {self.actor}"
         return f"task {self.task_id} {self.new.name.lower()}{why}{who}"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskAdvanced:
+    """A task being executed has begun its next leg; not a move in the lifecycle table."""
+
+    task_id: TaskId
+    vehicle: int
+    version: int
+    progress: Progress
+    at: float
+
+    def __str__(self) -> str:
+        return f"task {self.task_id}: leg {self.progress.leg + 1} begun"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskModified:
+    """The terms of a task were changed."""
+
+    task_id: TaskId
+    vehicle: int
+    version: int
+    terms: Terms
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        return f"task {self.task_id} modified, by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +144,32 @@ class QueueContinued:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleIdentified:
+    """The vehicle behind a system id has told its unique id (AUTOPILOT_VERSION)."""
+
+    vehicle: int
+    uid: str
+    at: float
+
+    def __str__(self) -> str:
+        return f"vehicle {self.vehicle}: its unique id is {self.uid}"
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleSpeedSet:
+    """The speed of tasks that name none was changed; None: as in the settings."""
+
+    vehicle: int
+    speed: float | None
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        speed = "as configured" if self.speed is None else f"{self.speed:g} m/s"
+        return f"vehicle {self.vehicle}: default speed {speed}, by {self.actor}"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleSeen:
     """A vehicle was found, or is heard again."""
 
@@ -158,11 +213,15 @@ class ServerStopped:
 Event = (
     TaskSubmitted
     | TaskChanged
+    | TaskAdvanced
+    | TaskModified
     | TaskWaits
     | TaskWithdrawn
     | SubmissionRefused
     | QueuePaused
     | QueueContinued
+    | VehicleIdentified
+    | VehicleSpeedSet
     | VehicleSeen
     | VehicleNoted
     | ServerStopped

@@ -1,4 +1,4 @@
-"""(goal, where the vehicle is) → the velocity to ask for, or arrival. Closed loop, no memory.
+"""(leg, where the vehicle is) → the velocity to ask for, or arrival. Closed loop, no memory.
 
 Measured pose in, body velocity out; nothing is integrated, so that a lost setpoint, a pause or a
 pre-emption leaves no error behind. ``limits`` has the last word on what comes out.
@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.task import Goal, Move, Pose, Rotate
+from mav_tasks.tasks.task import Drive, Head, Move, Pose, Rotate, Wait
+
+#: what can be steered; every goal comes down to these (``legs``)
+Leg = Move | Rotate | Drive | Head | Wait
 
 APPROACH_GAIN = 1.2  # 1/s, of the last centimetres: speed = gain * remaining
 CREEP_SPEED = 0.02  # m/s, the least that a skid-steered vehicle still moves at
@@ -62,14 +65,16 @@ def wrap(angle: float) -> float:
     return atan2(sin(angle), cos(angle))
 
 
-def done_so_far(goal: Goal, anchor: Pose, pose: Pose, *, before: float) -> float:
-    """Give the metres along the line, or the radians turned, from the anchor towards the goal.
+def done_so_far(
+    leg: Leg, anchor: Pose, pose: Pose, *, before: float, elapsed: float = 0.0
+) -> float:
+    """Give the metres along the line, the radians turned, or the seconds, since the anchor.
 
     ``before`` is the last such value: of the turns that fit a measured heading, the nearest to it
     is meant, which holds as long as the vehicle is seen at least twice in half a turn. Negative
-    when the vehicle is behind its anchor.
+    when the vehicle is behind its anchor. ``elapsed`` is the time since ``before``.
     """
-    match goal:
+    match leg:
         case Move(distance=distance):
             along = (pose.north - anchor.north) * cos(anchor.yaw) + (pose.east - anchor.east) * sin(
                 anchor.yaw
@@ -78,6 +83,8 @@ def done_so_far(goal: Goal, anchor: Pose, pose: Pose, *, before: float) -> float
         case Rotate(angle=angle):
             turned = copysign(1.0, angle) * (pose.yaw - anchor.yaw)
             return before + wrap(turned - before)
+        case Drive() | Head() | Wait():
+            return before + elapsed
 
 
 def cross_track(anchor: Pose, pose: Pose) -> float:
@@ -87,21 +94,23 @@ def cross_track(anchor: Pose, pose: Pose) -> float:
     )
 
 
-def has_arrived(goal: Goal, remaining: float, *, within: float, driving: Driving) -> bool:
-    """Whether the measured place is the goal's end; ``within`` is a factor on the tolerance."""
-    match goal:
+def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) -> bool:
+    """Whether the measured place is the leg's end; ``within`` is a factor on the tolerance."""
+    match leg:
         case Move():
             return abs(remaining) <= within * driving.arrival_distance
         case Rotate():
             return abs(remaining) <= within * driving.arrival_angle
+        case Drive() | Head() | Wait():
+            return remaining <= 0.0
 
 
-def steer(goal: Goal, anchor: Pose, pose: Pose, *, remaining: float, driving: Driving) -> Velocity:
-    """Give the velocity that brings the vehicle nearer to the goal's end.
+def steer(leg: Leg, anchor: Pose, pose: Pose, *, remaining: float, driving: Driving) -> Velocity:
+    """Give the velocity that brings the vehicle nearer to the leg's end.
 
     ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
     """
-    match goal:
+    match leg:
         case Move(distance=distance, speed=speed):
             towards_end = _approach(
                 remaining,
@@ -111,10 +120,7 @@ def steer(goal: Goal, anchor: Pose, pose: Pose, *, remaining: float, driving: Dr
                 creep=CREEP_SPEED,
             )
             forward = copysign(towards_end, distance * remaining)
-            heading_error = _heading_error(anchor, pose, forward=forward)
-            steer_rate = HEADING_GAIN * heading_error
-            steer_rate = max(-MAX_STEER_RATE, min(MAX_STEER_RATE, steer_rate))
-            return Velocity(0.0 if abs(heading_error) > PIVOT_ERROR else forward, steer_rate)
+            return _towards(_heading_error(anchor, pose, forward=forward), forward)
         case Rotate(angle=angle, rate=rate):
             towards_end = _approach(
                 remaining,
@@ -124,6 +130,18 @@ def steer(goal: Goal, anchor: Pose, pose: Pose, *, remaining: float, driving: Dr
                 creep=CREEP_RATE,
             )
             return Velocity(0.0, copysign(towards_end, angle * remaining))
+        case Drive(forward=forward, yaw_rate=yaw_rate):
+            return Velocity(forward, yaw_rate)
+        case Head(yaw=yaw, forward=forward):
+            return _towards(wrap(yaw - pose.yaw), forward)
+        case Wait():
+            return ZERO
+
+
+def _towards(heading_error: float, forward: float) -> Velocity:
+    """Drive while pointing about right, and turn on the spot until then."""
+    rate = max(-MAX_STEER_RATE, min(MAX_STEER_RATE, HEADING_GAIN * heading_error))
+    return Velocity(0.0 if abs(heading_error) > PIVOT_ERROR else forward, rate)
 
 
 def _approach(remaining: float, *, top: float, braking: float, gain: float, creep: float) -> float:

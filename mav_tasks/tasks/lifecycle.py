@@ -119,6 +119,7 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
         _S.KILLED: "kill",
     },
     _S.BLOCKED: {
+        _S.SCHEDULED: "start time set",
         _S.QUEUED: "dependency done, or start command",
         _S.CANCELLED: "client",
         _S.EXPIRED: "deadline",
@@ -126,6 +127,8 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
         _S.KILLED: "kill",
     },
     _S.QUEUED: {
+        _S.SCHEDULED: "start time set",
+        _S.BLOCKED: "dependency set",
         _S.STARTING: "its turn",
         _S.CANCELLED: "client",
         _S.EXPIRED: "deadline",

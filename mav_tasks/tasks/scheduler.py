@@ -1,12 +1,16 @@
-"""Whether a task may start, and what it waits for: pure decisions."""
+"""Which task may run, what it waits for, and which may interrupt which: pure decisions."""
 
-from mav_tasks.settings import Watch
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.settings import Queueing, Watch
+from mav_tasks.tasks.frames import to_local
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.task import GlobalPlace, Goal, GoTo, LocalPlace, Task
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 
-def start_blocker(view: VehicleView, *, watch: Watch, now: float) -> TaskReason:
-    """Give why no task can take control of the vehicle now, or NONE.
+def start_blocker(
+    view: VehicleView, *, watch: Watch, now: float, goal: Goal | None = None
+) -> TaskReason:
+    """Give why no task, or not one of this goal, can take control of the vehicle now, or NONE.
 
     Modes are taken only from HOLD or from one that we set; from MANUAL only while disarmed.
     """
@@ -18,6 +22,31 @@ def start_blocker(view: VehicleView, *, watch: Watch, now: float) -> TaskReason:
         return TaskReason.WRONG_MODE
     if view.motion is None or now - view.motion.at > watch.motion_fresh:
         return TaskReason.NO_POSITION
+    if isinstance(goal, GoTo) and place_of(goal, view) is None:
+        return TaskReason.NO_POSITION
     if not view.armed and not view.may_arm:
         return TaskReason.DISARMED
     return TaskReason.NONE
+
+
+def place_of(goal: GoTo, view: VehicleView) -> LocalPlace | None:
+    """Give the place that a goal means in the vehicle's frame, or None while that is not known."""
+    place = view.home if goal.place is None else goal.place
+    if isinstance(place, GlobalPlace):
+        return None if view.origin is None else to_local(place, view.origin)
+    return place
+
+
+def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:
+    """Whether a waiting task may interrupt a running one.
+
+    By what they were submitted or modified with: neither aging nor the urgency of others counts.
+    """
+    if not running.terms.is_preemptible:
+        return False
+    if running.state not in (TaskState.STARTING, TaskState.EXECUTING):
+        return False
+    if waiting.terms.is_preemptive:
+        return not running.terms.is_preemptive or waiting.priority > running.priority
+    gap = queueing.preemption_gap
+    return gap > 0 and waiting.priority - running.priority >= gap

@@ -1,46 +1,79 @@
-"""The tasks of one vehicle: its queue, the begun one, and what makes the queue stand.
+"""The tasks of one vehicle: its queue, those begun, and what makes the queue stand.
 
 The STOP latch is the queue's pause reason STOPPED: there is no second flag. Nothing here knows how
 a vehicle is spoken to; ``step`` says what it must be made to do.
+
+One task at a time has the vehicle. Others may have begun and be set aside: pre-empted, or held.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
+from math import nan
 
 from mav_tasks.errors import Rejection
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import SERVER, QueueContinued, QueuePaused, TaskWaits
+from mav_tasks.tasks.estimate import duration_of, time_left
+from mav_tasks.tasks.events import (
+    SERVER,
+    QueueContinued,
+    QueuePaused,
+    TaskWaits,
+    VehicleSpeedSet,
+)
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
-from mav_tasks.tasks.queue import TaskQueue
-from mav_tasks.tasks.scheduler import start_blocker
-from mav_tasks.tasks.task import Draft, Task, TaskId
+from mav_tasks.tasks.queue import Rank
+from mav_tasks.tasks.scheduler import outranks, start_blocker
+from mav_tasks.tasks.task import Draft, Rotate, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
+from mav_tasks.tasks.waiting_room import WaitingRoom
 
-R = TaskReason
+R, S = TaskReason, TaskState
+
+FORESEEN = 500  # tasks ahead, beyond which nobody reckons when a task starts
 
 
 class VehicleTasks:
-    """Queue and begun task of the vehicle with this system id."""
+    """All tasks of the vehicle with this system id."""
 
-    def __init__(self, vehicle: int, book: TaskBook, settings: Settings) -> None:
+    def __init__(self, vehicle: int, book: TaskBook, room: WaitingRoom, settings: Settings) -> None:
         self.vehicle = vehicle
         self._book = book
+        self._room = room
+        self._queue = room.queue(vehicle)
         self._settings = settings
-        self._queue = TaskQueue(settings.queueing.capacity)
         self._executor = Executor(book, settings)
-        self._paused = TaskReason.NONE
-        self._blocker = TaskReason.NONE  # why the next task does not begin
+        self._aside: dict[TaskId, None] = {}
+        self._of_earlier_run: set[TaskId] = set()
+        self._speed: float | None = None  # of what names none; None: the settings' one
+        self._paused = R.NONE
+        self._urgent: TaskId | None = None  # runs although the queue is paused
+        self._is_halting = False  # killed: nothing begins before the vehicle stands
+        self._begun_at = 0.0
+        self._blocker = R.NONE  # why the next task does not begin
         self._blocked: TaskId | None = None  # which task that was
 
     def __repr__(self) -> str:
         return f"VehicleTasks({self.vehicle}, {self._queue!r}, {self._paused.name}, {self.begun!r})"
 
+    # what can be seen
+
     @property
     def begun(self) -> Task | None:
-        """The one task that is begun and not over."""
+        """The task that has the vehicle: begun, not over and not set aside."""
         return self._executor.task
+
+    @property
+    def aside(self) -> list[Task]:
+        """The tasks that have begun and were set aside."""
+        return [self._book[task_id] for task_id in self._aside]
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether any task has begun and is not over."""
+        return self.begun is not None or bool(self._aside)
 
     @property
     def paused(self) -> TaskReason:
@@ -50,64 +83,239 @@ class VehicleTasks:
     @property
     def is_stopped(self) -> bool:
         """Whether STOP is latched."""
-        return self._paused is TaskReason.STOPPED
+        return self._paused is R.STOPPED
 
     @property
     def waiting(self) -> list[TaskId]:
         """Waiting tasks, next one first."""
-        return self._queue.in_order()
+        return self._room.of(self.vehicle)
+
+    @property
+    def next_waiting(self) -> TaskId | None:
+        """The task that is next in the queue."""
+        return self._queue.first()
 
     @property
     def capacity(self) -> int:
         """How many tasks may wait."""
-        return self._queue.capacity
+        return self._settings.queueing.capacity
 
     @property
     def is_idle(self) -> bool:
-        """Whether there is neither a begun nor a waiting task."""
-        return self.begun is None and len(self._queue) == 0
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
-        self._queue.capacity = settings.queueing.capacity
-        self._executor.apply(settings)
+        """Whether there is neither a begun task nor one that could begin now."""
+        return not self.is_driving and len(self._queue) == 0
 
     @property
     def awaits_commit(self) -> bool:
         """Whether the next task waits for nothing but its submission being durable."""
-        first = self._queue.first()
+        first = self._next()
         return first is not None and self.begun is None and not self._book.is_durable(first)
 
     def position(self, task: Task) -> int | None:
-        """Give how many tasks run before this one, or None if it does not wait."""
-        ahead = self._queue.position(task)
+        """Give how many tasks run before this one, or None if it is not ready to run."""
+        ahead = self._queue.position(task.id)
         if ahead is None:
             return None
-        return ahead + (self.begun is not None)
+        return ahead + (self.begun is not None) + len(self._aside)
+
+    def page(self, first: int, count: int) -> list[TaskId]:
+        """Give up to ``count`` waiting tasks from a position on."""
+        if first + count <= len(self._queue):
+            return self._queue.page(first, count)
+        return self.waiting[first : first + count]
+
+    def estimate(self, task: Task, *, now: float) -> tuple[float, float]:
+        """Give the estimated seconds until a task starts, and until it ends; NaN: not known."""
+        match task.state:
+            case S.STARTING | S.EXECUTING:
+                return 0.0, time_left(task.goal, task.progress, self._driving)
+            case S.SCHEDULED:
+                to_start = self._room.due_at(task) - now
+            case S.QUEUED:
+                to_start = self._time_ahead(task)
+            case _:
+                return nan, nan
+        return to_start, to_start + duration_of(task.goal, self._driving)
+
+    def _time_ahead(self, task: Task) -> float:
+        """Give the seconds until those before it are done; NaN while nothing goes on."""
+        position = self._queue.position(task.id)
+        if self._paused or self._is_held_ahead or position is None or position > FORESEEN:
+            return nan
+        ahead = [self._book[task_id] for task_id in self._queue.page(0, position)]
+        begun = [task for task in (self.begun, *self.aside) if task is not None]
+        return sum(time_left(t.goal, t.progress, self._driving) for t in (*begun, *ahead))
 
     def wait_reason(self, task: Task) -> TaskReason:
         """Give why a task is not being executed; its own reason once it has begun."""
-        if task.state not in WAITING:
-            return task.reason
-        if self._paused:
-            return R.QUEUE_PAUSED
+        match task.state:
+            case S.SCHEDULED:
+                return R.START_TIME
+            case S.BLOCKED:
+                return R.DEPENDENCY
+            case S.QUEUED:
+                return self._why_queued(task)
+            case _:
+                return task.reason
+
+    def _why_queued(self, task: Task) -> TaskReason:
+        if self._is_held_ahead:
+            return R.HELD_AHEAD
+        if self._paused and task.id != self._urgent:
+            return R.RESTARTED if self._paused is R.RESTARTED else R.QUEUE_PAUSED
+        if self.begun is not None or self._queue.position(task.id):
+            return R.BEHIND_OTHERS
+        return self._blocker if self._blocked == task.id else R.NONE
+
+    @property
+    def _is_held_ahead(self) -> bool:
         begun = self.begun
-        if begun is not None:
-            return R.HELD_AHEAD if begun.state is TaskState.HELD else R.BEHIND_OTHERS
-        return R.BEHIND_OTHERS if self._queue.position(task) else self._blocker
+        return (begun is not None and begun.state is S.HELD) or any(
+            task.state is S.HELD for task in self.aside
+        )
+
+    # coming, changing, going
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        self._apply_driving()
+
+    def _apply_driving(self) -> None:
+        self._executor.apply(replace(self._settings, driving=self._driving))
+
+    @property
+    def _driving(self) -> Driving:
+        """The settings for driving, with the speed that a client has set."""
+        driving = self._settings.driving
+        return driving if self._speed is None else replace(driving, speed=self._speed)
+
+    def restore(self, tasks: Iterable[Task], *, paused: TaskReason, speed: float | None) -> None:
+        """Take on what had begun in an earlier run, as it was left."""
+        self._paused = paused
+        self._speed = speed
+        self._apply_driving()
+        for task in tasks:
+            self._of_earlier_run.add(task.id)
+            if self.begun is None and task.reason is not R.PREEMPTED:
+                self._executor.adopt(task)
+            else:
+                self._aside[task.id] = None
 
     def submit(self, draft: Draft, *, now: float) -> Task:
-        """Queue a task; Rejection(QUEUE_FULL) when too many wait."""
-        self._queue.check_room()
-        task = self._book.submit(draft, now=now)
-        self._queue.add(task)
-        return task
+        """Take a task in; Rejection when too many wait."""
+        return self._room.submit(draft, now=now)
+
+    def waits(self, task: Task) -> bool:
+        """Whether a task has not begun."""
+        return task.state in WAITING
 
     def withdraw(self, task: Task, *, now: float) -> None:
-        """Take back a submission that did not become durable; it cannot have left the queue."""
-        self._queue.remove(task)
-        self._book.withdraw(task.id, now=now)
+        """Take back a submission that did not become durable; it cannot have begun."""
+        self._room.withdraw(task, now=now)
+
+    def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
+        """Take a task in that runs at once; what runs and what waits goes on when continued."""
+        if self.is_stopped:
+            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        if self._is_held_ahead:
+            raise Rejection(R.HELD_AHEAD, "a held task must be released first")
+        task = self._room.submit(draft, now=now)
+        begun = self.begun
+        if begun is not None and begun.id == self._urgent:
+            self._executor.cancel(R.REPLACED, actor=actor, now=now)
+        elif begun is not None and begun.state in (S.STARTING, S.EXECUTING, S.PAUSED):
+            self._executor.pause(R.OPERATOR, actor=actor, now=now)
+            self._set_aside(begun.id)
+        if self._urgent is not None:
+            self._replace_urgent(actor=actor, now=now)
+        self._urgent = task.id
+        self._pause_queue(R.OPERATOR, actor=actor, now=now)
+        return task
+
+    def _replace_urgent(self, *, actor: str, now: float) -> None:
+        assert self._urgent is not None
+        before = self._book.get(self._urgent)
+        if before is not None and before.state in WAITING:
+            self._room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
+
+    def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
+        """Call a task off, or (kill) end it at once; the vehicle stands before anything begins."""
+        state = S.KILLED if kill else S.CANCELLED
+        if task.state in WAITING:
+            self._room.end(task, state, reason, actor=actor, now=now)
+        elif task.id in self._aside:
+            del self._aside[task.id]
+            if task.state is S.PAUSED and not kill:
+                self._book.change(task.id, S.CANCELLING, reason=reason, actor=actor, now=now)
+            self._book.change(task.id, state, reason=reason, actor=actor, now=now)
+            self._room.ended(task.id, now=now)
+        elif kill:
+            self._executor.kill(reason, actor=actor, now=now)
+            self._is_halting = True
+            self._ended(task.id, now=now)
+        else:
+            self._executor.cancel(reason, actor=actor, now=now)
+            if self.begun is None:
+                self._ended(task.id, now=now)
+
+    def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
+        """Change a task's terms; Rejection when it would wait for itself, or for nothing."""
+        if task.state in WAITING:
+            self._room.modify(task, terms, actor=actor, now=now)
+        else:
+            self._book.modify(task.id, terms, actor=actor, now=now)
+
+    def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
+        """Cancel what waits; with ``begun_too`` also what has begun."""
+        self._room.clear(self.vehicle, R.CLEARED, actor=actor, now=now)
+        if not begun_too:
+            return
+        for task in [*self.aside, *([] if self.begun is None else [self.begun])]:
+            self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
+
+    def release(
+        self, task: Task, *, again: bool, seen: VehicleView, actor: str, now: float
+    ) -> None:
+        """Let a held task go on from here: all of it again, or its remainder.
+
+        Rejection, and nothing is changed, while it could not take the vehicle.
+        """
+        if self.is_stopped:
+            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        begun = self.begun
+        if begun is not None and begun.id != task.id and begun.state is not S.HELD:
+            words = f"task {begun.id} is {begun.state.name.lower()}"
+            raise Rejection(R.WRONG_STATE, words)
+        self._check_start(seen, task, now=now)
+        if not again:
+            self._check_remainder(task, seen)
+        if begun is not None and begun.id != task.id:
+            self._set_aside(begun.id)
+        if self.begun is None:
+            self._aside.pop(task.id, None)
+            self._executor.adopt(task)
+        self._of_earlier_run.discard(task.id)
+        self._executor.release(again=again, actor=actor, now=now)
+        self._begun_at = now
+
+    def _check_remainder(self, task: Task, seen: VehicleView) -> None:
+        """What is left must be known: measured along its line, or counted until it was held."""
+        progress = task.progress
+        if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
+            return
+        turned = isinstance(task.goal, Rotate) and abs(task.goal.angle) > 3.0
+        if turned or not same_frame(progress.frame, seen.frame):
+            words = f"what task {task.id} had done is not known: run it again, or skip it"
+            raise Rejection(R.WRONG_STATE, words)
+
+    def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
+        """Set the speed of the task that runs, and of those to come that name none."""
+        self._speed = speed
+        self._apply_driving()
+        self._executor.speed = speed
+        self._book.record(VehicleSpeedSet(self.vehicle, speed, actor, now))
+        return None if self.begun is None else self.begun.id
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
         """Let the begun task and the queue stand; gives the task's id. Never undoes a STOP."""
@@ -123,63 +331,151 @@ class VehicleTasks:
         way, and everything stays as it is.
         """
         begun = self.begun
-        resumes = begun is not None and begun.state is TaskState.PAUSED
-        if resumes:
-            blocker = start_blocker(seen, watch=self._settings.watch, now=now)
-            if blocker:
-                raise Rejection(blocker, f"cannot continue: {words_of(blocker)}")
-        elif begun is not None and begun.state is TaskState.HELD:
-            words = f"task {begun.id} is held ({words_of(begun.reason)}): STOP ends it"
+        resumes = begun is not None and begun.state is S.PAUSED
+        held = next((t for t in (begun, *self.aside) if t is not None and t.state is S.HELD), None)
+        if held is not None:
+            words = f"task {held.id} is held ({words_of(held.reason)}): release it first"
             raise Rejection(R.WRONG_STATE, words)
+        if resumes:
+            assert begun is not None
+            self._check_start(seen, begun, now=now)
         if self._paused:
             self._paused = R.NONE
             self._book.record(QueueContinued(self.vehicle, actor, now))
         if resumes:
-            self._executor.resume(seen, actor=actor, now=now)
+            assert begun is not None
+            self._resume(begun, seen, actor=actor, now=now)
         begun = self.begun
-        return None if begun is None or begun.state is TaskState.HELD else begun.id
+        return None if begun is None or begun.state is S.HELD else begun.id
+
+    def _check_start(self, seen: VehicleView, task: Task, *, now: float) -> None:
+        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=task.goal)
+        if blocker:
+            raise Rejection(blocker, f"cannot continue: {words_of(blocker)}")
+
+    def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
+        if self._is_of_another_frame(task, seen):
+            self._executor.hold(R.FRAME_RESET, now=now)
+        else:
+            self._executor.resume(seen, actor=actor, now=now)
+            self._begun_at = now
+
+    def _is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:
+        """Whether what is left of an earlier run was in coordinates that mean nothing any more."""
+        return (
+            task.id in self._of_earlier_run
+            and task.progress.anchor is not None
+            and not same_frame(task.progress.frame, seen.frame)
+        )
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Set the begun task aside until somebody decides what becomes of it."""
+        """Set the begun task aside until somebody decides what becomes of it.
+
+        With its frame every other line is lost, too.
+        """
         self._executor.hold(reason, now=now)
+        if reason is R.FRAME_RESET:
+            for task in self.aside:
+                if task.state is S.PAUSED and task.progress.anchor is not None:
+                    self._book.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
-        """Kill the begun task and latch; with ``clear`` the waiting ones are cancelled too."""
+        """Kill the begun task and latch; with ``clear`` all others are cancelled too."""
         killed = self._executor.kill(R.STOP, actor=actor, now=now)
+        self._urgent = None
         self._pause_queue(R.STOPPED, actor=actor, now=now)
         if clear:
-            for task_id in self._queue.in_order():
-                self._queue.remove(self._book[task_id])
-                self._book.change(
-                    task_id, TaskState.CANCELLED, reason=R.CLEARED, actor=actor, now=now
-                )
+            self.clear(begun_too=True, actor=actor, now=now)
+        if killed is not None:
+            self._room.ended(killed, now=now)
         return killed
+
+    # time
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Begin what can begin, and give what the vehicle must be made to do now."""
         if self.is_stopped:
             return view.STOP
+        if self._is_halting:
+            if not seen.still:
+                return view.HALT
+            self._is_halting = False
         before = self.begun
         demand = self._executor.step(seen, now=now)
         if before is not None and self.begun is None:
-            self._after_end(self._book[before.id], now=now)
-        if self.begun is not None:
+            self._ended(before.id, now=now)
+        if self.begun is not None and not self._is_interrupted(seen, now=now):
             return demand
         self._begin_next(seen, now=now)
         if self.begun is not None:  # what was refused was refused to the one before
             return self._executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 
-    def _begin_next(self, seen: VehicleView, *, now: float) -> None:
+    def _is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
+        """Set the running task aside if a waiting one may interrupt it, and could begin."""
+        running = self.begun
+        if running is None or self._paused or not self._queue:
+            return False
+        if now - self._begun_at < self._settings.queueing.preemption_rest:
+            return False
+        for task_id in (self._queue.first_preemptive(), self._queue.first()):
+            if task_id is None or not self._book.is_durable(task_id):
+                continue
+            waiting = self._book[task_id]
+            if outranks(waiting, running, queueing=self._settings.queueing) and not start_blocker(
+                seen, watch=self._settings.watch, now=now, goal=waiting.goal
+            ):
+                self._executor.pause(R.PREEMPTED, actor=SERVER, now=now)
+                self._set_aside(running.id)
+                self._begin(waiting, seen, now=now)
+                return True
+        return False
+
+    def _set_aside(self, task_id: TaskId) -> None:
+        self._executor.give_up()
+        self._aside[task_id] = None
+
+    def _next(self) -> TaskId | None:
+        """The task that has the next turn: the urgent one, a pre-empted one, or a waiting one."""
+        if self._is_held_ahead:
+            return None
+        if self._urgent is not None and self._urgent in self._queue:
+            return self._urgent
+        if self._paused:
+            return None
         first = self._queue.first()
-        if first is None or self._paused:
-            return
-        self._note_blocker(first, start_blocker(seen, watch=self._settings.watch, now=now), now=now)
-        if self._blocker or not self._book.is_durable(first):
+        resumable = [task for task in self.aside if task.state is S.PAUSED]
+        if not resumable:
+            return first
+        best = min(resumable, key=self._rank)
+        if first is not None and self._queue.rank(first) < self._rank(best):
+            return first
+        return best.id
+
+    def _rank(self, task: Task) -> Rank:
+        return self._room.rank(task)
+
+    def _begin_next(self, seen: VehicleView, *, now: float) -> None:
+        first = None if self.begun is not None else self._next()
+        if first is None:
             return
         task = self._book[first]
-        self._queue.remove(task)
-        self._executor.begin(task, actor=SERVER, now=now)
+        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=task.goal)
+        self._note_blocker(first, blocker, now=now)
+        if not blocker and self._book.is_durable(first):
+            self._begin(task, seen, now=now)
+
+    def _begin(self, task: Task, seen: VehicleView, *, now: float) -> None:
+        if task.state is S.QUEUED:
+            self._room.leave(task)
+        else:
+            del self._aside[task.id]
+        self._begun_at = now
+        if self._is_of_another_frame(task, seen):
+            self._executor.adopt(task)
+            self._executor.hold(R.FRAME_RESET, now=now)
+        else:
+            self._executor.begin(task, actor=SERVER, now=now)
 
     def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
         """Keep why the next task does not begin, and tell of it once each time that it changes."""
@@ -187,11 +483,15 @@ class VehicleTasks:
             self._book.record(TaskWaits(first, self.vehicle, blocker, now))
         self._blocked, self._blocker = first, blocker
 
-    def _after_end(self, task: Task, *, now: float) -> None:
-        """After a failure that had moved the vehicle, somebody should look before the next."""
+    def _ended(self, task_id: TaskId, *, now: float) -> None:
+        """A task is over. After a failure that had moved the vehicle, somebody should look."""
+        task = self._book[task_id]
+        if task_id == self._urgent:
+            self._urgent = None
         moved = task.progress.anchor is not None
-        if task.state is TaskState.FAILED and moved and self._settings.on_failure == "pause":
+        if task.state is S.FAILED and moved and self._settings.on_failure == "pause":
             self._pause_queue(task.reason, actor=SERVER, now=now)
+        self._room.ended(task_id, now=now)
 
     def _pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
         if self._paused in (reason, R.STOPPED):

@@ -5,6 +5,7 @@ from enum import Enum, auto
 
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Frame, GlobalPlace
 
 
 class ModeKind(Enum):
@@ -33,6 +34,16 @@ class VehicleView:
     motion: Motion | None  # the last measured, however old
     still: bool  # measured to stand still
     other_controller: bool  # somebody else's setpoints were seen just now
+    frame: Frame | None = None  # that positions are in, where it is known
+    home: GlobalPlace | None = None
+
+    @property
+    def origin(self) -> GlobalPlace | None:
+        """Where the local frame begins on earth, if that is known."""
+        frame = self.frame
+        if frame is None or frame.latitude_degE7 is None or frame.longitude_degE7 is None:
+            return None
+        return GlobalPlace(frame.latitude_degE7, frame.longitude_degE7)
 
 
 class DemandKind(Enum):
@@ -48,6 +59,8 @@ class DemandKind(Enum):
     HAND_BACK = auto()
     #: zeros and the mode HOLD at once, both until confirmed
     STOP = auto()
+    #: as STOP, and begun anew as long as it does not stand
+    HALT = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,3 +76,4 @@ TAKE = Demand(DemandKind.TAKE)
 HOLD = Demand(DemandKind.HOLD)
 HAND_BACK = Demand(DemandKind.HAND_BACK)
 STOP = Demand(DemandKind.STOP)
+HALT = Demand(DemandKind.HALT)

@@ -28,19 +28,21 @@ class Origin:
 
     def to_global(self, north: float, east: float) -> tuple[int, int]:
         """Give latitude and longitude in degE7."""
-        east_scale = METRES_PER_DEGREE * math.cos(math.radians(self.latitude))
-        return (
-            round((self.latitude + north / METRES_PER_DEGREE) * 1e7),
-            round((self.longitude + east / east_scale) * 1e7),
-        )
+        latitude = self.latitude + north / METRES_PER_DEGREE
+        longitude = self.longitude + east / self._metres_per_degree_east(latitude)
+        return round(latitude * 1e7), round(longitude * 1e7)
 
     def to_local(self, latitude_degE7: int, longitude_degE7: int) -> tuple[float, float]:
         """Give north and east in metres."""
-        east_scale = METRES_PER_DEGREE * math.cos(math.radians(self.latitude))
+        latitude = latitude_degE7 * 1e-7
         return (
-            (latitude_degE7 * 1e-7 - self.latitude) * METRES_PER_DEGREE,
-            (longitude_degE7 * 1e-7 - self.longitude) * east_scale,
+            (latitude - self.latitude) * METRES_PER_DEGREE,
+            (longitude_degE7 * 1e-7 - self.longitude) * self._metres_per_degree_east(latitude),
         )
+
+    def _metres_per_degree_east(self, latitude: float) -> float:
+        """Of longitude, between the origin and a place at this latitude: half-way between them."""
+        return METRES_PER_DEGREE * math.cos(math.radians((self.latitude + latitude) / 2))
 
 
 DEFAULT_ORIGIN = Origin(-35.363262, 149.165237, 584.0)  # where ArduPilot's SITL starts

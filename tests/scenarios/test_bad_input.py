@@ -213,20 +213,20 @@ def test_nan_is_not_given_and_zero_is_nothing_to_do(world: World, command: int) 
     assert world.task(1).priority == 5
 
 
-def test_what_is_not_built_yet_is_refused_and_never_left_out(world: World) -> None:
-    after = world.client.command(MOVE, 1, 0, 0, 0, 1, 0, 5)
+def test_what_means_nothing_yet_is_refused_and_never_left_out(world: World) -> None:
+    reserved = world.client.command(MOVE, 1, 0, 7, 0, 0, 0, 5)
     world.run(0.1)
-    delayed = world.client.command(MOVE, 1, 0, 0, 0, 0, 3, 5)
+    unknown_task = world.client.command(MOVE, 1, 0, 0, 0, 99, 0, 5)
     world.run(0.1)
-    driven = world.client.command(54002, 1, 0, 1)
+    option = world.client.command(54014, 1)
     frame = world.client.command_int(MOVE, 1, frame=77)
     world.run(0.1)
-    assert [s.answer for s in (after, delayed, frame)] == [
+    assert [s.answer for s in (reserved, unknown_task, frame)] == [
         (DENIED, R.BAD_PARAMETER),
-        (DENIED, R.BAD_PARAMETER),
+        (DENIED, R.UNKNOWN_DEPENDENCY),
         (DENIED, R.BAD_FRAME),
     ]
-    assert driven.answer == (common.MAV_RESULT_UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert option.answer == (common.MAV_RESULT_UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
 
 
 def test_unverified_bytes_of_our_own_address_are_no_second_server(world: World) -> None:

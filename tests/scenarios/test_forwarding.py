@@ -467,14 +467,6 @@ def test_a_clients_stream_makes_tasks_wait(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-def test_go_to_is_denied_while_a_task_drives(world: World) -> None:
-    world.client.move(2)
-    world.run(2)
-    sent = world.client.command_int(192, -1, 1, 0, 0, x=1, y=1, frame=6, target=(1, 1))
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.NOT_ALLOWED)
-
-
 @pytest.mark.parametrize("field", ["vx", "yaw_rate", "x"])
 def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, field: str) -> None:
     world.operator_arm(True)

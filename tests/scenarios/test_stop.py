@@ -252,9 +252,7 @@ MOVING_COMMANDS: list[Callable[[World], object]] = [
     lambda world: world.client.command_int(400, 1, target=(1, 1)),
     lambda world: world.client.mode(GUIDED),
     lambda world: world.client.mode(AUTO, target=(1, 99)),
-    lambda world: world.client.command(20, target=(1, 1)),
     lambda world: world.client.command(300, target=(1, 50)),
-    lambda world: world.client.command_int(192, -1, 1, 0, 0, x=1, y=1, frame=6, target=(1, 1)),
     lambda world: world.client.command(209, 1, 0, 50, 10, target=(1, 1)),
 ]
 

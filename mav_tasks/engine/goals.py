@@ -1,0 +1,297 @@
+"""Commands → drafts of tasks; a Rejection names what is wrong. Pure functions.
+
+Our own commands, and the standard ones that a stock client sends without knowing of us.
+"""
+
+from collections.abc import Callable
+from hashlib import blake2b
+from math import degrees, inf, isnan, radians
+from struct import Struct
+from typing import NamedTuple
+
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.services.command_receiver import Command
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import (
+    DEFAULT_PRIORITY,
+    MAX_PRIORITY,
+    MAX_TASK_ID,
+    Drive,
+    Face,
+    GlobalPlace,
+    Goal,
+    GoTo,
+    Head,
+    LocalPlace,
+    Marks,
+    Move,
+    Place,
+    Rotate,
+    Terms,
+    Wait,
+)
+
+R = TaskReason
+
+#: a COMMAND_INT may name any frame there is where its numbers are no coordinates
+KNOWN_FRAMES = frozenset(MavFrame)
+GLOBAL_FRAMES = frozenset(
+    {
+        MavFrame.GLOBAL,
+        MavFrame.GLOBAL_RELATIVE_ALT,
+        MavFrame.GLOBAL_INT,
+        MavFrame.GLOBAL_RELATIVE_ALT_INT,
+        MavFrame.GLOBAL_TERRAIN_ALT,
+        MavFrame.GLOBAL_TERRAIN_ALT_INT,
+    }
+)
+NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT, which has no NaN there
+LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
+MAX_WAIT = 86_400.0  # s
+MAX_DELAY = 31_536_000.0  # s, a year
+HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own time-out of a setpoint
+
+_MARK = Struct("<BBHh7d")
+
+
+class Wish(NamedTuple):
+    """What a command asks for: a goal, and on what terms."""
+
+    goal: Goal
+    terms: Terms
+    marks: Marks
+
+
+def wish_of(command: Command, packet: bytes, driving: Driving, *, now: float) -> Wish:
+    """Give what a command that becomes a task asks for; Rejection names a bad parameter."""
+    if command.frame is not None and command.frame not in KNOWN_FRAMES:
+        raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
+    goal = _GOALS[command.command](command, driving)
+    if command.command not in OURS:
+        return Wish(goal, Terms(), marks_of(command, packet))
+    marks = marks_of(command, packet, nonce=whole(command, 4, "nonce", high=MAX_TASK_ID))
+    after = whole(command, 5, "run after", high=MAX_TASK_ID)
+    delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
+    priority = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
+    start_at = now + delay if delay > 0 else None
+    return Wish(goal, Terms(priority=priority, after=after, start_at=start_at), marks)
+
+
+def becomes_task(number: int) -> bool:
+    """Whether a command of this MAV_CMD number asks for a task."""
+    return number in _GOALS
+
+
+def marks_of(command: Command, packet: bytes, *, nonce: int = 0) -> Marks:
+    """Give by what a submission is recognised when it comes again; NaN is equal to NaN."""
+    system_id, component_id = command.target
+    frame = -1 if command.frame is None else command.frame
+    params = (0.0 if isnan(p) else p + 0.0 for p in command.params)
+    given = "".join("n" if isnan(p) else "." for p in command.params)
+    packed = _MARK.pack(system_id, component_id, command.command, frame, *params)
+    return Marks(nonce, _digest(packed + given.encode()), _digest(packet))
+
+
+def _digest(data: bytes) -> str:
+    return blake2b(data, digest_size=9).hexdigest()
+
+
+# numbers
+
+
+def number(
+    command: Command,
+    index: int,
+    name: str,
+    *,
+    low: float,
+    high: float,
+    default: float | None = None,
+) -> float:
+    """Give a parameter, or raise a Rejection that names it. NaN is "not given"."""
+    value = command.params[index - 1]
+    if low <= value <= high:
+        return value
+    label = f"param{index} {name}"
+    if not isnan(value):
+        words = f"{label} {value:.8g} not in {low:.8g}..{high:.8g}"
+        raise Rejection(R.BAD_PARAMETER, words)
+    if default is None:
+        raise Rejection(R.BAD_PARAMETER, f"{label} is not given")
+    return default
+
+
+def whole(
+    command: Command, index: int, name: str, *, low: int = 0, high: int, default: int = 0
+) -> int:
+    """Give a parameter that must be a whole number, or raise a Rejection that names it."""
+    value = number(command, index, name, low=low, high=high, default=float(default))
+    if value != int(value):
+        words = f"param{index} {name} {value:.8g} is not a whole number"
+        raise Rejection(R.BAD_PARAMETER, words)
+    return int(value)
+
+
+def flag(command: Command, index: int, name: str) -> bool:
+    """Give a parameter that is 0 or 1."""
+    return whole(command, index, name, high=1) == 1
+
+
+def place_in(command: Command) -> Place | None:
+    """Give the place in x and y, or None if none is given; Rejection names what is wrong."""
+    x, y = command.params[4:6]
+    if command.frame is None:
+        if isnan(x) and isnan(y):
+            return None
+        latitude = number(command, 5, "latitude", low=-90.0, high=90.0)
+        longitude = number(command, 6, "longitude", low=-180.0, high=180.0)
+        return _global(round(latitude * 1e7), round(longitude * 1e7))
+    if x == NOT_GIVEN and y == NOT_GIVEN:
+        return None
+    if command.frame == MavFrame.LOCAL_NED:
+        return LocalPlace(x / LOCAL_SCALE, y / LOCAL_SCALE)
+    if command.frame not in GLOBAL_FRAMES:
+        raise Rejection(R.BAD_FRAME, f"frame {command.frame} is not supported here")
+    if abs(x) > 90e7:
+        raise Rejection(R.BAD_PARAMETER, f"x latitude {x / 1e7:.7f} not in -90..90")
+    if abs(y) > 180e7:
+        raise Rejection(R.BAD_PARAMETER, f"y longitude {y / 1e7:.7f} not in -180..180")
+    return _global(int(x), int(y))
+
+
+def _global(latitude_degE7: int, longitude_degE7: int) -> GlobalPlace:
+    if latitude_degE7 == longitude_degE7 == 0:  # what an unset place looks like
+        raise Rejection(R.BAD_PARAMETER, "latitude and longitude are 0: no place is given")
+    return GlobalPlace(latitude_degE7, longitude_degE7)
+
+
+def _place(command: Command) -> Place:
+    place = place_in(command)
+    if place is None:
+        raise Rejection(R.BAD_PARAMETER, "param5 latitude, param6 longitude: not given")
+    return place
+
+
+def _yaw(command: Command, index: int) -> float | None:
+    """Give a heading in radians, None where none is asked for."""
+    value = number(command, index, "yaw", low=-360.0, high=360.0, default=inf)
+    return None if value == inf else radians(value)
+
+
+def _speed(command: Command, index: int, driving: Driving) -> float | None:
+    """Give a speed in m/s, None for the default: 0, -1 or NaN."""
+    if command.params[index - 1] == -1.0:
+        return None
+    speed = number(command, index, "speed", low=0.0, high=driving.max_speed, default=0.0)
+    return speed or None
+
+
+# goals
+
+
+def _move(command: Command, driving: Driving) -> Goal:
+    longest = driving.max_distance
+    distance = number(command, 1, "distance", low=-longest, high=longest)
+    speed = number(command, 2, "speed", low=0.0, high=driving.max_speed, default=0.0)
+    _refuse_reserved(command, 3)
+    if distance == 0.0:
+        raise Rejection(R.BAD_PARAMETER, "param1 distance is 0: nothing to do")
+    return Move(distance, speed or None)
+
+
+def _rotate(command: Command, driving: Driving) -> Goal:
+    turn, fastest = degrees(driving.max_turn), degrees(driving.max_turn_rate)
+    angle = number(command, 1, "angle", low=-turn, high=turn)
+    rate = number(command, 2, "rate", low=0.0, high=fastest, default=0.0)
+    _refuse_reserved(command, 3)
+    if angle == 0.0:
+        raise Rejection(R.BAD_PARAMETER, "param1 angle is 0: nothing to do")
+    return Rotate(radians(angle), radians(rate) or None)
+
+
+def _drive(command: Command, driving: Driving) -> Goal:
+    top, fastest = driving.max_speed, degrees(driving.max_turn_rate)
+    forward = number(command, 1, "forward speed", low=-top, high=top, default=0.0)
+    rate = number(command, 2, "yaw rate", low=-fastest, high=fastest, default=0.0)
+    duration = number(command, 3, "duration", low=0.0, high=driving.max_duration)
+    if duration == 0.0:
+        raise Rejection(R.BAD_PARAMETER, "param3 duration is 0: nothing to do")
+    if forward == rate == 0.0:
+        raise Rejection(R.BAD_PARAMETER, "param1 speed and param2 rate are 0: nothing to do")
+    return Drive(forward, radians(rate), duration)
+
+
+def _refuse_reserved(command: Command, index: int) -> None:
+    """What may come to mean something is refused until it does, never left out in silence."""
+    if not (isnan(command.params[index - 1]) or command.params[index - 1] == 0.0):
+        raise Rejection(R.BAD_PARAMETER, f"param{index} (unused): must be 0 in this version")
+
+
+def _waypoint(command: Command, _driving: Driving) -> Goal:
+    hold = number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0)
+    radius = number(command, 2, "acceptance radius", low=0.0, high=1000.0, default=0.0)
+    return GoTo(_place(command), None, radius or None, _yaw_if_given(command), hold)
+
+
+def _yaw_if_given(command: Command) -> float | None:
+    """NAV_WAYPOINT's yaw: many clients leave a 0 there that is not meant as north."""
+    return None if command.params[3] == 0.0 else _yaw(command, 4)
+
+
+def _reposition(command: Command, driving: Driving) -> Goal:
+    speed = _speed(command, 1, driving)
+    radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
+    return GoTo(_place(command), speed, max(radius, 0.0) or None, _yaw_if_given(command))
+
+
+def _loiter_time(command: Command, _driving: Driving) -> Goal:
+    seconds = number(command, 1, "time", low=0.0, high=MAX_WAIT)
+    here = tuple(command.params[4:6]) == (0.0, 0.0) or place_in(command) is None
+    return Wait(seconds) if here else GoTo(_place(command), wait=seconds)
+
+
+def _return(_command: Command, _driving: Driving) -> Goal:
+    return GoTo(None)
+
+
+def _delay(command: Command, _driving: Driving) -> Goal:
+    if command.params[0] == -1.0:
+        words = "param1 -1: a time of day is not supported, see START_UTC"
+        raise Rejection(R.BAD_PARAMETER, words)
+    return Wait(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
+
+
+def _condition_yaw(command: Command, driving: Driving) -> Goal:
+    angle = number(command, 1, "angle", low=-360.0, high=360.0)
+    fastest = degrees(driving.max_turn_rate)
+    rate = radians(number(command, 2, "rate", low=0.0, high=fastest, default=0.0)) or None
+    direction = whole(command, 3, "direction", low=-1, high=1)
+    if not flag(command, 4, "relative"):
+        return Face(radians(angle), direction, rate)
+    if angle == 0.0:
+        raise Rejection(R.BAD_PARAMETER, "param1 angle is 0: nothing to do")
+    return Rotate(radians(angle if direction >= 0 else -angle), rate)
+
+
+def _set_yaw_speed(command: Command, driving: Driving) -> Goal:
+    angle = number(command, 1, "angle", low=-360.0, high=360.0)
+    top = driving.max_speed
+    speed = number(command, 2, "speed", low=-top, high=top)
+    return Head(radians(angle), speed, HEAD_FOR, is_relative=flag(command, 3, "relative"))
+
+
+OURS = frozenset({MavCmd.TASK_MOVE, MavCmd.TASK_ROTATE, MavCmd.TASK_DRIVE})
+_GOALS: dict[int, Callable[[Command, Driving], Goal]] = {
+    MavCmd.TASK_MOVE: _move,
+    MavCmd.TASK_ROTATE: _rotate,
+    MavCmd.TASK_DRIVE: _drive,
+    MavCmd.NAV_WAYPOINT: _waypoint,
+    MavCmd.NAV_LOITER_TIME: _loiter_time,
+    MavCmd.NAV_RETURN_TO_LAUNCH: _return,
+    MavCmd.NAV_DELAY: _delay,
+    MavCmd.CONDITION_YAW: _condition_yaw,
+    MavCmd.DO_REPOSITION: _reposition,
+    MavCmd.NAV_SET_YAW_SPEED: _set_yaw_speed,
+}

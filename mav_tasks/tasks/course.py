@@ -1,0 +1,70 @@
+"""Drives one goal, leg after leg: where the vehicle is → the velocity to ask for, or the end."""
+
+from dataclasses import replace
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks import guidance
+from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
+from mav_tasks.tasks.legs import anchor_of, leg_count, leg_of, length_of
+from mav_tasks.tasks.task import Goal, GoTo, Head, Move, Progress, Wait
+
+MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
+
+
+class Course:
+    """One goal on its way; ``progress`` is all that there is to resume it."""
+
+    def __init__(self, goal: Goal, progress: Progress) -> None:
+        self.goal = goal
+        self.progress = progress
+
+    def __repr__(self) -> str:
+        return f"Course({self.goal}, {self.progress})"
+
+    @property
+    def leg(self) -> Leg:
+        """The present leg."""
+        return leg_of(self.goal, self.progress)
+
+    @property
+    def remaining(self) -> float:
+        """What is left of the present leg; negative beyond its end."""
+        return length_of(self.leg) - self.progress.done
+
+    def look(self, motion: Motion, *, elapsed: float) -> None:
+        """Take in where the vehicle is, ``elapsed`` seconds after the last look."""
+        anchor = self.progress.anchor
+        assert anchor is not None, "a course has an anchor"
+        before = self.progress.done
+        done = guidance.done_so_far(self.leg, anchor, motion.pose, before=before, elapsed=elapsed)
+        self.progress = replace(self.progress, done=done)
+
+    def has_arrived(self, *, stands: bool, driving: Driving) -> bool:
+        """Whether to stand here: near the end while moving; anywhere within tolerance at rest."""
+        within = 1.0 if stands else MOVING_TOLERANCE
+        remaining = self.remaining
+        if isinstance(self.goal, GoTo) and self.goal.radius and self.progress.leg == 0:
+            return abs(remaining) <= self.goal.radius
+        return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
+
+    def advance(self, motion: Motion) -> bool:
+        """Begin the next leg where the vehicle stands; False: there is none."""
+        following = self.progress.leg + 1
+        if following >= leg_count(self.goal):
+            return False
+        anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
+        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0)
+        return True
+
+    def steer(self, motion: Motion, *, driving: Driving, speed: float | None) -> Velocity:
+        """Give the velocity towards the end of the leg; ``speed`` m/s overrides what it says."""
+        anchor = self.progress.anchor
+        assert anchor is not None, "a course has an anchor"
+        leg = self.leg
+        if speed is not None and isinstance(leg, Move):
+            leg = replace(leg, speed=speed)
+        elif speed is not None and isinstance(leg, Head):
+            leg = replace(leg, forward=speed)
+        if isinstance(leg, Wait):
+            return ZERO
+        return guidance.steer(leg, anchor, motion.pose, remaining=self.remaining, driving=driving)

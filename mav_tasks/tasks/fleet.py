@@ -1,0 +1,82 @@
+"""The tasks of all vehicles, whether the vehicles are there or not, and what a restart makes of
+them.
+"""
+
+from collections.abc import Iterator
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SERVER, QueuePaused
+from mav_tasks.tasks.lifecycle import ACTIVE, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+from mav_tasks.tasks.waiting_room import WaitingRoom
+
+R, S = TaskReason, TaskState
+
+LONG_IDLE = 600.0  # s without a write before the start: nobody remembers what was queued
+RUNNING = frozenset({S.STARTING, S.EXECUTING, S.CANCELLING})
+
+
+class Fleet:
+    """``VehicleTasks`` by system id, and the room in which all their tasks wait."""
+
+    def __init__(self, book: TaskBook, settings: Settings) -> None:
+        self._book = book
+        self._settings = settings
+        self._of: dict[int, VehicleTasks] = {}
+        self.room = WaitingRoom(book, settings)
+        #: vehicles that a task was driving when the last run ended
+        self.to_be_halted: set[int] = set()
+
+    def __iter__(self) -> Iterator[VehicleTasks]:
+        return iter(self._of.values())
+
+    def of(self, vehicle: int) -> VehicleTasks:
+        """Give the tasks of a vehicle; there need not be any yet, nor the vehicle."""
+        tasks = self._of.get(vehicle)
+        if tasks is None:
+            tasks = VehicleTasks(vehicle, self._book, self.room, self._settings)
+            self._of[vehicle] = tasks
+        return tasks
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        self.room.apply(settings)
+        for tasks in self:
+            tasks.apply(settings)
+
+    def restore(self, restored: Restored, *, now: float) -> None:
+        """Take over an earlier run: what ran is held, nothing that was under way runs by itself."""
+        self._book.restore(restored.tasks, next_id=restored.next_id)
+        begun: dict[int, list[Task]] = {}
+        waiting: set[int] = set()
+        for task in restored.tasks:
+            if task.state in RUNNING:
+                self.to_be_halted.add(task.vehicle)
+                task = self._book.change(
+                    task.id, S.HELD, reason=R.OUTCOME_UNKNOWN, actor=SERVER, now=now
+                )
+            if task.state in ACTIVE:
+                begun.setdefault(task.vehicle, []).append(task)
+            elif task.state in WAITING:
+                waiting.add(task.vehicle)
+        self.room.restore(restored.tasks, now=now)
+        for vehicle in begun.keys() | waiting | restored.paused.keys() | restored.speeds.keys():
+            paused = restored.paused.get(vehicle, R.NONE)
+            has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
+            is_doubtful = self._is_doubtful(restored) and (vehicle in begun or vehicle in waiting)
+            if not paused and (has_paused or is_doubtful):
+                paused = R.RESTARTED
+                self._book.record(QueuePaused(vehicle, paused, SERVER, now))
+            self.of(vehicle).restore(
+                begun.get(vehicle, ()), paused=paused, speed=restored.speeds.get(vehicle)
+            )
+
+    def _is_doubtful(self, restored: Restored) -> bool:
+        """Whether somebody should look before what was queued runs."""
+        if self._settings.on_restart == "continue":
+            return False
+        return not restored.ended_well or restored.idle > LONG_IDLE

@@ -1,0 +1,26 @@
+"""What a store gives back when the server starts: the tasks as their events had left them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Task
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """The state of an earlier run. All times are monotonic seconds of the present one.
+
+    ``tasks`` are in the order of their ids, ``next_id`` was never given to any. ``paused`` are the
+    queues that stood, with the reason, ``uids`` the vehicles' unique ids and ``speeds`` their
+    default speeds in m/s, each by system id. ``ended_well``: the last run closed its store;
+    ``idle`` is the seconds since it last wrote.
+    """
+
+    tasks: tuple[Task, ...] = ()
+    next_id: int = 1
+    paused: Mapping[int, TaskReason] = field(default_factory=dict)
+    uids: Mapping[int, str] = field(default_factory=dict)
+    speeds: Mapping[int, float] = field(default_factory=dict)
+    ended_well: bool = True
+    idle: float = 0.0

@@ -1,0 +1,54 @@
+"""Whether a vehicle that is told to move does: the same place for too long, or for too much asked.
+
+Two ways to see it: no progress towards the end of the leg, or, where a leg has no place to come
+nearer to, standing still while a velocity is asked for.
+"""
+
+from math import inf
+
+from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.guidance import Velocity
+from mav_tasks.tasks.task import Move, Rotate
+from mav_tasks.tasks.view import VehicleView
+
+PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
+BLIND = 1.0  # m or rad towards the goal commanded without progress: the same, but sooner
+
+
+class StuckWatch:
+    """The memory of one stretch of driving."""
+
+    def __init__(self) -> None:
+        self._best_remaining = inf
+        self._progress_at = 0.0
+        self._commanded = 0.0  # m or rad, since the last progress
+        self._last = (0.0, 0.0)
+
+    def begin(self, *, now: float) -> None:
+        """Begin anew: another leg, or nothing has been asked for yet."""
+        self._best_remaining = inf
+        self._progress_at = now
+        self._commanded = 0.0
+        self._last = (0.0, 0.0)
+
+    def commanded(self, velocity: Velocity, *, seconds: float) -> None:
+        """Take in what is asked of the vehicle for the next ``seconds``."""
+        self._last = (abs(velocity.forward) * seconds, abs(velocity.yaw_rate) * seconds)
+
+    def is_stuck(self, course: Course, seen: VehicleView, *, limit: float, now: float) -> bool:
+        """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
+        leg = course.leg
+        forward, turned = self._last
+        if isinstance(leg, Move | Rotate):
+            self._commanded += forward if isinstance(leg, Move) else turned
+            left = abs(course.remaining)
+            if left < self._best_remaining - PROGRESS:
+                self._best_remaining = left
+                self._progressed(now)
+        elif not seen.still or not (forward or turned):
+            self._progressed(now)
+        return now - self._progress_at > limit or self._commanded > BLIND
+
+    def _progressed(self, now: float) -> None:
+        self._progress_at = now
+        self._commanded = 0.0

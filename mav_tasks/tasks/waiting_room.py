@@ -1,0 +1,347 @@
+"""Every task that has not begun, of all vehicles: what it waits for, and until when.
+
+Start times, deadlines and dependencies are no vehicle's own business: a task can wait for one of
+another vehicle. What is ready is in its vehicle's queue. A task that others wait for is as urgent
+as the most urgent of them, directly or through others again.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from math import inf
+
+from mav_tasks.errors import Rejection
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SERVER
+from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.queue import Rank, TaskQueue, full, rank_of
+from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
+
+R, S = TaskReason, TaskState
+
+
+@dataclass(slots=True)
+class _Waiter:
+    """What is known of one waiting task beyond the book."""
+
+    came_at: float  # when it began to compete with others: submitted, or start time reached
+    own: Rank
+    rank: Rank  # its own, or that of one that waits for it
+
+
+class WaitingRoom:
+    """Tasks in SCHEDULED, BLOCKED and QUEUED, by what will let them go on."""
+
+    def __init__(self, book: TaskBook, settings: Settings) -> None:
+        self._book = book
+        self._settings = settings
+        self._waiters: dict[TaskId, _Waiter] = {}
+        self._queues: dict[int, TaskQueue] = {}
+        self._of_vehicle: dict[int, int] = {}  # how many wait
+        self._of_client: dict[Submitter, int] = {}
+        self._dependents: dict[TaskId, dict[TaskId, None]] = {}
+        self._starts: list[tuple[float, TaskId]] = []  # heaps; entries out of date are passed over
+        self._deadlines: list[tuple[float, TaskId]] = []
+        self._wall_offset = 0.0
+        self._woken: set[int] = set()
+
+    def __repr__(self) -> str:
+        return f"WaitingRoom({len(self._waiters)} tasks)"
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings; the order of what waits already is kept."""
+        self._settings = settings
+
+    def queue(self, vehicle: int) -> TaskQueue:
+        """Give the queue of a vehicle's ready tasks."""
+        queue = self._queues.get(vehicle)
+        if queue is None:
+            queue = self._queues[vehicle] = TaskQueue()
+        return queue
+
+    def count(self, vehicle: int) -> int:
+        """Give how many tasks of a vehicle wait, ready or not."""
+        return self._of_vehicle.get(vehicle, 0)
+
+    def of(self, vehicle: int) -> list[TaskId]:
+        """Give all waiting tasks of a vehicle: first those that are ready, in order."""
+        ready = self.queue(vehicle).in_order()
+        if len(ready) == self.count(vehicle):
+            return ready
+        others = [
+            task_id
+            for task_id in self._waiters
+            if self._book[task_id].vehicle == vehicle and task_id not in self.queue(vehicle)
+        ]
+        return ready + sorted(others, key=self._due_or_rank)
+
+    def rank(self, task: Task) -> Rank:
+        """Give a task's rank among those that are ready; of a begun one, as if it were."""
+        waiter = self._waiters.get(task.id)
+        return self._own_rank(task, task.submitted_at) if waiter is None else waiter.rank
+
+    def due_at(self, task: Task) -> float:
+        """Give the monotonic time before which a task does not begin; -inf without one."""
+        return self._due_by(task.terms)
+
+    def _due_by(self, terms: Terms) -> float:
+        from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
+        return max(from_utc, -inf if terms.start_at is None else terms.start_at)
+
+    def take_woken(self) -> set[int]:
+        """Give the vehicles whose queues have got a task since the last call."""
+        woken, self._woken = self._woken, set()
+        return woken
+
+    # coming
+
+    def submit(self, draft: Draft, *, now: float) -> Task:
+        """Take a new task in; Rejection when there is no room, or nothing to run after."""
+        self._check_room(draft)
+        self._check_dependency(draft.terms.after)
+        state = self._state_by(draft.terms, now=now)
+        task = self._book.submit(draft, state=state, now=now)
+        self._enter(task, now=now)
+        if state is S.QUEUED:  # nobody is woken: it is not durable yet
+            self._line_up(task)
+        return task
+
+    def restore(self, tasks: Iterable[Task], *, now: float) -> None:
+        """Take in the waiting ones of an earlier run's tasks, as they were."""
+        waiting = [task for task in tasks if task.state in WAITING]
+        for task in waiting:
+            due = self.due_at(task)
+            came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
+            self._enter(task, now=came_at)
+        for task in waiting:
+            if task.terms.after and self._book.get(task.terms.after) is None:
+                continue  # it was over, and has been forgotten since
+            self._settle(self._book[task.id], now=now)
+
+    def _check_room(self, draft: Draft) -> None:
+        queueing = self._settings.queueing
+        if self.count(draft.vehicle) >= queueing.capacity:
+            raise full(queueing.capacity)
+        if self._of_client.get(draft.submitter, 0) >= queueing.quota:
+            words = f"quota: {queueing.quota} tasks of this client wait"
+            raise Rejection(R.QUOTA, words)
+
+    def _check_dependency(self, after: int) -> None:
+        if not after:
+            return
+        task = self._book.get(after)
+        if task is None:
+            raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
+        if task.state in TERMINAL and task.state is not S.COMPLETED:
+            words = f"run after {after}: it is over, {task.state.name.lower()}"
+            raise Rejection(R.DEPENDENCY_FAILED, words)
+
+    def _enter(self, task: Task, *, now: float) -> None:
+        own = self._own_rank(task, now)
+        self._waiters[task.id] = _Waiter(now, own, own)
+        self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
+        self._of_client[task.submitter] = self._of_client.get(task.submitter, 0) + 1
+        self._note_times(task)
+        if task.terms.after:
+            self._dependents.setdefault(TaskId(task.terms.after), {})[task.id] = None
+            self._lift(TaskId(task.terms.after))
+
+    def _note_times(self, task: Task) -> None:
+        due = self.due_at(task)
+        if due > -inf:
+            heappush(self._starts, (due, task.id))
+        if task.terms.deadline is not None:
+            heappush(self._deadlines, (task.terms.deadline, task.id))
+
+    def _own_rank(self, task: Task, came_at: float) -> Rank:
+        aging = self._settings.queueing.aging
+        return rank_of(task.priority, came_at=came_at, task_id=task.id, aging=aging)
+
+    def _due_or_rank(self, task_id: TaskId) -> tuple[float, Rank]:
+        return self.due_at(self._book[task_id]), self._waiters[task_id].rank
+
+    # going on
+
+    def _settle(self, task: Task, *, now: float) -> Task:
+        """Put a waiting task into the state that its terms ask for now."""
+        wanted = self._state_by(task.terms, now=now)
+        if task.state is S.SCHEDULED and wanted is not S.SCHEDULED:
+            waiter = self._waiters[task.id]
+            waiter.came_at = max(waiter.came_at, self.due_at(task))
+            self._rerank(task)
+        if task.state is not wanted:
+            task = self._book.change(task.id, wanted, reason=R.NONE, actor=SERVER, now=now)
+        if wanted is S.QUEUED:
+            self._line_up(task)
+            self._woken.add(task.vehicle)
+        else:
+            self.queue(task.vehicle).discard(task.id)
+        return task
+
+    def _line_up(self, task: Task) -> None:
+        rank = self._waiters[task.id].rank
+        self.queue(task.vehicle).put(task.id, rank, is_preemptive=task.terms.is_preemptive)
+
+    def _state_by(self, terms: Terms, *, now: float) -> TaskState:
+        if self._due_by(terms) > now:
+            return S.SCHEDULED
+        return S.BLOCKED if self._is_waited_for(terms.after) else S.QUEUED
+
+    def _is_waited_for(self, after: int) -> bool:
+        """Whether a task that others run after is still to complete."""
+        task = self._book.get(after) if after else None
+        return task is not None and task.state not in TERMINAL
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do; inf: never, as things are."""
+        first_start = self._starts[0][0] if self._starts else inf
+        return min(first_start, self._deadlines[0][0] if self._deadlines else inf)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Let go on whose time has come, and end whose time is over."""
+        while self._deadlines and self._deadlines[0][0] <= now:
+            at, task_id = heappop(self._deadlines)
+            task = self._waiting(task_id)
+            if task is not None and task.terms.deadline == at:
+                self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
+        while self._starts and self._starts[0][0] <= now:
+            _, task_id = heappop(self._starts)
+            task = self._waiting(task_id)
+            if task is not None:
+                self._settle(task, now=now)
+
+    def set_wall_offset(self, offset: float, *, now: float) -> None:
+        """UTC = monotonic time + offset from now on: moves what starts at a UTC time."""
+        self._wall_offset = offset
+        self._starts.clear()
+        for task_id in self._waiters:
+            due = self.due_at(self._book[task_id])
+            if due > -inf:
+                heappush(self._starts, (due, task_id))
+        for task in [self._book[task_id] for task_id in self._waiters]:
+            if task.terms.start_utc is not None:
+                self._settle(task, now=now)
+
+    def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
+        """Change the terms of a waiting task; Rejection when it would wait for itself."""
+        if terms.after != task.terms.after:
+            self._check_dependency(terms.after)
+            self._check_cycle(task, terms.after)
+        before = task.terms.after
+        task = self._book.modify(task.id, terms, actor=actor, now=now)
+        self._note_times(task)
+        if before != terms.after:
+            self._forget_dependent(task.id, before)
+            if terms.after:
+                self._dependents.setdefault(TaskId(terms.after), {})[task.id] = None
+        self._rerank(task)
+        self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
+        self._settle(task, now=now)
+
+    def _check_cycle(self, task: Task, after: int) -> None:
+        seen: int = after
+        while seen:
+            if seen == task.id:
+                raise Rejection(R.CYCLE, f"run after {after}: they would wait for each other")
+            ahead = self._book.get(seen)
+            seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
+
+    # leaving
+
+    def leave(self, task: Task) -> None:
+        """Let a task go: it begins, or is over."""
+        del self._waiters[task.id]
+        self.queue(task.vehicle).discard(task.id)
+        self._of_vehicle[task.vehicle] -= 1
+        left = self._of_client[task.submitter] - 1
+        if left:
+            self._of_client[task.submitter] = left
+        else:
+            del self._of_client[task.submitter]
+        self._forget_dependent(task.id, task.terms.after)
+        self._woken.add(task.vehicle)
+
+    def end(
+        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
+    ) -> None:
+        """End a waiting task, and what waits for it."""
+        self.leave(task)
+        self._book.change(task.id, state, reason=reason, actor=actor, now=now)
+        self.ended(task.id, now=now)
+
+    def withdraw(self, task: Task, *, now: float) -> None:
+        """Take back a submission that did not become durable; nothing can run after it yet."""
+        self.leave(task)
+        self._book.withdraw(task.id, now=now)
+        for dependent in self._dependents.pop(task.id, {}):
+            self._fail(dependent, now=now)
+
+    def clear(self, vehicle: int, reason: TaskReason, *, actor: str, now: float) -> None:
+        """Cancel all that wait for a vehicle."""
+        cleared = [self._book[task_id] for task_id in self.of(vehicle)]
+        for task in cleared:  # first all of them: a dependent is cleared, too, and not failed
+            self.leave(task)
+            self._book.change(task.id, S.CANCELLED, reason=reason, actor=actor, now=now)
+        for task in cleared:
+            self.ended(task.id, now=now)
+
+    def ended(self, task_id: TaskId, *, now: float) -> None:
+        """A task is over: let go on, or fail, what waits for it."""
+        over = [task_id]
+        while over:
+            ended = self._book.get(over.pop())
+            if ended is None:
+                continue
+            for dependent in self._dependents.pop(ended.id, {}):
+                task = self._waiting(dependent)
+                if task is None:
+                    continue
+                if ended.state is S.COMPLETED:
+                    self._settle(task, now=now)
+                else:
+                    self._fail(dependent, now=now)
+                    over.append(dependent)
+
+    def _fail(self, task_id: TaskId, *, now: float) -> None:
+        self.leave(self._book[task_id])
+        self._book.change(task_id, S.FAILED, reason=R.DEPENDENCY_FAILED, actor=SERVER, now=now)
+
+    def _waiting(self, task_id: TaskId) -> Task | None:
+        return self._book[task_id] if task_id in self._waiters else None
+
+    def _forget_dependent(self, task_id: TaskId, after: int) -> None:
+        if not after:
+            return
+        dependents = self._dependents.get(TaskId(after))
+        if dependents is not None and task_id in dependents:
+            del dependents[task_id]
+            if not dependents:
+                del self._dependents[TaskId(after)]
+            self._lift(TaskId(after))
+
+    # order
+
+    def _rerank(self, task: Task) -> None:
+        waiter = self._waiters[task.id]
+        waiter.own = self._own_rank(task, waiter.came_at)
+        self._lift(task.id)
+
+    def _lift(self, task_id: TaskId) -> None:
+        """Give a task, and through it those that it waits for, the rank of who waits for it."""
+        seen = task_id
+        while True:
+            waiter = self._waiters.get(seen)
+            if waiter is None:
+                return
+            dependents = (self._waiters.get(d) for d in self._dependents.get(seen, ()))
+            rank = min([waiter.own, *(d.rank for d in dependents if d is not None)])
+            if rank == waiter.rank and seen != task_id:
+                return
+            waiter.rank = rank
+            task = self._book[seen]
+            if seen in self.queue(task.vehicle):
+                self._line_up(task)
+            if not task.terms.after:
+                return
+            seen = TaskId(task.terms.after)
