@@ -5,7 +5,7 @@ from dataclasses import replace
 from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
-from mav_tasks.tasks.legs import anchor_of, leg_count, leg_of, length_of
+from mav_tasks.tasks.legs import WAY, anchor_of, leg_count, leg_of, length_of
 from mav_tasks.tasks.task import Goal, GoTo, Head, Move, Progress, Wait
 
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
@@ -43,7 +43,7 @@ class Course:
         """Whether to stand here: near the end while moving; anywhere within tolerance at rest."""
         within = 1.0 if stands else MOVING_TOLERANCE
         remaining = self.remaining
-        if isinstance(self.goal, GoTo) and self.goal.radius and self.progress.leg == 0:
+        if isinstance(self.goal, GoTo) and self.goal.radius and self.progress.leg == WAY:
             return abs(remaining) <= self.goal.radius
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 

@@ -23,17 +23,20 @@ from mav_tasks.tasks.task import (
     Wait,
 )
 
+#: the legs of a GoTo: face the place, drive there, then what else was asked for
+FACE, WAY = range(2)
+
 
 def leg_count(goal: Goal) -> int:
     """Give the number of a goal's legs."""
     if isinstance(goal, GoTo):
-        return 1 + (goal.yaw is not None) + (goal.wait > 0)
+        return 2 + (goal.yaw is not None) + (goal.wait > 0)
     return 1
 
 
 def anchor_of(goal: Goal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
     """Give the pose from which a leg that begins at ``pose`` counts."""
-    if isinstance(goal, GoTo) and leg == 0:
+    if isinstance(goal, GoTo) and leg == WAY:
         assert target is not None, "the place was found before the task began"
         return replace(pose, yaw=bearing(pose, target))
     return pose
@@ -106,10 +109,12 @@ def distance(pose: Pose, place: LocalPlace) -> float:
 
 
 def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
-    if progress.leg == 0:
+    if progress.leg <= WAY:
         assert progress.target is not None, "the place was found before the task began"
+        if progress.leg == FACE:
+            return Rotate(wrap(bearing(anchor, progress.target) - anchor.yaw))
         return Move(distance(anchor, progress.target), goal.speed)
-    if progress.leg == 1 and goal.yaw is not None:
+    if progress.leg == WAY + 1 and goal.yaw is not None:
         return Rotate(_turn(anchor.yaw, goal.yaw, 0))
     return Wait(goal.wait)
 

@@ -9,7 +9,7 @@ from math import copysign, cos, hypot, radians, sin
 
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.guidance import Motion, cross_track, done_so_far, wrap
-from mav_tasks.tasks.legs import anchor_of, distance, leg_of, length_of
+from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_of, length_of
 from mav_tasks.tasks.task import (
     Goal,
     GoTo,
@@ -55,11 +55,12 @@ def resumed(goal: Goal, progress: Progress, motion: Motion) -> Progress:
     if not isinstance(goal, GoTo) or anchor is None or progress.target is None:
         return progress
     leg = leg_of(goal, progress)
-    if isinstance(leg, Move):
+    if progress.leg == WAY:
         along = done_so_far(leg, anchor, pose, before=progress.done)
         is_near = abs(cross_track(anchor, pose)) <= OFF_LINE and 0 <= along <= length_of(leg)
     else:
-        is_near = distance(pose, progress.target) <= max(goal.radius or 0.0, 2 * ON_SPOT)
+        near_enough = max(goal.radius or 0.0, 2 * ON_SPOT)
+        is_near = progress.leg > WAY and distance(pose, progress.target) <= near_enough
     if is_near:
         return progress
     again = anchor_of(goal, 0, pose, progress.target)

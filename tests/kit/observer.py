@@ -194,7 +194,8 @@ class Observer:
             self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
         if mode != self.mode:
             self._zero_in_mode = False
-            by_us = mode == HOLD and now - self._hold_at < OWN_REQUEST
+            asked = mode == HOLD and now - self._hold_at < OWN_REQUEST
+            by_us = asked and not self._moved_last  # driving on, we had not asked for this one
             if self.mode == GUIDED and not by_us:
                 self._take_over(now, zeros=0)
         self.armed, self.mode = armed, mode

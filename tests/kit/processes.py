@@ -68,11 +68,18 @@ def wait_until(
 def process(
     *arguments: str, folder: Path, name: str, python: str = sys.executable
 ) -> Iterator[Process]:
-    """Run a Python process while the block runs; it is killed if it is still there after it."""
+    """Run a Python process while the block runs; it is killed if it is still there after it.
+
+    A server in it that is told no store has one in ``folder``: never its user's own.
+    """
     output = folder / f"{name}.log"
     with output.open("wb") as sink:
         popen = subprocess.Popen(
-            [python, *arguments], stdout=sink, stderr=subprocess.STDOUT, cwd=folder
+            [python, *arguments],
+            stdout=sink,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env={**os.environ, "MAV_TASKS_STORE": str(folder / f"{name}.sqlite3")},
         )
     running = Process(popen, output)
     try:
@@ -142,7 +149,8 @@ def stand(folder: Path, *serve_options: str, body: str = "kinematic") -> Iterato
     rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", body, "--truth", str(truth))
     serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client_port}"]
     serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
-    serve += ["--push", f"127.0.0.1:{push_port}", *serve_options]
+    serve += ["--push", f"127.0.0.1:{push_port}"]
+    serve += ["--store", ":memory:", *serve_options]
     with (
         process(*rover, folder=folder, name="rover") as rover_process,
         process(*serve, folder=folder, name="server") as server_process,

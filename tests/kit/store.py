@@ -37,5 +37,8 @@ class LateStore:
             outcomes.append(Kept(self._under_way.popleft()[1]))
         return outcomes
 
+    def fileno(self) -> None:
+        """The world asks at every step."""
+
     def close(self) -> None:
         """Nothing is open."""

@@ -1,0 +1,161 @@
+"""Tasks are called off: promptly, visibly, and the rover stands before anything else begins."""
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Packer
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+CANCEL, CLEAR = 54010, 54011
+
+
+def driving(world: World) -> World:
+    world.client.move(5, speed=1.0)
+    world.until_state(1, S.EXECUTING)
+    world.client.move(0.3)
+    world.client.rotate(20)
+    world.run(2)
+    assert world.truth.forward_speed > 0.5
+    return world
+
+
+@pytest.mark.parametrize("task", [0, 1])
+def test_the_running_task_is_cancelled_once_the_rover_stands(world: World, task: int) -> None:
+    driving(world)
+    at = world.now
+    sent = world.client.command(CANCEL, task)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, 1)
+    assert world.state(1) == (S.CANCELLING, R.CANCELLED)
+    assert world.observer.sent_since(at + 0.01)[0] == "zero"
+    world.until_state(1, S.CANCELLED, within=4)
+    assert world.stands()
+    world.until_idle(tasks=3)
+    assert [t.state for t in world.tasks()] == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
+    assert world.client.statuses(1)[-1].why == (S.CANCELLED, R.CANCELLED)
+
+
+def test_a_kill_is_zero_and_hold_at_once_and_no_latch(world: World) -> None:
+    driving(world)
+    at = world.now
+    sent = world.client.command(CANCEL, 0, 1)
+    world.run(0.05)
+    assert sent.answer == (ACCEPTED, 1)
+    assert world.state(1) == (S.KILLED, R.CANCELLED)
+    assert {"zero", "HOLD"} <= set(world.observer.sent_since(at)[:3])
+    world.until_state(2, S.STARTING, within=4)
+    assert world.stands()
+    world.until_idle(tasks=3)
+
+
+def test_a_rover_that_does_not_stop_leaves_the_task_held_and_is_told_on(world: World) -> None:
+    driving(world)
+    world.fault(Faults(withheld=frozenset({32})))  # no position: nobody can see it stand
+    world.client.command(CANCEL, 1)
+    world.run(5.5)
+    assert world.state(1) == (S.HELD, R.STOP_UNCONFIRMED)
+    world.run(1)
+    assert world.state(2)[0] is S.QUEUED
+    assert "HOLD" in world.observer.sent_since(world.now - 0.9)
+    world.fault(Faults())
+    world.until(lambda: world.stands() and world.rover.autopilot.mode is Mode.HOLD, within=5)
+    world.run(1)
+    assert world.state(1) == (S.HELD, R.STOP_UNCONFIRMED)
+
+
+def test_waiting_tasks_are_cancelled_or_killed_at_once(world: World) -> None:
+    driving(world)
+    world.client.command(CANCEL, 2)
+    world.run(0.6)
+    world.client.command(CANCEL, 3, 1)
+    world.run(0.1)
+    assert world.state(2) == (S.CANCELLED, R.CANCELLED)
+    assert world.state(3) == (S.KILLED, R.CANCELLED)
+    assert world.state(1)[0] is S.EXECUTING
+
+
+@pytest.mark.parametrize("scope", [0, 1])
+def test_clear_takes_what_waits_or_everything(world: World, scope: int) -> None:
+    driving(world)
+    sent = world.client.command(CLEAR, scope)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, 0)
+    assert [world.state(i) for i in (2, 3)] == [(S.CANCELLED, R.CLEARED)] * 2
+    world.until_idle(tasks=3)
+    assert world.state(1)[0] is (S.CANCELLED if scope else S.COMPLETED)
+
+
+@pytest.mark.parametrize(
+    ("params", "answer"),
+    [
+        ((99, 0), (DENIED, R.NOT_FOUND)),
+        ((0, 0), (DENIED, R.NOT_FOUND)),
+        ((-1, 0), (DENIED, R.BAD_PARAMETER)),
+        ((1.5, 0), (DENIED, R.BAD_PARAMETER)),
+        ((1, 2), (DENIED, R.BAD_PARAMETER)),
+        ((1, 0), (DENIED, R.WRONG_STATE)),
+    ],
+)
+def test_what_cannot_be_cancelled_is_said(
+    world: World, params: tuple[float, float], answer: tuple[int, int]
+) -> None:
+    world.client.move(0.2)
+    world.until_idle(tasks=1)
+    sent = world.client.command(CANCEL, *params)
+    world.run(0.1)
+    assert sent.answer == answer
+
+
+def test_another_rovers_task_is_not_found_here(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.move(3, target=(2, 191))
+    world.run(0.1)
+    sent = world.client.command(CANCEL, 1, target=(1, 191))
+    world.run(0.1)
+    assert sent.answer == (DENIED, R.NOT_FOUND)
+    assert world.state(1)[0] is not S.CANCELLED
+
+
+def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) -> None:
+    other = world.add_client("other")
+    other.send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    for client, distance in ((world.client, 1), (world.client, 2), (other, 3)):
+        client.move(distance)
+        world.run(0.1)
+    world.client.rotate(10)
+    world.run(0.1)
+    acks = len(world.client.acks)
+    message = m.CommandCancel(1, 191, MOVE)
+    world.client.send_raw(Packer().pack(message, Address(255, 190), seq=200))
+    world.run(0.3)
+    assert world.state(2) == (S.CANCELLED, R.CANCELLED)
+    assert [world.state(i)[0] for i in (3, 4)] == [S.QUEUED, S.QUEUED]
+    assert len(world.client.acks) == acks
+
+
+def test_a_client_has_a_quota_and_a_rover_a_capacity(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(queueing=Queueing(capacity=4, quota=3)))
+    other = world.add_client("other", system_id=1 + 244)
+    other.send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    world.client.pause()
+    world.run(0.1)
+    mine = []
+    for distance in (1, 2, 3, 4):
+        mine.append(world.client.move(distance))
+        world.run(0.05)
+    theirs = []
+    for distance in (1, 2):
+        theirs.append(other.move(distance))
+        world.run(0.05)
+    assert mine[3].answer == (TEMPORARILY_REJECTED, R.QUOTA)
+    assert theirs[1].answer == (TEMPORARILY_REJECTED, R.QUEUE_FULL)
+    assert theirs[0].task_id == 4

@@ -1,0 +1,118 @@
+"""A more urgent task interrupts another, which then ends exactly where it would have ended."""
+
+from math import hypot
+from random import Random
+
+import pytest
+
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.events import TaskChanged
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import MOVE, ROTATE
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+MODIFY, PREEMPTIBLE, PREEMPTIVE = 54012, 5, 6
+GAP = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
+
+
+def test_nothing_is_interrupted_by_default(world: World) -> None:
+    world.client.move(2)
+    world.run(3)
+    world.client.move(0.2, priority=10)
+    world.until_state(2, S.EXECUTING)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_a_task_that_outranks_enough_interrupts_and_the_other_resumes(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(settings=GAP)
+    world.client.move(3, priority=4)
+    world.run(4)
+    world.client.move(0.2, priority=6)
+    world.run(1)
+    assert world.state(1)[0] is S.EXECUTING
+    world.client.rotate(90, priority=7)
+    world.until_state(1, S.PAUSED)
+    assert world.state(1) == (S.PAUSED, R.PREEMPTED)
+    assert world.paused() is R.NONE
+    world.until_idle(tasks=3)
+    ended = [e.task_id for e in world.events(TaskChanged) if e.new is S.COMPLETED]
+    assert ended == [3, 2, 1]
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 3
+    assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=1.5)
+
+
+def test_a_preemptive_task_interrupts_whatever_its_priority_but_not_a_firm_one(
+    world: World,
+) -> None:
+    world.client.move(4)
+    world.run(3)
+    world.client.rotate(30, priority=1)
+    world.run(0.1)
+    world.client.command(MODIFY, 1, PREEMPTIBLE, 0)
+    world.run(0.6)
+    world.client.command(MODIFY, 2, PREEMPTIVE, 1)
+    world.run(1)
+    assert world.state(1)[0] is S.EXECUTING
+    world.client.command(MODIFY, 1, PREEMPTIBLE, 1)
+    world.until_state(1, S.PAUSED, within=1)
+    world.until_state(2, S.COMPLETED)
+    world.until_idle(tasks=2)
+    assert near_pose(world.pose(), (4.0, 0.0, 0.0), metres=0.03, angle=1.5)
+
+
+def test_a_stop_kills_the_one_that_runs_and_keeps_the_interrupted_one(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(settings=GAP)
+    world.client.move(2, priority=1)
+    world.run(3)
+    world.client.rotate(90, priority=9)
+    world.until_state(2, S.EXECUTING)
+    world.client.stop()
+    world.run(3)
+    assert [world.state(i)[0] for i in (1, 2)] == [S.PAUSED, S.KILLED]
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=1.5)
+
+
+@pytest.mark.parametrize("goal", ["move", "back", "rotate", "turns"])
+@pytest.mark.parametrize("seed", range(5))
+def test_whatever_interrupts_it_ends_where_it_would_have_ended(
+    make_world: MakeWorld, goal: str, seed: int
+) -> None:
+    random = Random(f"{goal} {seed}")
+    world = make_world(seed=seed, settings=GAP)
+    command, amount, end = {
+        "move": (MOVE, 3.0, (3.0, 0.0, 0.0)),
+        "back": (MOVE, -2.0, (-2.0, 0.0, 0.0)),
+        "rotate": (ROTATE, 150.0, (0.0, 0.0, 150.0)),
+        "turns": (ROTATE, -500.0, (0.0, 0.0, -140.0)),
+    }[goal]
+    world.client.command(command, amount, 0, 0, 0, 0, 0, 2)
+    world.until_state(1, S.EXECUTING)
+    others = 1
+    for _ in range(random.randrange(1, 5)):
+        world.run(random.uniform(0.3, 2.5))
+        if world.state(1)[0] is S.COMPLETED:
+            break
+        kind = random.choice(("move", "rotate", "pause", "takeover"))
+        if kind == "move":
+            world.client.move(random.uniform(-2.5, 2.5), priority=8)
+            others += 1
+        elif kind == "rotate":
+            world.client.rotate(random.uniform(-400, 400), priority=9)
+            others += 1
+        else:
+            world.client.pause() if kind == "pause" else world.operator_mode(Mode.HOLD)
+            world.run(random.uniform(1.0, 3.0))
+            world.client.proceed()
+    world.until_idle(tasks=others, within=240)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * others
+    assert near_pose(world.pose(), end, metres=0.03, angle=1.5), world.pose()
+    assert hypot(world.truth.forward_speed, world.truth.yaw_rate) < 0.01

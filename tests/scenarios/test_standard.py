@@ -1,0 +1,227 @@
+"""The commands that stock clients send without knowing of tasks become tasks all the same."""
+
+from math import nan
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.geo import DEFAULT_ORIGIN
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, AUTO, DENIED, RTL, set_mode
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
+YAW, SPEED, REPOSITION, YAW_SPEED = 115, 178, 192, 213
+GLOBAL, LOCAL, GLOBAL_RELATIVE_INT = 0, 1, 6
+
+
+def at(north: float, east: float) -> dict[str, Any]:
+    x, y = DEFAULT_ORIGIN.to_global(north, east)
+    return {"x": x, "y": y}
+
+
+@pytest.mark.parametrize("target", [(1, 1), (1, 191), (1, 0)])
+@pytest.mark.parametrize("frame", [GLOBAL, 5, GLOBAL_RELATIVE_INT])
+def test_go_to_drives_to_the_place(world: World, target: tuple[int, int], frame: int) -> None:
+    sent = world.client.command_int(
+        REPOSITION, -1, 1, 0, nan, **at(1.5, -2.0), frame=frame, target=target
+    )
+    world.run(0.2)
+    assert sent.answer == (ACCEPTED, 1)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    north, east, _ = world.pose()
+    assert (north, east) == (pytest.approx(1.5, abs=0.03), pytest.approx(-2.0, abs=0.03))
+
+
+def test_go_to_in_the_local_frame_and_then_a_heading(world: World) -> None:
+    world.client.command_int(WAYPOINT, 1.0, 0, 0, -90, x=-12_000, y=10_000, frame=LOCAL)
+    world.until_idle(tasks=1)
+    assert near_pose(world.pose(), (-1.2, 1.0, -90.0), metres=0.03)
+
+
+def test_go_to_in_three_forms_is_one_task(world: World) -> None:
+    place = at(2.0, 0.5)
+    world.client.command_int(REPOSITION, -1, 1, 0, nan, **place, frame=GLOBAL, target=(1, 1))
+    world.run(0.3)
+    again = world.client.command(
+        REPOSITION, -1, 1, 0, nan, place["x"] / 1e7, place["y"] / 1e7, 0, target=(1, 1)
+    )
+    world.run(0.3)
+    local = world.client.command_int(WAYPOINT, x=20_000, y=5_000, frame=LOCAL)
+    world.run(0.3)
+    assert [s.answer for s in (again, local)] == [(ACCEPTED, 1)] * 2
+    assert len(world.tasks()) == 1
+
+
+def test_without_a_place_it_is_a_pause(world: World) -> None:
+    world.client.move(2)
+    world.run(2)
+    sent = world.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1))
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, 1)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+
+
+def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(settings=Settings(guided="now"))
+    world.client.move(3)
+    world.run(3)
+    world.client.move(0.3)
+    world.run(0.1)
+    for place in (at(0.5, 1.0), at(0.5, -1.0)):  # the operator thinks better of the first
+        world.client.command_int(REPOSITION, -1, 1, 0, nan, **place, frame=GLOBAL, target=(1, 1))
+        world.run(2)
+    world.until_state(4, S.COMPLETED)
+    world.run(1)
+    assert [world.state(i) for i in (1, 3)] == [(S.PAUSED, R.OPERATOR), (S.CANCELLED, R.REPLACED)]
+    assert world.paused() is R.OPERATOR
+    assert world.pose()[:2] == (pytest.approx(0.5, abs=0.03), pytest.approx(-1.0, abs=0.03))
+    world.client.proceed()
+    world.until_idle(tasks=4)
+    assert near_pose(world.pose(), (3.3, 0.0, 0.0), metres=0.04)
+
+
+@pytest.mark.parametrize("how", ["command", "mode", "old mode message"])
+def test_return_drives_home(world: World, how: str) -> None:
+    world.client.move(1.0)
+    world.until_idle(tasks=1)
+    if how == "command":
+        world.client.command(RETURN, target=(1, 1))
+    elif how == "mode":
+        world.client.mode(RTL)
+    else:
+        world.client.send(set_mode(RTL))
+    world.run(0.2)
+    world.until_idle(tasks=2)
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.pose()[:2] == (pytest.approx(0.0, abs=0.03), pytest.approx(0.0, abs=0.03))
+    assert world.paused() is (R.NONE if how == "command" else R.OPERATOR)
+
+
+def test_return_interrupts_what_runs(world: World) -> None:
+    world.client.move(3)
+    world.run(4)
+    world.client.mode(RTL)
+    world.until_state(2, S.COMPLETED)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+
+
+def test_a_client_that_wants_auto_gets_it_and_that_is_a_takeover(world: World) -> None:
+    world.client.move(3)
+    world.run(3)
+    world.client.mode(AUTO)
+    world.until_state(1, S.PAUSED)
+    assert world.paused() is R.TAKEOVER
+
+
+@pytest.mark.parametrize(
+    ("params", "yaw"),
+    [((90, 20, 0, 0), 90.0), ((90, 0, -1, 0), 90.0), ((30, 0, 1, 1), 30.0), ((30, 0, -1, 1), -30)],
+)
+def test_a_heading_is_turned_to(
+    world: World, params: tuple[float, float, float, float], yaw: float
+) -> None:
+    world.client.command(YAW, *params, target=(1, 1))
+    world.until_idle(tasks=1)
+    assert near_pose(world.pose(), (0.0, 0.0, yaw), metres=0.03)
+
+
+def test_delays_and_loiters_stand_and_takeoff_is_nothing(world: World) -> None:
+    takeoff = world.client.command(TAKEOFF, target=(1, 1))
+    world.run(0.1)
+    world.client.command(DELAY, 2.0)
+    world.run(0.1)
+    world.client.command_int(LOITER_TIME, 1.0, **at(0.5, 0.0), frame=GLOBAL, target=(1, 1))
+    world.until_idle(tasks=2)
+    assert takeoff.answer == (ACCEPTED, 0)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert world.client.statuses(1)[-1].execution_time == pytest.approx(2.0, abs=0.3)
+    assert world.pose()[0] == pytest.approx(0.5, abs=0.03)
+
+
+def test_drive_and_heading_last_their_time(world: World) -> None:
+    world.client.command(54002, 0.4, 20, 3)
+    world.until_idle(tasks=1)
+    first = world.pose()
+    assert 40 < first[2] < 75
+    world.client.command(YAW_SPEED, 0, 0.5, 0, target=(1, 1))
+    world.until_idle(tasks=2)
+    assert world.pose()[2] == pytest.approx(0, abs=8)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_the_speed_is_changed_of_what_runs_and_of_what_comes(world: World) -> None:
+    world.client.move(3, speed=0.3)
+    world.run(3)
+    sent = world.client.command(SPEED, 1, 0.8, -1, target=(1, 1))
+    world.run(2)
+    assert sent.answer == (ACCEPTED, 1)
+    assert world.truth.forward_speed == pytest.approx(0.8, abs=0.08)
+    world.until_idle(tasks=1)
+    world.client.move(4)
+    world.run(4)
+    assert world.truth.forward_speed == pytest.approx(0.8, abs=0.08)
+    world.until_idle(tasks=2)
+    world.client.command(SPEED, 1, -2, -1)
+    world.client.move(1.5)
+    world.run(2.5)
+    assert world.truth.forward_speed == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "kw", "named"),
+    [
+        (REPOSITION, (-1, 1, 0, nan), {"x": 910_000_000, "y": 0, "frame": 0}, "latitude"),
+        (REPOSITION, (-1, 1, 0, nan), {"x": 1, "y": 1_900_000_000, "frame": 0}, "longitude"),
+        (REPOSITION, (-1, 1, 0, nan), {"x": 0, "y": 0, "frame": 0}, "no place"),
+        (REPOSITION, (9, 1, 0, nan), {"x": 1, "y": 1, "frame": 0}, "speed"),
+        (WAYPOINT, (0, 0, 0, 0), {"x": 1, "y": 1, "frame": 8}, "frame 8"),
+        (WAYPOINT, (-1, 0, 0, 0), {"x": 1, "y": 1, "frame": 0}, "hold"),
+        (DELAY, (-1,), {"frame": 0}, "time of day"),
+        (YAW, (400,), {"frame": 0}, "angle"),
+        (SPEED, (1, 9), {"frame": 0}, "speed"),
+        (SPEED, (2, 1), {"frame": 0}, "speed type"),
+    ],
+)
+def test_what_is_of_no_use_is_denied_and_named(
+    world: World, command: int, params: tuple[float, ...], kw: dict[str, Any], named: str
+) -> None:
+    sent = world.client.command_int(command, *params, **kw)
+    world.run(0.1)
+    assert sent.result == DENIED
+    assert named in world.client.texts()[-1]
+    assert world.tasks() == ()
+
+
+def test_another_origin_holds_what_runs(world: World) -> None:
+    world.client.move(3)
+    world.run(3)
+    moved = common.MAVLink_gps_global_origin_message(-353_600_000, 1_491_600_000, 0)
+    raw = moved.pack(common.MAVLink(None, 1, 1))
+    world.from_vehicle_side(raw, peer="rover1")
+    world.run(0.2)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    world.until(world.stands, within=3)
+
+
+def test_while_stopped_they_wait(world: World) -> None:
+    world.client.stop()
+    world.run(1)
+    world.client.command(RETURN, target=(1, 1))
+    world.run(0.6)
+    world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=0, target=(1, 1))
+    world.run(0.6)
+    rtl = world.client.mode(RTL)
+    world.run(2)
+    assert rtl.result == 1
+    assert [world.state(i)[0] for i in (1, 2)] == [S.QUEUED, S.QUEUED]
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD

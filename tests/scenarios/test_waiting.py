@@ -1,0 +1,168 @@
+"""Tasks that wait for a time or for each other, and what is changed about them meanwhile."""
+
+import pytest
+
+from mav_tasks.engine.inputs import WallClock
+from mav_tasks.tasks.events import TaskChanged
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import ACCEPTED, DENIED, MOVE
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+MODIFY = 54012
+PRIORITY, START_DELAY, DEADLINE, RUN_AFTER, PREEMPTIBLE, PREEMPTIVE, START_UTC = range(1, 8)
+UTC = 1_800_000_000.0  # s, at the beginning of these worlds
+DAY = 86_400.0
+
+
+def submit(
+    world: World,
+    distance: float = 0.2,
+    *,
+    after: int = 0,
+    delay: float = 0,
+    priority: float = 5,
+    target: tuple[int, int] = (1, 191),
+) -> int:
+    sent = world.client.command(MOVE, distance, 0, 0, 0, after, delay, priority, target=target)
+    world.run(0.05)
+    return sent.task_id
+
+
+def set_clock(world: World, offset: float) -> None:
+    world.server.pump.handle(WallClock(offset - world.now), now=world.now)
+    world.server.pump.turn(now=world.now)
+
+
+def order_of_start(world: World) -> list[int]:
+    return [e.task_id for e in world.events(TaskChanged) if e.new is S.STARTING]
+
+
+def test_a_start_delay_counts_from_the_acknowledgement(world: World) -> None:
+    at = world.now
+    task = submit(world, delay=3)
+    later = submit(world, 0.1)
+    assert world.client.statuses(task)[-1].why == (S.SCHEDULED, R.START_TIME)
+    world.until_idle(tasks=2)
+    assert order_of_start(world) == [later, task]
+    started = next(s for s in world.client.statuses(task) if s.state == S.STARTING)
+    assert started.time_boot_ms / 1000 == pytest.approx(at + 3, abs=0.1)
+
+
+def test_a_utc_start_is_exact_and_moves_with_the_clock_and_nothing_else_does(world: World) -> None:
+    set_clock(world, UTC)
+    world.client.pause()
+    delayed = submit(world, delay=20)
+    task = submit(world)
+    sent = world.client.command_int(MODIFY, task, START_UTC, x=int(UTC + world.now + 5), frame=0)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, task)
+    assert world.state(task)[0] is S.SCHEDULED
+    set_clock(world, UTC - DAY)
+    world.run(10)
+    assert [world.state(i)[0] for i in (delayed, task)] == [S.SCHEDULED, S.SCHEDULED]
+    set_clock(world, UTC + DAY)
+    world.run(0.1)
+    assert [world.state(i)[0] for i in (delayed, task)] == [S.SCHEDULED, S.QUEUED]
+    world.client.proceed()
+    world.until_state(task, S.COMPLETED)
+    assert world.state(delayed)[0] is S.SCHEDULED
+    world.until_idle(tasks=2)
+
+
+def test_a_utc_start_in_a_float_is_refused(world: World) -> None:
+    task = submit(world, 3)
+    waiting = submit(world)
+    sent = world.client.command(MODIFY, waiting, START_UTC, 0, 0, 1.8e9)
+    world.run(0.1)
+    assert sent.answer == (DENIED, R.BAD_PARAMETER)
+    assert any("COMMAND_INT" in text for text in world.client.texts())
+    assert world.state(task)[0] in (S.STARTING, S.EXECUTING)
+
+
+def test_a_deadline_ends_what_has_not_begun(world: World) -> None:
+    submit(world, 3)
+    task, dependent = submit(world), submit(world, after=2)
+    world.client.command(MODIFY, task, DEADLINE, 2)
+    world.run(2.2)
+    assert world.state(task) == (S.EXPIRED, R.DEADLINE)
+    assert world.state(dependent) == (S.FAILED, R.DEPENDENCY_FAILED)
+    assert world.paused() is R.NONE
+
+
+def test_tasks_run_after_each_other_across_rovers(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    first = submit(world, 0.4, target=(1, 191))
+    second = submit(world, 0.3, after=first, target=(2, 191))
+    third = submit(world, 0.2, after=second, target=(1, 191))
+    assert [world.state(i)[0] for i in (second, third)] == [S.BLOCKED, S.BLOCKED]
+    assert world.task(second).terms.after == first
+    world.until_idle(tasks=3)
+    assert order_of_start(world) == [first, second, third]
+
+
+def test_a_task_is_as_urgent_as_who_waits_for_it(world: World) -> None:
+    running = submit(world, 0.5)
+    usual = submit(world, priority=7)
+    needed = submit(world, priority=1)
+    urgent = submit(world, after=needed, priority=9)
+    world.until_idle(tasks=4)
+    assert order_of_start(world) == [running, needed, urgent, usual]
+
+
+@pytest.mark.parametrize(
+    ("prop", "value", "answer"),
+    [
+        (PRIORITY, 11, (DENIED, R.BAD_PARAMETER)),
+        (RUN_AFTER, 3, (DENIED, R.CYCLE)),
+        (RUN_AFTER, 77, (DENIED, R.UNKNOWN_DEPENDENCY)),
+        (8, 1, (DENIED, R.BAD_PARAMETER)),
+        (PREEMPTIBLE, 2, (DENIED, R.BAD_PARAMETER)),
+        (START_DELAY, -1, (DENIED, R.BAD_PARAMETER)),
+    ],
+)
+def test_a_bad_modification_changes_nothing(
+    world: World, prop: int, value: float, answer: tuple[int, int]
+) -> None:
+    submit(world, 2)
+    second = submit(world)
+    submit(world, after=second)
+    before = world.task(second)
+    sent = world.client.command(MODIFY, second, prop, value)
+    world.run(0.1)
+    assert sent.answer == answer
+    assert world.task(second) == before
+
+
+def test_a_modified_priority_counts_at_once(world: World) -> None:
+    tasks = [submit(world, d) for d in (1, 0.2, 0.3)]
+    world.client.command(MODIFY, tasks[2], PRIORITY, 8)
+    world.until_idle(tasks=3)
+    assert order_of_start(world) == [tasks[0], tasks[2], tasks[1]]
+
+
+def test_a_dependency_can_be_set_and_lifted_again(world: World) -> None:
+    running, other = submit(world, 1), submit(world)
+    world.client.command(MODIFY, other, RUN_AFTER, running)
+    world.run(0.1)
+    assert world.state(other)[0] is S.BLOCKED
+    world.client.command(MODIFY, other, RUN_AFTER, 0)
+    world.run(0.1)
+    assert world.state(other)[0] is S.QUEUED
+
+
+def test_estimates_are_given_on_request(world: World) -> None:
+    submit(world, 2)
+    waiting = submit(world, 1)
+    world.client.request_status(waiting)
+    world.run(0.1)
+    status = world.client.statuses(waiting)[-1]
+    assert status.queue_position == 1
+    begin, end = status.time_to_start, status.time_to_finish
+    assert 4 < begin < 9
+    at = world.now
+    world.until_state(waiting, S.EXECUTING)
+    assert world.now - at == pytest.approx(begin, rel=0.35)
+    world.until_state(waiting, S.COMPLETED)
+    assert world.now - at == pytest.approx(end, rel=0.35)
