@@ -29,6 +29,8 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
+REORDERED = 64  # packets that a net can put one behind others
+REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -66,6 +68,7 @@ class Vehicle:
         self.control = self.requests.control
         self.last_heartbeat: Packet | None = None
         self.last_seq = 0  # of the autopilot's packets
+        self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
         self._book = book
         self._settings = settings
         self._motion = MotionMonitor(settings.watch)
@@ -102,6 +105,25 @@ class Vehicle:
 
     # what comes in
 
+    def is_overtaken(self, packet: Packet, *, now: float) -> bool:
+        """Whether a newer heartbeat came just before this one; keeps its number if not."""
+        seq, at = self._last_beat
+        if 0 < (seq - packet.seq) & 0xFF <= REORDERED and now - at <= REORDERED_WITHIN:
+            return True
+        self._last_beat = packet.seq, now
+        return False
+
+    def come_back(self, *, was_driven: bool, now: float) -> None:
+        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving."""
+        if self.tasks.is_stopped:
+            self._begin_stop(now=now)
+        elif was_driven and self._monitor.custom_mode == self.persona.control_mode:
+            self.control.begin_release(now=now)
+            self.requests.flush(now=now)
+            self._plan_tick(now=now)
+        elif was_driven:
+            self.requests.send_zero()
+
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:
         """Take in a message that the server itself makes use of."""
         if isinstance(message, m.CommandAck):
@@ -122,6 +144,9 @@ class Vehicle:
                 self.step(now=now)
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt):
             self._receive_of_frame(message, now=now)
+        elif isinstance(message, m.AutopilotVersion):
+            self.tasks.identified(_uid_of(message), now=now)
+            self.requests.is_identified = True
 
     def _receive_of_frame(self, message: Seen, *, now: float) -> None:
         self._frame.receive(message, now=now)
@@ -482,7 +507,15 @@ class Vehicle:
 
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # nothing is asked of one that cannot answer
+            self.requests.ask_which(now=now)
             self.requests.ask_for_rates(now=now)
 
     def _note(self, text: str, *, now: float) -> None:
         self._book.record(VehicleNoted(self.system_id, text, now))
+
+
+def _uid_of(version: m.AutopilotVersion) -> str:
+    """Give what tells this vehicle from all others, "" if it does not say."""
+    if any(version.uid2):
+        return bytes(version.uid2).hex()
+    return f"{version.uid:x}" if version.uid else ""

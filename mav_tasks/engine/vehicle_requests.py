@@ -17,6 +17,9 @@ from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Watch
 
+ASK_WHICH = 5  # times that a vehicle is asked for its AUTOPILOT_VERSION
+ASK_WHICH_EACH = 3.0  # s
+
 
 class VehicleRequests:
     """The way out to one vehicle, and our hold on it."""
@@ -39,6 +42,10 @@ class VehicleRequests:
         self._answers: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
+        self._versions_asked = 0
+        self._ask_version_at = now
+        #: whether the vehicle has said which one it is
+        self.is_identified = False
         #: zero and HOLD as packets, for an exit on which nothing can be computed any more
         self.last_words = self._prepare_last_words()
 
@@ -95,6 +102,17 @@ class VehicleRequests:
             request.target_system, request.target_component = self._target
             self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
             self.flush(now=now)
+
+    def ask_which(self, *, now: float) -> None:
+        """Ask which vehicle it is, some times, until it has said so."""
+        if self.is_identified or self._versions_asked >= ASK_WHICH or now < self._ask_version_at:
+            return
+        self._versions_asked += 1
+        self._ask_version_at = now + ASK_WHICH_EACH
+        wanted = m.AutopilotVersion.id
+        request = m.CommandLong(*self._target, MavCmd.REQUEST_MESSAGE, 0, wanted, 0, 0, 0, 0, 0, 0)
+        self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
+        self.flush(now=now)
 
     def next_deadline(self) -> float | None:
         """Give when a command is to be repeated or given up."""

@@ -38,6 +38,7 @@ USED = frozenset(
         m.GlobalPositionInt.id,
         m.GpsGlobalOrigin.id,
         m.HomePosition.id,
+        m.AutopilotVersion.id,
         m.CommandAck.id,
     }
     | SETPOINTS
@@ -136,6 +137,8 @@ class VehicleSide:
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
+                if vehicle.is_overtaken(packet, now=now):
+                    return vehicle  # an old mode, or an old arming, is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
         return vehicle
@@ -208,6 +211,7 @@ class VehicleSide:
         )
         self.vehicles[packet.system_id] = vehicle
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
+        vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
         vehicle.step(now=now)
         return vehicle
 

@@ -27,8 +27,7 @@ class Fleet:
         self._settings = settings
         self._of: dict[int, VehicleTasks] = {}
         self.room = WaitingRoom(book, settings)
-        #: vehicles that a task was driving when the last run ended
-        self.to_be_halted: set[int] = set()
+        self._was_driven: set[int] = set()
 
     def __iter__(self) -> Iterator[VehicleTasks]:
         return iter(self._of.values())
@@ -41,6 +40,12 @@ class Fleet:
             self._of[vehicle] = tasks
         return tasks
 
+    def was_driven(self, vehicle: int) -> bool:
+        """Whether a task was driving a vehicle when the last run ended; said once."""
+        was_driven = vehicle in self._was_driven
+        self._was_driven.discard(vehicle)
+        return was_driven
+
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
@@ -50,12 +55,13 @@ class Fleet:
 
     def restore(self, restored: Restored, *, now: float) -> None:
         """Take over an earlier run: what ran is held, nothing that was under way runs by itself."""
+        self.room.set_wall_offset(restored.wall_offset, now=now)
         self._book.restore(restored.tasks, next_id=restored.next_id)
         begun: dict[int, list[Task]] = {}
         waiting: set[int] = set()
         for task in restored.tasks:
             if task.state in RUNNING:
-                self.to_be_halted.add(task.vehicle)
+                self._was_driven.add(task.vehicle)
                 task = self._book.change(
                     task.id, S.HELD, reason=R.OUTCOME_UNKNOWN, actor=SERVER, now=now
                 )
@@ -64,7 +70,8 @@ class Fleet:
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
-        for vehicle in begun.keys() | waiting | restored.paused.keys() | restored.speeds.keys():
+        of_note = {*restored.paused, *restored.speeds, *restored.uids}
+        for vehicle in begun.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
             is_doubtful = self._is_doubtful(restored) and (vehicle in begun or vehicle in waiting)
@@ -72,7 +79,10 @@ class Fleet:
                 paused = R.RESTARTED
                 self._book.record(QueuePaused(vehicle, paused, SERVER, now))
             self.of(vehicle).restore(
-                begun.get(vehicle, ()), paused=paused, speed=restored.speeds.get(vehicle)
+                begun.get(vehicle, ()),
+                paused=paused,
+                speed=restored.speeds.get(vehicle),
+                uid=restored.uids.get(vehicle, ""),
             )
 
     def _is_doubtful(self, restored: Restored) -> bool:

@@ -14,7 +14,7 @@ class Restored:
     ``tasks`` are in the order of their ids, ``next_id`` was never given to any. ``paused`` are the
     queues that stood, with the reason, ``uids`` the vehicles' unique ids and ``speeds`` their
     default speeds in m/s, each by system id. ``ended_well``: the last run closed its store;
-    ``idle`` is the seconds since it last wrote.
+    ``idle`` is the seconds since it last wrote. ``wall_offset`` is UTC less monotonic time.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -24,3 +24,4 @@ class Restored:
     speeds: Mapping[int, float] = field(default_factory=dict)
     ended_well: bool = True
     idle: float = 0.0
+    wall_offset: float = 0.0

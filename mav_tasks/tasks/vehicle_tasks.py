@@ -20,6 +20,7 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     TaskWaits,
+    VehicleIdentified,
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
@@ -47,6 +48,7 @@ class VehicleTasks:
         self._executor = Executor(book, settings)
         self._aside: dict[TaskId, None] = {}
         self._of_earlier_run: set[TaskId] = set()
+        self._uid = ""  # of the vehicle, as far as it was heard
         self._speed: float | None = None  # of what names none; None: the settings' one
         self._paused = R.NONE
         self._urgent: TaskId | None = None  # runs although the queue is paused
@@ -190,9 +192,12 @@ class VehicleTasks:
         driving = self._settings.driving
         return driving if self._speed is None else replace(driving, speed=self._speed)
 
-    def restore(self, tasks: Iterable[Task], *, paused: TaskReason, speed: float | None) -> None:
+    def restore(
+        self, tasks: Iterable[Task], *, paused: TaskReason, speed: float | None, uid: str
+    ) -> None:
         """Take on what had begun in an earlier run, as it was left."""
         self._paused = paused
+        self._uid = uid
         self._speed = speed
         self._apply_driving()
         for task in tasks:
@@ -201,6 +206,19 @@ class VehicleTasks:
                 self._executor.adopt(task)
             else:
                 self._aside[task.id] = None
+
+    def identified(self, uid: str, *, now: float) -> None:
+        """The vehicle has said which one it is; another one does not run this one's tasks unasked.
+
+        "" is what a vehicle says that does not know.
+        """
+        if not uid or uid == self._uid:
+            return
+        before, self._uid = self._uid, uid
+        self._book.record(VehicleIdentified(self.vehicle, uid, now))
+        if before and (self.is_driving or self._room.count(self.vehicle)):
+            self._executor.pause(R.OPERATOR, actor=SERVER, now=now)
+            self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
 
     def submit(self, draft: Draft, *, now: float) -> Task:
         """Take a task in; Rejection when too many wait."""

@@ -69,6 +69,7 @@ class Observer:
     #: everything that reached the rover, by message id
     reached: list[tuple[float, int]] = field(default_factory=list)
     _zeros_left: int = 0
+    _newest: tuple[int, float] = (0, -1e9)  # of its heartbeats: number, and when it came
     _before_continue: tuple[bool, bool] | None = None
     _zero_in_mode: bool = False
     _unready_since: float | None = None  # of heartbeats that say so, one after the other
@@ -108,7 +109,7 @@ class Observer:
     def heard(self, now: float, data: bytes) -> None:
         """A datagram from the vehicles' side reaches the server."""
         message = self._decode(data)
-        if message is None:
+        if message is None or self._is_overtaken(now, data):
             return
         kind = message.get_type()
         source = (message.get_srcSystem(), message.get_srcComponent())
@@ -121,6 +122,16 @@ class Observer:
                 self._position_at = now
             elif kind == "ATTITUDE":
                 self._attitude_at = now
+
+    def _is_overtaken(self, now: float, data: bytes) -> bool:
+        """Whether it is a heartbeat of the rover, and a newer one came before: it is history."""
+        if (data[5], data[6], data[7]) != (self.system_id, 1, 0):
+            return False
+        seq, at = self._newest
+        if 0 < (seq - data[4]) % 256 <= 64 and now - at <= 0.5:
+            return True
+        self._newest = data[4], now
+        return False
 
     def answered(self, now: float, data: bytes) -> None:
         """The server sends a datagram to a client: a continue that is refused ends nothing."""
