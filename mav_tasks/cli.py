@@ -42,6 +42,14 @@ def serve(
         str,
         typer.Option(help="Who arms: server, operator, or auto (server on loopback links only)."),
     ] = "auto",
+    store: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATH|:memory:",
+            envvar="MAV_TASKS_STORE",
+            help="Where tasks are kept; default: mav-tasks.sqlite3 in the user's data folder.",
+        ),
+    ] = None,
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Allow links that other machines can reach.")
     ] = False,
@@ -55,6 +63,7 @@ def serve(
             push=[] if no_push else push,
             vehicles=vehicle,
             arming=arming,
+            store=store,
             insecure=insecure,
         )
     )

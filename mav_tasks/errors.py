@@ -6,9 +6,9 @@
     ├── UsageError            the operator can mend it: one clear line, exit code 2
     │   ├── LinkUrlError      a link URL that says nothing we can open
     │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
-    │   └── InsecureLinkError a link beyond loopback without a key
+    │   ├── InsecureLinkError a link beyond loopback without a key
+    │   └── StoreError        a store that cannot be opened or read at start
     ├── Rejection             a request refused: reason code and words for the client
-    ├── StoreError            the journal cannot be read or written
     └── IllegalTransition     our own mistake: a move that the lifecycle table lacks
 
 Bytes from outside never raise: they are parsed to a value or counted (see ``mavlink``).
@@ -35,6 +35,13 @@ class InsecureLinkError(UsageError):
     """A link reachable from other machines, without a signing key."""
 
 
+class StoreError(UsageError):
+    """A store cannot be opened, or what it holds cannot be read.
+
+    Only at start: what the disk does later is no exception but an outcome (``NotKept``).
+    """
+
+
 class Rejection(MavTasksError):
     """A client's request refused.
 
@@ -47,10 +54,6 @@ class Rejection(MavTasksError):
         super().__init__(text)
         self.reason = reason
         self.text = text
-
-
-class StoreError(MavTasksError):
-    """The store cannot keep or give back what it should."""
 
 
 class IllegalTransition(MavTasksError):

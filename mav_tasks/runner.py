@@ -23,7 +23,7 @@ from mav_tasks.engine.inputs import (
     WallClock,
 )
 from mav_tasks.links.base import Link
-from mav_tasks.store import Kept, Store
+from mav_tasks.store import Kept, NotKept, Outcome, Store
 from mav_tasks.tasks.events import (
     Event,
     QueuePaused,
@@ -47,6 +47,7 @@ class Pump:
         self.engine = engine
         self._store = store
         self._send = send
+        self._store_is_away = False
         self.is_over = False
 
     def handle(self, item: Input, *, now: float) -> None:
@@ -71,6 +72,7 @@ class Pump:
             if not outcomes:
                 break
             for outcome in outcomes:
+                self._note_outcome(outcome)
                 self.engine.handle(
                     Committed(outcome.through)
                     if isinstance(outcome, Kept)
@@ -83,6 +85,13 @@ class Pump:
         """Stop every vehicle that is being driven, without asking the engine anything."""
         for outgoing in self.engine.last_words:
             self._send(outgoing)
+
+    def _note_outcome(self, outcome: Outcome) -> None:
+        if isinstance(outcome, NotKept):
+            log.error("%s: submissions are refused until it is mended", outcome.text)
+        elif self._store_is_away:
+            log.warning("the store takes events again")
+        self._store_is_away = isinstance(outcome, NotKept)
 
     def _note(self, events: list[Event]) -> None:
         for event in events:
@@ -107,6 +116,7 @@ class Runner:
         self._sides += [(link, LinkSide.CLIENTS) for link in clients]
         self._links = {link.name: link for link, _ in self._sides}
         self._store = store
+        self._store_fd = store.fileno()
         self._pump = Pump(engine, store, self._send)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
@@ -123,21 +133,35 @@ class Runner:
             for link, side in self._sides:
                 self._guarded(link_changed(link, side))
                 self._loop.add_reader(link.fileno(), self._on_readable, link)
+            if self._store_fd is not None:
+                self._loop.add_reader(self._store_fd, self._on_stored)
             return await self._over
         finally:
+            if self._store_fd is not None:
+                self._loop.remove_reader(self._store_fd)
             for link, _ in self._sides:
                 self._loop.remove_reader(link.fileno())
                 link.close()
-            self._store.close()
+            self._close_store()
 
     def _on_readable(self, link: Link) -> None:
         datagrams = link.receive(DRAIN)
         if datagrams:
             self._guarded(Packets(link.name, datagrams))
 
+    def _on_stored(self) -> None:
+        self._guarded(None)
+
     def _on_timer(self) -> None:
         self._timer = None
         self._guarded(None)
+
+    def _close_store(self) -> None:
+        """What it says to the last goes to the log: there is nobody else to tell."""
+        self._store.close()
+        for outcome in self._store.take_outcomes():
+            if isinstance(outcome, NotKept):
+                log.error("%s", outcome.text)
 
     def _on_signal(self) -> None:
         assert self._loop is not None

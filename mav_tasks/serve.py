@@ -3,16 +3,27 @@
 import asyncio
 import logging
 import sys
+import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from platformdirs import user_data_path
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, parse_endpoint, parse_url, refuse_insecure
 from mav_tasks.runner import Runner
 from mav_tasks.settings import ARMING, Settings
 from mav_tasks.store import MemoryStore
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.restored import Restored
+
+IN_MEMORY = ":memory:"
+DEFAULT_STORE = "mav-tasks.sqlite3"
 
 
 def serve(
@@ -21,6 +32,7 @@ def serve(
     push: Sequence[str],
     vehicles: Sequence[str],
     arming: str,
+    store: str | None,
     insecure: bool,
 ) -> int:
     """Run until a signal; gives the exit code. UsageError says what the operator can mend."""
@@ -37,22 +49,55 @@ def serve(
         for host, port in pushed:
             refuse_insecure(LinkUrl("udpout", host, port))
     log_to_stderr()
-    # Pushing from the first client link: who answers is served from the socket it was called by.
-    client_links = [
-        UdpLink(url, push=pushed if number == 0 else ()) for number, url in enumerate(client_urls)
-    ]
-    vehicle_links = [UdpLink(url) for url in vehicle_urls]
-    for link in client_links:
-        sys.stdout.write(f"mav-tasks: clients on {link.name}\n")
-    for link in vehicle_links:
-        sys.stdout.write(f"mav-tasks: vehicles on {link.name}, waiting for the first heartbeat\n")
-    sys.stdout.flush()
-    return asyncio.run(_run(settings, client_links, vehicle_links))
+    with ExitStack() as opened:
+        # Pushing from the first client link: who answers is served by the socket that called.
+        client_links = [
+            _open_link(opened, url, push=pushed if number == 0 else ())
+            for number, url in enumerate(client_urls)
+        ]
+        vehicle_links = [_open_link(opened, url) for url in vehicle_urls]
+        journal = open_store(store)
+        opened.callback(journal.close)
+        restored = journal.load() if isinstance(journal, SqliteStore) else None
+        for link in client_links:
+            _say(f"clients on {link.name}")
+        for link in vehicle_links:
+            _say(f"vehicles on {link.name}, waiting for the first heartbeat")
+        _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
+        sys.stdout.flush()
+        return asyncio.run(_run(settings, journal, restored, client_links, vehicle_links))
 
 
-async def _run(settings: Settings, clients: Sequence[UdpLink], vehicles: Sequence[UdpLink]) -> int:
-    engine = Engine(settings, now=asyncio.get_running_loop().time())
-    return await Runner(engine, MemoryStore(), clients=clients, vehicles=vehicles).run()
+def open_store(path: str | None) -> SqliteStore | MemoryStore:
+    """Open the store at a path; None: in the user's data folder. StoreError says why not."""
+    if path == IN_MEMORY:
+        return MemoryStore()
+    if path == "":
+        raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
+    chosen = Path(path) if path else user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE
+    return SqliteStore(chosen, wall_offset=lambda: time.time() - time.monotonic())
+
+
+def _open_link(opened: ExitStack, url: LinkUrl, *, push: tuple[Any, ...] = ()) -> UdpLink:
+    link = UdpLink(url, push=push)
+    opened.callback(link.close)
+    return link
+
+
+async def _run(
+    settings: Settings,
+    store: SqliteStore | MemoryStore,
+    restored: Restored | None,
+    clients: Sequence[UdpLink],
+    vehicles: Sequence[UdpLink],
+) -> int:
+    now = asyncio.get_running_loop().time()
+    engine = Engine(settings, now=now, restored=restored)  # what the store gave back
+    return await Runner(engine, store, clients=clients, vehicles=vehicles).run()
+
+
+def _say(words: str) -> None:
+    sys.stdout.write(f"mav-tasks: {words}\n")
 
 
 def _refuse_doubles(urls: Sequence[LinkUrl]) -> None:

@@ -52,6 +52,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.links",
             "mav_tasks.store",
             "mav_tasks.settings",
+            "mav_tasks.tasks",
             "mav_tasks.runner",
             "mav_tasks.errors",
         }

@@ -157,6 +157,7 @@ class Submissions:
         if known.task_id in self._undecided:
             return
         asked.answer(MavResult.ACCEPTED, known.task_id)
+        asked.client.statuses.changed(known.task_id)  # it names the nonce; an ack does not
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL):
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
             words = f"same {what} again: still task {known.task_id}"

@@ -1,6 +1,7 @@
 """What the operator can mend is said in one clear line, exit code 2, never a traceback."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -18,7 +19,7 @@ def run(*arguments: str, environment: dict[str, str] | None = None) -> tuple[int
         capture_output=True,
         text=True,
         timeout=30,
-        env={**os.environ, **(environment or {})},
+        env={**os.environ, "MAV_TASKS_STORE": ":memory:", **(environment or {})},
         check=False,
     )
     return done.returncode, done.stdout, done.stderr
@@ -83,6 +84,28 @@ def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
         server.wait_for(f"clients on udpin:0.0.0.0:{port}")
         server.end()
     assert server.popen.returncode == 0
+
+
+def test_a_store_in_use_is_named_with_its_process(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    first, second, rover = free_udp_ports(3)
+    options = ("serve", "--no-push", "--store", str(path), "--vehicle", f"udpout:127.0.0.1:{rover}")
+    with process(
+        *("-m", "mav_tasks.cli", *options, "--client", f"udpin:127.0.0.1:{first}"),
+        folder=tmp_path,
+        name="server",
+    ) as server:
+        server.wait_for(re.escape(f"store {path}, 0 tasks"))
+        result = run(*options, "--client", f"udpin:127.0.0.1:{second}")
+        assert_one_clear_line(result, str(path), "in use", str(server.popen.pid))
+        server.end()
+    assert server.popen.returncode == 0
+
+
+def test_a_store_without_a_name_is_refused() -> None:
+    (port,) = free_udp_ports(1)
+    client = ("--client", f"udpin:127.0.0.1:{port}")
+    assert_one_clear_line(run("serve", "--no-push", *client, "--store", ""), "--store", ":memory:")
 
 
 def test_who_arms_must_be_known() -> None:

@@ -32,6 +32,7 @@ def test_the_wheel_runs_server_and_rover_in_an_empty_environment(tmp_path: Path)
     sim = ("-m", "mav_tasks.cli", "sim", "--port", str(rover_port))
     serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client_port}"]
     serve += ["--no-push", "--vehicle", f"udpout:127.0.0.1:{rover_port}"]
+    serve += ["--store", str(tmp_path / "tasks.sqlite3")]
     with (
         process(*sim, folder=tmp_path, name="sim", python=python) as rover,
         process(*serve, folder=tmp_path, name="serve", python=python) as server,

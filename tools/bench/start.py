@@ -62,6 +62,7 @@ def _first_heartbeat() -> float:
                 f"--client=udpin:127.0.0.1:{listen}",
                 f"--push=127.0.0.1:{push}",
                 f"--vehicle=udpout:127.0.0.1:{dial}",
+                "--store=:memory:",
             ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

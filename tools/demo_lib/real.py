@@ -39,7 +39,7 @@ def drive(screen: Screen, *, body: str, gui: bool, seed: int) -> tuple[ThirdPart
         rover += ["--gui"] if gui else []
         server = [sys.executable, "-m", "mav_tasks.cli", "serve"]
         server += ["--client", f"udpin:127.0.0.1:{client_port}"]
-        server += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
+        server += ["--vehicle", f"udpout:127.0.0.1:{rover_port}", "--store", ":memory:"]
         with (
             process(rover, Path(folder) / "rover.log") as check_rover,
             process(server, Path(folder) / "server.log") as check_server,

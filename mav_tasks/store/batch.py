@@ -1,0 +1,79 @@
+"""Events as the rows that one transaction writes. Pure: rows are made once, however often tried."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from mav_tasks.store.codec import Encoder, dumps
+from mav_tasks.tasks.events import (
+    Event,
+    QueueContinued,
+    QueuePaused,
+    TaskChanged,
+    TaskModified,
+    TaskSubmitted,
+    TaskWithdrawn,
+    VehicleIdentified,
+    VehicleSpeedSet,
+)
+
+
+class Batch:
+    """Rows of events, numbered from ``first`` over the life of the file.
+
+    A submission makes a row of a task and none of the journal; a task that changes twice is
+    written once.
+    """
+
+    def __init__(
+        self,
+        events: Sequence[Event],
+        *,
+        first: int,
+        encoder: Encoder,
+        format_id: int,
+        offset: float,
+    ) -> None:
+        self.first = first
+        self.last = first + len(events) - 1
+        self.next_id = 0  # one above the highest task id, 0 if there is none
+        self.tasks: list[tuple[Any, ...]] = []  # id, number, vehicle, state, changed_at, submitted
+        self.journal: list[tuple[Any, ...]] = []  # number, utc, kind, task_id, vehicle, body
+        self.changed: dict[int, tuple[Any, ...]] = {}  # state, changed_at, changed, id
+        self.modified: dict[int, tuple[Any, ...]] = {}  # modified, id
+        self.withdrawn: list[tuple[int]] = []
+        self.vehicles: dict[tuple[str, int], Any] = {}  # column and vehicle -> value
+        for number, event in enumerate(events, first):
+            row = encoder.row(event, offset=offset)
+            row.insert(0, format_id)
+            body = dumps(row)
+            if type(event) is TaskSubmitted:
+                task = event.task
+                self.next_id = max(self.next_id, task.id + 1)
+                self.tasks.append(
+                    (task.id, number, task.vehicle, task.state, event.at + offset, body)
+                )
+            else:
+                self._note(event, number, body, event.at + offset)
+
+    def __repr__(self) -> str:
+        return f"Batch({self.first} to {self.last})"
+
+    def _note(self, event: Event, number: int, body: str, utc: float) -> None:
+        task_id = getattr(event, "task_id", None)
+        vehicle = getattr(event, "vehicle", None)
+        self.journal.append((number, utc, type(event).__name__, task_id, vehicle, body))
+        match event:
+            case TaskChanged():
+                self.changed[event.task_id] = (event.new, utc, body, event.task_id)
+            case TaskModified():
+                self.modified[event.task_id] = (body, event.task_id)
+            case TaskWithdrawn():
+                self.withdrawn.append((event.task_id,))
+            case QueuePaused():
+                self.vehicles["paused", event.vehicle] = event.reason
+            case QueueContinued():
+                self.vehicles["paused", event.vehicle] = None
+            case VehicleIdentified():
+                self.vehicles["uid", event.vehicle] = event.uid
+            case VehicleSpeedSet():
+                self.vehicles["speed", event.vehicle] = event.speed

@@ -1,0 +1,270 @@
+"""Frozen dataclasses ↔ rows of JSON values, led by their annotations: a new field needs nothing.
+
+A row is a flat list. What its places mean says a format, which is stored beside the rows: for each
+class the paths of its fields, those of a dataclass within it with a dot. Where there may be another
+class, or None, stands a row of its own; where there may be several classes, their name comes first.
+Reading a row of an older format, a missing field takes its default and an unknown one is passed
+over. (Names in every row would cost three times the size, and twice the time to write and read.)
+
+Stored times are UTC seconds: a field named in MONOTONIC is moved by ``offset``, UTC minus monotonic
+seconds, on its way out, and back on its way in. NaN and infinity are refused.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from json import JSONEncoder, loads
+from operator import attrgetter, itemgetter
+from types import NoneType, UnionType
+from typing import Any, NewType, Union, get_args, get_origin, get_type_hints
+
+__all__ = ["MONOTONIC", "Decoder", "Encoder", "Unreadable", "dumps", "format_of", "loads"]
+
+#: fields in monotonic seconds, wherever they are
+MONOTONIC = frozenset({"at", "submitted_at", "start_at", "deadline", "booted_at"})
+
+#: class name -> paths of its fields, in their order
+Format = Mapping[str, tuple[str, ...]]
+#: value, offset -> value for JSON, or back
+Converter = Callable[[Any, float], Any]
+
+_PLAIN = frozenset({int, float, str, bool, NoneType})
+
+# Circles are looked for by an entry in a dict for each list: values have none.
+_encoder = JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False)
+
+
+class Unreadable(ValueError):
+    """Stored text that this version cannot make a value of."""
+
+
+def dumps(value: object) -> str:
+    """Give compact JSON; ValueError for NaN and infinity."""
+    return _encoder.encode(value)
+
+
+def format_of(*kinds: type) -> dict[str, tuple[str, ...]]:
+    """Give the format of dataclasses and of all that is in them. TypeError: no way to store it."""
+    found: dict[str, tuple[str, ...]] = {}
+    waiting = list(kinds)
+    while waiting:
+        kind = waiting.pop()
+        if kind.__name__ not in found:
+            leaves = dict(_leaves(kind))
+            found[kind.__name__] = tuple(leaves)
+            waiting += [inner for hint in leaves.values() for inner in _records(hint)]
+    return dict(sorted(found.items()))
+
+
+class Encoder:
+    """Makes rows of values of some kinds, in the order of ``format_of``."""
+
+    def __init__(self) -> None:
+        self._encoders: dict[type, Callable[[Any, float], list[Any]]] = {}
+
+    def row(self, value: Any, *, offset: float) -> list[Any]:
+        """Give the row of a dataclass."""
+        kind = type(value)
+        encode = self._encoders.get(kind)
+        if encode is None:
+            encode = self._encoders[kind] = self._encoder_of(kind)
+        return encode(value, offset)
+
+    def _encoder_of(self, kind: type) -> Callable[[Any, float], list[Any]]:
+        leaves = list(_leaves(kind))
+        get = _getter(tuple(path for path, _ in leaves))
+        special = [
+            (index, convert)
+            for index, (path, hint) in enumerate(leaves)
+            if (convert := self._converter(path, hint)) is not None
+        ]
+
+        def encode(value: Any, offset: float) -> list[Any]:
+            row = list(get(value))
+            for index, convert in special:
+                if row[index] is not None:
+                    row[index] = convert(row[index], offset)
+            return row
+
+        return encode
+
+    def _converter(self, path: str, hint: Any) -> Converter | None:
+        if path.rpartition(".")[2] in MONOTONIC:
+            return lambda value, offset: value + offset
+        inner = _records(hint)
+        if get_origin(hint) is tuple:
+            part = self._converter("", get_args(hint)[0])
+            return lambda value, offset: [part(v, offset) if part else v for v in value]
+        if len(inner) > 1:
+            return lambda v, offset: [type(v).__name__, *self.row(v, offset=offset)]
+        if inner:
+            return lambda value, offset: self.row(value, offset=offset)
+        enum = _enum_in(hint)
+        if enum is None or issubclass(enum, int):
+            return None
+        return lambda value, _: value.value
+
+
+class Decoder:
+    """Makes values of rows that were written in a format: many at once, column by column."""
+
+    def __init__(self, written: Format) -> None:
+        self._written = written
+        self._decoders: dict[type, _Decode] = {}
+
+    def values(self, kind: type, rows: Sequence[list[Any]], *, offset: float) -> list[Any]:
+        """Give the values of rows. Unreadable if one cannot be understood."""
+        if not rows:
+            return []
+        decode = self._decoders.get(kind)
+        if decode is None:
+            decode = self._decoders[kind] = self._decoder_of(kind)
+        try:
+            return decode(list(zip(*rows, strict=True)), offset)
+        except Unreadable:
+            raise
+        except KeyError as error:
+            raise Unreadable(f"{kind.__name__}: {error} is unknown to this version") from error
+        except (TypeError, ValueError, IndexError, AttributeError) as error:
+            raise Unreadable(f"{kind.__name__}: {error}") from error
+
+    def _decoder_of(self, kind: type) -> "_Decode":
+        if kind.__name__ not in self._written:
+            raise Unreadable(f"{kind.__name__} is not in its format")
+        places = {path: index for index, path in enumerate(self._written[kind.__name__])}
+        special = [
+            (places[path], convert)
+            for path, hint in _leaves(kind)
+            if path in places and (convert := self._converter(path, hint)) is not None
+        ]
+        build = _builder(kind, places)
+
+        def decode(columns: list[Sequence[Any]], offset: float) -> list[Any]:
+            for index, convert in special:
+                columns[index] = convert(columns[index], offset)
+            return build(columns)
+
+        return decode
+
+    def _converter(self, path: str, hint: Any) -> "_Decode | None":
+        """Give what converts a column; None: it is as it is in JSON."""
+        if path.rpartition(".")[2] in MONOTONIC:
+            return lambda column, offset: [None if v is None else v - offset for v in column]
+        inner = {kind.__name__: kind for kind in _records(hint)}
+        if get_origin(hint) is tuple:
+            part = self._converter("", get_args(hint)[0])
+            return lambda column, offset: [
+                tuple(part(value, offset) if part else value) for value in column
+            ]
+        if len(inner) > 1:
+            return lambda column, offset: self._tagged(inner, column, offset)
+        if inner:
+            (only,) = inner.values()
+            return lambda column, offset: self._optional(only, column, offset)
+        enum = _enum_in(hint)
+        if enum is None:
+            return None
+        members = {None: None, **{member.value: member for member in enum}}
+        return lambda column, _: [members[value] for value in column]
+
+    def _optional(self, kind: type, column: Sequence[Any], offset: float) -> list[Any]:
+        there = [row for row in column if row is not None]
+        values = iter(self.values(kind, there, offset=offset))
+        return [None if row is None else next(values) for row in column]
+
+    def _tagged(self, kinds: Mapping[str, type], column: Sequence[Any], offset: float) -> list[Any]:
+        rows: dict[str, list[list[Any]]] = {}
+        for row in column:
+            if row is not None:
+                rows.setdefault(row[0], []).append(row[1:])
+        values = {
+            name: iter(self.values(kinds[name], of_kind, offset=offset))
+            for name, of_kind in rows.items()
+        }
+        return [None if row is None else next(values[row[0]]) for row in column]
+
+
+#: columns of converted values, offset -> values; or one column
+_Decode = Callable[[Any, float], list[Any]]
+
+
+def _builder(
+    kind: type, places: Mapping[str, int], prefix: str = ""
+) -> Callable[[list[Sequence[Any]]], list[Any]]:
+    """Give what makes dataclasses of columns; a field not in ``places`` has its default."""
+    hints = get_type_hints(kind)
+    sources: dict[str, Callable[[list[Sequence[Any]]], Sequence[Any]]] = {}
+    for field in fields(kind):
+        path = prefix + field.name
+        if path in places:
+            sources[field.name] = itemgetter(places[path])
+        elif any(place.startswith(f"{path}.") for place in places):
+            sources[field.name] = _builder(hints[field.name], places, f"{path}.")
+    takes = tuple(sources.values())
+    make = _maker(kind, tuple(sources))
+
+    def build(columns: list[Sequence[Any]]) -> list[Any]:
+        parts = [take(columns) for take in takes]
+        if not prefix:
+            return list(map(make, *parts))
+        rows = list(zip(*parts, strict=True))
+        different = dict.fromkeys(rows)
+        if 2 * len(different) > len(rows):
+            return list(map(make, *parts))
+        shared = {row: make(*row) for row in different}  # as most terms and submitters are
+        return [shared[row] for row in rows]
+
+    return build
+
+
+def _maker(kind: type, names: tuple[str, ...]) -> Callable[..., Any]:
+    if names == tuple(field.name for field in fields(kind)):
+        return kind
+    return lambda *values: kind(**dict(zip(names, values, strict=True)))
+
+
+def _leaves(kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Give path and annotation of each place of a kind's row."""
+    hints = get_type_hints(kind)
+    for field in fields(kind):
+        hint = _real(hints[field.name])
+        if is_dataclass(hint):
+            assert isinstance(hint, type)
+            yield from _leaves(hint, f"{prefix}{field.name}.")
+        else:
+            yield prefix + field.name, hint
+
+
+def _records(hint: Any) -> list[type]:
+    """Give the dataclasses that may stand in a place. TypeError: there may be what has no way."""
+    hint = _real(hint)
+    if get_origin(hint) in (Union, UnionType):
+        return [kind for part in get_args(hint) for kind in _records(part)]
+    if get_origin(hint) is tuple and get_args(hint)[1:] == (...,):
+        return _records(get_args(hint)[0])
+    if is_dataclass(hint):
+        assert isinstance(hint, type)
+        return [hint]
+    if hint in _PLAIN or (isinstance(hint, type) and issubclass(hint, Enum)):
+        return []
+    raise TypeError(f"no way to store {hint}")
+
+
+def _enum_in(hint: Any) -> type[Enum] | None:
+    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    for part in map(_real, parts):
+        if isinstance(part, type) and issubclass(part, Enum):
+            return part
+    return None
+
+
+def _getter(paths: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    if len(paths) > 1:
+        return attrgetter(*paths)
+    return lambda value: tuple(attrgetter(path)(value) for path in paths)
+
+
+def _real(hint: Any) -> Any:
+    while isinstance(hint, NewType):
+        hint = hint.__supertype__
+    return hint

@@ -1,0 +1,204 @@
+"""The file: opening, writing batches, closing. One thread at a time; errors are sqlite3's.
+
+WAL with synchronous=FULL: a transaction is on the disk when its COMMIT returns.
+"""
+
+import os
+import sqlite3
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from mav_tasks.errors import StoreError
+from mav_tasks.store import schema
+from mav_tasks.store.batch import Batch
+from mav_tasks.store.codec import dumps, format_of
+from mav_tasks.store.failures import words_for
+from mav_tasks.store.retention import Trimmer
+from mav_tasks.store.schema import transaction
+from mav_tasks.tasks.events import Event
+
+BUSY_TIMEOUT = 0.25  # s, that SQLite waits for another program's lock
+MOST_ROWS = 128  # in one INSERT: seven columns of them are below SQLite's oldest limit, 999 values
+
+_PRAGMAS = (
+    "PRAGMA journal_mode = WAL",
+    "PRAGMA synchronous = FULL",
+    "PRAGMA fullfsync = ON",  # macOS, where fsync alone does not reach the disk
+    "PRAGMA temp_store = MEMORY",
+    f"PRAGMA journal_size_limit = {16 << 20}",  # bytes that the WAL keeps after a checkpoint
+)
+
+
+class Database:
+    """An open store file. StoreError, on making one, says in a line why it cannot be used."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            _create(path)
+            self._connection = _connect(path)
+            try:
+                schema.check(self._connection)
+                _check_whole(self._connection)
+                _set_up(self._connection)
+                schema.migrate(self._connection)
+                self.format_id = self._find_format()
+                row = self._meta("next_id, last_number, last_write, ended_well")
+                with transaction(self._connection):  # durable before anything is moved
+                    self._connection.execute("UPDATE meta SET ended_well = 0")
+            except BaseException:
+                self._connection.close()
+                raise
+        except StoreError as error:
+            raise StoreError(f"store {path}: {error}") from None
+        except (OSError, sqlite3.Error) as error:
+            raise StoreError(f"store {path}: {words_for(error)}") from error
+        self.next_id: int = row[0]
+        self.last_number: int = row[1]
+        self.last_write: float | None = row[2]  # UTC seconds, of an earlier life
+        self.ended_well = bool(row[3])
+
+    def __repr__(self) -> str:
+        return f"Database({self._path.name}, event {self.last_number})"
+
+    def reopen(self) -> None:
+        """Open the file anew after a failure, and look which events are in it."""
+        with suppress(sqlite3.Error):
+            self._connection.close()
+        self._connection = _connect(self._path)
+        _set_up(self._connection)
+        (self.last_number,) = self._meta("last_number")
+
+    def write(self, batch: Batch, *, utc: float) -> None:
+        """Make a batch durable, all of it or nothing."""
+        connection = self._connection
+        with transaction(connection):
+            _insert(
+                connection, "tasks (id, number, vehicle, state, changed_at, submitted)", batch.tasks
+            )
+            _insert(
+                connection, "journal (number, utc, kind, task_id, vehicle, body)", batch.journal
+            )
+            connection.executemany(
+                "UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?",
+                batch.changed.values(),
+            )
+            connection.executemany(
+                "UPDATE tasks SET modified = ? WHERE id = ?", batch.modified.values()
+            )
+            self._withdraw(batch.withdrawn)
+            for (column, vehicle), value in batch.vehicles.items():
+                connection.execute(
+                    f"INSERT INTO vehicles (vehicle, {column}) VALUES (?, ?)"
+                    f" ON CONFLICT (vehicle) DO UPDATE SET {column} = excluded.{column}",
+                    (vehicle, value),
+                )
+            connection.execute(
+                "UPDATE meta SET next_id = max(next_id, ?), last_number = ?, last_write = ?",
+                (batch.next_id, batch.last, utc),
+            )
+        self.last_number = batch.last
+
+    def is_certain(self) -> bool:
+        """Bring what is in the WAL into the file itself; False: it is not all there yet.
+
+        A COMMIT that failed may yet be found in the WAL, though a failed fsync has promised
+        nothing: it counts only once it has been written again, somewhere else.
+        """
+        _, pages, done = self._connection.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
+        return bool(pages == done)
+
+    def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
+        """Forget a little of what may be forgotten; True: there may be more."""
+        with transaction(self._connection):
+            return trimmer.step(self._connection, utc=utc)
+
+    def close(self, *, utc: float | None) -> None:
+        """Close the file; ``utc`` notes the clean end, None: it is none."""
+        try:
+            if utc is not None:
+                with transaction(self._connection):
+                    self._connection.execute(
+                        "UPDATE meta SET ended_well = 1, last_write = ?", (utc,)
+                    )
+        finally:
+            self._connection.close()
+
+    def _withdraw(self, ids: Sequence[tuple[int]]) -> None:
+        """The task goes; that it was submitted stays in the journal."""
+        self._connection.executemany(
+            "INSERT INTO journal SELECT number, changed_at, 'TaskSubmitted', id, vehicle, submitted"
+            " FROM tasks WHERE id = ?",
+            ids,
+        )
+        self._connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
+
+    def _find_format(self) -> int:
+        names = dumps(format_of(*Event.__args__))
+        with transaction(self._connection):
+            self._connection.execute("INSERT OR IGNORE INTO formats (names) VALUES (?)", (names,))
+        query = "SELECT id FROM formats WHERE names = ?"
+        return int(self._connection.execute(query, (names,)).fetchone()[0])
+
+    def _meta(self, columns: str) -> tuple[Any, ...]:
+        row: tuple[Any, ...] | None = self._connection.execute(
+            f"SELECT {columns} FROM meta"
+        ).fetchone()
+        if row is None:
+            raise sqlite3.DatabaseError("the table meta is empty")
+        return row
+
+
+def _create(path: Path) -> None:
+    """Make the file and its folder, unless they are there, for nobody else to read."""
+    fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    os.close(fd)
+    folder = os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        os.fsync(folder)  # that the file is there is durable, too
+    finally:
+        os.close(folder)
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(
+        f"{path.as_uri()}?mode=rw",  # never a new, empty one in place of what was removed
+        uri=True,
+        timeout=BUSY_TIMEOUT,
+        isolation_level=None,
+        check_same_thread=False,  # made by the main thread, used by the writer's
+    )
+
+
+def _set_up(connection: sqlite3.Connection) -> None:
+    modes = [connection.execute(pragma).fetchone() for pragma in _PRAGMAS]
+    if modes[0][0] != "wal":
+        raise sqlite3.OperationalError("this file system has no room for a write-ahead log")
+
+
+def _check_whole(connection: sqlite3.Connection) -> None:
+    """Raise StoreError for a file that is damaged in its structure."""
+    (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    if found != "ok":
+        raise StoreError(f"it is damaged ({found.splitlines()[-1]})")
+
+
+def _insert(connection: sqlite3.Connection, into: str, rows: list[tuple[Any, ...]]) -> None:
+    """Insert many rows by few statements.
+
+    At each statement the interpreter's lock is let go and asked for again, and beside a busy
+    engine that is a long way for each row. Powers of two, so that few statements are compiled.
+    """
+    done, size = 0, MOST_ROWS
+    while done < len(rows):
+        while size > len(rows) - done:
+            size //= 2
+        chunk = rows[done : done + size]
+        marks = f"({','.join('?' * len(chunk[0]))})"
+        connection.execute(
+            f"INSERT INTO {into} VALUES {','.join([marks] * size)}",
+            [value for row in chunk for value in row],
+        )
+        done += size

@@ -1,0 +1,32 @@
+"""What the disk does to us, in words. What is our own mistake is not in here: it raises."""
+
+import sqlite3
+
+#: SQLite's primary result codes (sqlite.org/rescode.html)
+_WORDS = {
+    sqlite3.SQLITE_FULL: "the disk is full",
+    sqlite3.SQLITE_READONLY: "it is read-only",
+    sqlite3.SQLITE_IOERR: "the disk cannot be read or written, or is full",
+    sqlite3.SQLITE_CORRUPT: "it is damaged",
+    sqlite3.SQLITE_NOTADB: "it is damaged, or no database",
+    sqlite3.SQLITE_CANTOPEN: "it cannot be opened",
+    sqlite3.SQLITE_BUSY: "another program has locked it",
+    sqlite3.SQLITE_LOCKED: "another program has locked it",
+    sqlite3.SQLITE_PERM: "there is no permission",
+}
+
+
+def is_failure(error: Exception) -> bool:
+    """Whether it is the disk's, and may pass."""
+    return isinstance(error, OSError) or type(error) in (
+        sqlite3.OperationalError,
+        sqlite3.DatabaseError,  # itself: damage; its other heirs are misuse
+    )
+
+
+def words_for(error: Exception) -> str:
+    """Give what is wrong with the file."""
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    words = _WORDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF)
+    return f"{words} ({error})" if words else str(error)

@@ -1,0 +1,129 @@
+"""What a store file holds, read back: the state to go on from, and the journal as events.
+
+Each reading has a connection of its own, and so sees one state of the file whatever is written.
+"""
+
+import gc
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import fields, replace
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, cast
+
+from mav_tasks.errors import StoreError
+from mav_tasks.store.codec import Decoder, Unreadable, loads
+from mav_tasks.store.failures import words_for
+from mav_tasks.tasks import events
+from mav_tasks.tasks.events import Event, TaskChanged, TaskModified, TaskSubmitted
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Task
+
+CHUNK = 1_000  # rows whose JSON is read in one go
+
+#: what an event says of its task besides its new state: the fields that both have
+_OF_TASK = {
+    kind: tuple({f.name for f in fields(kind)} & {f.name for f in fields(Task)})
+    for kind in (TaskChanged, TaskModified)
+}
+
+
+def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
+    """Give the state that a store file holds, its times moved by ``offset``. StoreError."""
+    with _opened(path) as (connection, rows), _no_collection():
+        (next_id,) = connection.execute("SELECT next_id FROM meta").fetchone()
+        found = connection.execute("SELECT submitted, changed, modified FROM tasks ORDER BY id")
+        tasks: list[Task] = []
+        while chunk := found.fetchmany(CHUNK):
+            submitted = rows.values(TaskSubmitted, [row[0] for row in chunk], offset)
+            for event, (_, changed, modified) in zip(submitted, chunk, strict=True):
+                task = event.task
+                if changed is not None or modified is not None:
+                    task = _changed(task, rows, changed, modified, offset)
+                tasks.append(task)
+        vehicles = connection.execute("SELECT vehicle, paused, uid, speed FROM vehicles").fetchall()
+        return Restored(
+            tasks=tuple(tasks),
+            next_id=next_id,
+            paused={row[0]: TaskReason(row[1]) for row in vehicles if row[1] is not None},
+            uids={row[0]: row[2] for row in vehicles if row[2] is not None},
+            speeds={row[0]: row[3] for row in vehicles if row[3] is not None},
+            ended_well=ended_well,
+            idle=idle,
+            wall_offset=offset,
+        )
+
+
+def read_journal(path: Path, *, offset: float) -> Iterator[tuple[int, Event]]:
+    """Give every event that is kept, with its number over the life of the file. StoreError."""
+    with _opened(path) as (connection, rows):
+        found = connection.execute(
+            "SELECT number, kind, body FROM journal"
+            " UNION ALL SELECT number, 'TaskSubmitted', submitted FROM tasks ORDER BY number"
+        )
+        for number, kind, body in found:
+            (event,) = rows.values(getattr(events, kind), [body], offset)
+            yield number, cast(Event, event)
+
+
+class _Rows:
+    """Makes values of stored texts, each of the format that it was written in."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._decoders = {
+            number: Decoder(loads(names))
+            for number, names in connection.execute("SELECT id, names FROM formats")
+        }
+
+    def values(self, kind: type, texts: list[str], offset: float) -> list[Any]:
+        values: list[Any] = []
+        rows = loads(f"[{','.join(texts)}]")
+        for number, of_format in groupby(rows, key=itemgetter(0)):
+            bare = [row[1:] for row in of_format]
+            values += self._decoders[number].values(kind, bare, offset=offset)
+        return values
+
+
+def _changed(
+    task: Task, rows: _Rows, changed: str | None, modified: str | None, offset: float
+) -> Task:
+    latest: list[TaskChanged | TaskModified] = []
+    if changed is not None:
+        latest += rows.values(TaskChanged, [changed], offset)
+    if modified is not None:
+        latest += rows.values(TaskModified, [modified], offset)
+    for event in sorted(latest, key=lambda event: event.version):
+        new: dict[str, Any] = {name: getattr(event, name) for name in _OF_TASK[type(event)]}
+        if isinstance(event, TaskChanged):
+            new["state"] = event.new
+        task = replace(task, **new)
+    return task
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[sqlite3.Connection, _Rows]]:
+    try:
+        with closing(sqlite3.connect(f"{path.as_uri()}?mode=rw", uri=True)) as connection:
+            connection.execute("BEGIN")  # one state of the file for every query
+            yield connection, _Rows(connection)
+    except Unreadable as error:
+        raise StoreError(f"store {path}: it cannot be understood: {error}") from error
+    except (ValueError, LookupError) as error:  # not JSON, or not what we write
+        raise StoreError(f"store {path}: it is damaged ({error})") from error
+    except sqlite3.Error as error:
+        raise StoreError(f"store {path}: {words_for(error)}") from error
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Among values that all stay, the collector would look for rubbish again and again."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()

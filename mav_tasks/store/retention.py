@@ -1,0 +1,81 @@
+"""What is forgotten: finished tasks with their events, and other events, in bounded steps.
+
+A task that waits or is under way is never deleted, nor any event of it.
+"""
+
+import sqlite3
+from dataclasses import dataclass
+from math import inf
+
+STEP = 250  # tasks deleted in one transaction
+SWEEP = 2_000  # journal rows looked at in one transaction
+
+_OVER = "state >= 9"  # the terminal states; as the index has it
+
+
+@dataclass(frozen=True, slots=True)
+class Retention:
+    """How long what is over is kept: ``max_age`` seconds, ``max_count`` tasks; None: for ever."""
+
+    max_age: float | None
+    max_count: int | None
+
+
+#: as many as the server itself remembers, for a month
+DEFAULT_RETENTION = Retention(max_age=30 * 86_400.0, max_count=10_000)
+
+
+class Trimmer:
+    """Applies a retention step by step, each step within a transaction of the caller's."""
+
+    def __init__(self, retention: Retention) -> None:
+        self._retention = retention
+        self._swept = 0  # number of the last journal row looked at
+
+    def step(self, connection: sqlite3.Connection, *, utc: float) -> bool:
+        """Delete some of what is too old or too many; True: there may be more."""
+        deleted = self._delete_tasks(connection, utc)
+        return self._sweep(connection, utc) or deleted >= STEP
+
+    def _delete_tasks(self, connection: sqlite3.Connection, utc: float) -> int:
+        ids: list[tuple[int]] = []
+        if self._retention.max_age is not None:
+            ids = _oldest(connection, STEP, before=utc - self._retention.max_age)
+        if self._retention.max_count is not None:
+            (count,) = connection.execute(f"SELECT count(*) FROM tasks WHERE {_OVER}").fetchone()
+            excess = min(count - self._retention.max_count, STEP)
+            if excess > len(ids):
+                ids = _oldest(connection, excess, before=inf)
+        connection.executemany("DELETE FROM journal WHERE task_id = ?", ids)
+        connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
+        return len(ids)
+
+    def _sweep(self, connection: sqlite3.Connection, utc: float) -> bool:
+        """Delete old events that are of no task (any more); True: more rows are to be looked at."""
+        if self._retention.max_age is None:
+            return False
+        too_old = utc - self._retention.max_age
+        rows = connection.execute(
+            "SELECT number, utc FROM journal WHERE number > ? ORDER BY number LIMIT ?",
+            (self._swept, SWEEP),
+        ).fetchall()
+        if not rows:
+            self._swept = 0
+            return False
+        connection.execute(
+            "DELETE FROM journal WHERE number > ? AND number <= ? AND utc < ? AND NOT EXISTS"
+            " (SELECT 1 FROM tasks WHERE tasks.id = journal.task_id)",
+            (self._swept, rows[-1][0], too_old),
+        )
+        if rows[-1][1] >= too_old:  # from here on everything is younger
+            self._swept = 0
+            return False
+        self._swept = rows[-1][0]
+        return True
+
+
+def _oldest(connection: sqlite3.Connection, most: int, *, before: float) -> list[tuple[int]]:
+    return connection.execute(
+        f"SELECT id FROM tasks WHERE {_OVER} AND changed_at < ? ORDER BY changed_at, id LIMIT ?",
+        (before, most),
+    ).fetchall()

@@ -1,0 +1,80 @@
+"""The tables of a store, and how an older file becomes a present one.
+
+``user_version`` counts the migrations that a file has seen. A change of a table, or of what a
+stored name means (a goal, a state, a field), is a migration at the end of the list; what has been
+released is never edited. A new field, goal or event needs none: see ``codec``.
+"""
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+
+from mav_tasks.errors import StoreError
+
+APPLICATION_ID = 0x4D565453  # "MVTS", so that we never write into another program's database
+
+#: each the statements of one transaction. Times are UTC seconds, texts rows as of ``codec``.
+MIGRATIONS: tuple[tuple[str, ...], ...] = (
+    (
+        f"PRAGMA application_id = {APPLICATION_ID}",
+        (
+            "CREATE TABLE meta (one INTEGER PRIMARY KEY CHECK (one = 1), next_id INTEGER NOT NULL,"
+            " last_number INTEGER NOT NULL, last_write REAL, ended_well INTEGER NOT NULL)"
+        ),
+        "INSERT INTO meta VALUES (1, 1, 0, NULL, 1)",
+        "CREATE TABLE formats (id INTEGER PRIMARY KEY, names TEXT NOT NULL UNIQUE)",
+        # The event of a submission is the task's own row: number and submitted.
+        (
+            "CREATE TABLE tasks (id INTEGER PRIMARY KEY, number INTEGER NOT NULL,"
+            " vehicle INTEGER NOT NULL, state INTEGER NOT NULL, changed_at REAL NOT NULL,"
+            " submitted TEXT NOT NULL, changed TEXT, modified TEXT)"
+        ),
+        "CREATE INDEX finished ON tasks (changed_at) WHERE state >= 9",
+        (
+            "CREATE TABLE journal (number INTEGER PRIMARY KEY, utc REAL NOT NULL,"
+            " kind TEXT NOT NULL, task_id INTEGER, vehicle INTEGER, body TEXT NOT NULL)"
+        ),
+        "CREATE INDEX of_task ON journal (task_id) WHERE task_id IS NOT NULL",
+        "CREATE TABLE vehicles (vehicle INTEGER PRIMARY KEY, paused INTEGER, uid TEXT, speed REAL)",
+    ),
+)
+
+
+def check(connection: sqlite3.Connection, *, known: int = len(MIGRATIONS)) -> None:
+    """Raise StoreError if a database is of another program or of a newer version of this one."""
+    version = _number(connection, "user_version")
+    if _number(connection, "application_id") != APPLICATION_ID and (
+        version or connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    ):
+        raise StoreError("a database of another program")
+    if version > known:
+        raise StoreError(f"written by a newer version (schema {version}, this one knows {known})")
+
+
+def migrate(
+    connection: sqlite3.Connection, *, migrations: Sequence[Sequence[str]] = MIGRATIONS
+) -> None:
+    """Bring a checked database up to the last migration."""
+    for number in range(_number(connection, "user_version"), len(migrations)):
+        with transaction(connection):
+            for statement in migrations[number]:
+                connection.execute(statement)
+            connection.execute(f"PRAGMA user_version = {number + 1}")
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """Commit what the block does, all of it or, if anything raises, nothing."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        if connection.in_transaction:
+            with suppress(sqlite3.Error):  # the first error is the one to tell
+                connection.execute("ROLLBACK")
+        raise
+
+
+def _number(connection: sqlite3.Connection, pragma: str) -> int:
+    return int(connection.execute(f"PRAGMA {pragma}").fetchone()[0])

@@ -1,0 +1,111 @@
+"""The store on a disk: a SQLite file that one server owns, written by a thread of its own."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from mav_tasks.errors import StoreError
+from mav_tasks.store.base import Outcome
+from mav_tasks.store.database import Database
+from mav_tasks.store.lock import Lock
+from mav_tasks.store.mailbox import Mailbox
+from mav_tasks.store.reading import read_journal, read_restored
+from mav_tasks.store.retention import DEFAULT_RETENTION, Retention, Trimmer
+from mav_tasks.store.writer import Writer
+from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.restored import Restored
+
+CLOSE_LIMIT = 3.0  # s, for what is left to be written when the server ends
+TRIM_AT_OPEN = 0.5  # s, for forgetting before the server serves; the rest is done beside it
+
+
+class SqliteStore:
+    """Implements ``Store``. Files and folders that it makes are its user's alone.
+
+    ``wall_offset`` gives UTC minus monotonic seconds, now. StoreError, on making one, says in one
+    line why the file cannot be used: by whom it is in use, damaged, newer, read-only, disk full.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        wall_offset: Callable[[], float],
+        retention: Retention = DEFAULT_RETENTION,
+    ) -> None:
+        self._wall_offset = wall_offset
+        self._path = _real_path(Path(path))
+        self.name = str(self._path)
+        lock = Lock(self._path)
+        try:
+            database = Database(self._path)
+        except BaseException:
+            lock.release()
+            raise
+        utc = time.monotonic() + wall_offset()
+        self._ended_well = database.ended_well
+        self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
+        self._mail = Mailbox()
+        trimmer = Trimmer(retention)
+        self._writer = Writer(
+            database,
+            self._mail,
+            trimmer,
+            name=self.name,
+            wall_offset=wall_offset,
+            release=lock.release,
+        )
+        self._is_open = True
+        self._writer.trim_for(TRIM_AT_OPEN)
+        self._writer.start()
+
+    def __repr__(self) -> str:
+        return f"SqliteStore({str(self._path)!r})"
+
+    def load(self) -> Restored:
+        """Give what the file holds, all times in this process's monotonic seconds. StoreError."""
+        return read_restored(
+            self._path, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
+        )
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        """Give every event that is kept, numbered over the life of the file. StoreError."""
+        return read_journal(self._path, offset=self._wall_offset())
+
+    def append(self, events: Sequence[Event]) -> None:
+        """Take events to be made durable; waits for nothing. ValueError once it is closed."""
+        if not self._is_open:
+            raise ValueError("the store is closed")
+        self._writer.append(tuple(events))
+
+    def take_outcomes(self) -> list[Outcome]:
+        """Give what became of them since the last call. It raises what was our own mistake."""
+        return self._mail.take()
+
+    def fileno(self) -> int | None:
+        """Give a descriptor that is readable while there are outcomes; None once closed."""
+        return self._mail.fileno()
+
+    def close(self) -> None:
+        """Write what is left, note the clean end and let others have the file.
+
+        A disk that fails until then, or is stuck, is given up after CLOSE_LIMIT; while it is stuck
+        the file stays locked.
+        """
+        if self._is_open:
+            self._is_open = False
+            self._writer.close(within=CLOSE_LIMIT)
+            self._mail.close()
+
+
+def _real_path(path: Path) -> Path:
+    """Give the one name of a file, in a folder that is there."""
+    try:
+        path = path.expanduser().resolve()
+        missing = [folder for folder in path.parents if not folder.is_dir()]
+        for folder in reversed(missing):
+            folder.mkdir(mode=0o700, exist_ok=True)
+    except (OSError, RuntimeError, ValueError) as error:
+        words = getattr(error, "strerror", None) or str(error)
+        raise StoreError(f"store {path}: its folder cannot be made: {words}") from error
+    return path

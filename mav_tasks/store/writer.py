@@ -1,0 +1,175 @@
+"""The thread that makes events durable: all that wait in one transaction, again and again.
+
+What fails is kept and tried again, in the same order, until it is written. Its rows are made once.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from queue import Empty, SimpleQueue
+from threading import Thread
+
+from mav_tasks.store.base import Kept, NotKept
+from mav_tasks.store.batch import Batch
+from mav_tasks.store.codec import Encoder
+from mav_tasks.store.database import Database
+from mav_tasks.store.failures import is_failure, words_for
+from mav_tasks.store.mailbox import Mailbox
+from mav_tasks.store.retention import Trimmer
+from mav_tasks.tasks.events import Event
+
+RETRY = 0.25  # s, until what failed is tried again
+LAST_TRY = 1.0  # s, that the try under way takes at most, unless the disk is stuck
+REPORT = 5.0  # s, between two reports of a failure that lasts
+MOST_EVENTS = 1_024  # in one transaction, about; more would let the first wait for the last
+TRIM_PERIOD = 60.0  # s, between two looks for what may be forgotten
+TRIM_PAUSE = 0.05  # s, between two steps of forgetting
+
+
+class Writer:
+    """Owns the database from ``start`` until it ends. Times of its own are monotonic seconds."""
+
+    def __init__(
+        self,
+        database: Database,
+        mail: Mailbox,
+        trimmer: Trimmer,
+        *,
+        name: str,
+        wall_offset: Callable[[], float],
+        release: Callable[[], None],
+    ) -> None:
+        self._database = database
+        self._mail = mail
+        self._trimmer = trimmer
+        self._name = name
+        self._wall_offset = wall_offset
+        self._release = release
+        self._base = database.last_number  # events are reported as counted from here
+        self._encoder = Encoder()
+        self._waiting: SimpleQueue[Sequence[Event] | None] = SimpleQueue()
+        self._give_up_at: float | None = None
+        self._is_closing = False
+        self._must_reopen = False
+        self._reported_at: float | None = None  # None: nothing is wrong
+        self._trim_at = time.monotonic()
+        self._thread = Thread(target=self._run, name="store", daemon=True)
+
+    def __repr__(self) -> str:
+        return f"Writer({self._database!r}, {'failing' if self._must_reopen else 'well'})"
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def trim_for(self, seconds: float) -> None:
+        """Forget what may be forgotten, before ``start``, for so long at most."""
+        end = time.monotonic() + seconds
+        while self._trim_at <= time.monotonic() < end:
+            self._trim(pause=0.0)
+
+    def append(self, events: Sequence[Event]) -> None:
+        """Take events; called by the loop's thread, which waits for nothing."""
+        self._waiting.put(events)
+
+    def close(self, *, within: float) -> bool:
+        """Write what is left and end; False: it did not end in time."""
+        self._give_up_at = time.monotonic() + within
+        self._waiting.put(None)
+        self._thread.join(within + LAST_TRY)
+        return not self._thread.is_alive()
+
+    def utc(self) -> float:
+        """Give the time of the wall, seconds since 1970."""
+        return time.monotonic() + self._wall_offset()
+
+    def _run(self) -> None:
+        try:
+            is_all_written = True
+            while is_all_written and not self._is_closing:
+                events = self._collect()
+                is_all_written = not events or self._write(events)
+                self._trim()
+            self._end(is_all_written)
+        except Exception as mistake:  # noqa: BLE001 - ours: raised where the engine's are
+            self._mail.put_mistake(mistake)
+        finally:
+            self._release()
+
+    def _collect(self) -> list[Event]:
+        """Wait for events, or until there is something to forget; gives all that wait."""
+        events: list[Event] = []
+        try:
+            item = self._waiting.get(timeout=max(0.001, self._trim_at - time.monotonic()))
+            while True:
+                if item is None:
+                    self._is_closing = True
+                    break
+                events += item
+                if len(events) >= MOST_EVENTS:
+                    break
+                item = self._waiting.get_nowait()
+        except Empty:
+            pass
+        return events
+
+    def _write(self, events: Sequence[Event]) -> bool:
+        """Write until it is written; False: closed, and out of time."""
+        batch = Batch(
+            events,
+            first=self._database.last_number + 1,
+            encoder=self._encoder,
+            format_id=self._database.format_id,
+            offset=self._wall_offset(),
+        )
+        while not self._is_written(batch):
+            if self._give_up_at is not None and time.monotonic() > self._give_up_at:
+                words = f"given up at the end: {len(events)} events or more are lost"
+                self._mail.put(NotKept(f"store {self._name}: {words}"))
+                return False
+            time.sleep(RETRY)
+        self._reported_at = None
+        self._mail.put(Kept(batch.last - self._base))
+        return True
+
+    def _is_written(self, batch: Batch) -> bool:
+        try:
+            if self._must_reopen:
+                self._database.reopen()
+            if self._database.last_number < batch.first:
+                self._database.write(batch, utc=self.utc())
+            elif not self._database.is_certain():  # a commit that failed and yet is there
+                return False
+        except Exception as error:
+            if not is_failure(error):
+                raise
+            self._must_reopen = True
+            self._report(error)
+            return False
+        self._must_reopen = False
+        return True
+
+    def _report(self, error: Exception) -> None:
+        now = time.monotonic()
+        if self._reported_at is None or now >= self._reported_at + REPORT:
+            self._reported_at = now
+            self._mail.put(NotKept(f"store {self._name}: {words_for(error)}"))
+
+    def _trim(self, *, pause: float = TRIM_PAUSE) -> None:
+        """One step of forgetting, if it is time for it. Its failures wait for the next time."""
+        if time.monotonic() < self._trim_at or self._is_closing:
+            return
+        try:
+            has_more = self._database.trim(self._trimmer, utc=self.utc())
+        except Exception as error:
+            if not is_failure(error):
+                raise
+            has_more = False
+        self._trim_at = time.monotonic() + (pause if has_more else TRIM_PERIOD)
+
+    def _end(self, is_all_written: bool) -> None:
+        try:
+            self._database.close(utc=self.utc() if is_all_written else None)
+        except Exception as error:
+            if not is_failure(error):
+                raise
+            self._mail.put(NotKept(f"store {self._name}: not closed well: {words_for(error)}"))

@@ -1,0 +1,80 @@
+"""Events and stores, made by hand."""
+
+import select
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from mav_tasks.store import Kept, NotKept, Outcome
+from mav_tasks.store.retention import Retention
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import TaskSubmitted
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.task import Marks, Move, Task, TaskId, Terms
+from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE
+
+OFFSET = 1_800_000_000.0  # s, UTC minus monotonic; a whole number loses nothing of the samples
+FOR_EVER = Retention(max_age=None, max_count=None)
+PATIENCE = 20.0  # s
+
+
+def submitted(number: int, *, at: float = 100.0) -> TaskSubmitted:
+    """Give the event of a submission; times are exact in binary."""
+    task = Task(
+        id=TaskId(number),
+        vehicle=1,
+        command=TASK_MOVE,
+        goal=Move(number / 4),
+        submitter=SOMEBODY,
+        marks=Marks(number, "payload", "packet"),
+        submitted_at=at,
+        terms=Terms(priority=7, deadline=at + 60),
+    )
+    return TaskSubmitted(task, at)
+
+
+def finish(book: TaskBook, number: int, *, now: float) -> None:
+    """Let a waiting task be cancelled."""
+    book.change(
+        TaskId(number), TaskState.CANCELLED, reason=TaskReason.CANCELLED, actor="client", now=now
+    )
+
+
+@contextmanager
+def opened(
+    path: Path, *, offset: float = OFFSET, retention: Retention = FOR_EVER
+) -> Iterator[SqliteStore]:
+    """Give a store; it is closed after the block."""
+    store = SqliteStore(path, wall_offset=lambda: offset, retention=retention)
+    try:
+        yield store
+    finally:
+        store.close()
+
+
+def wait_for(store: SqliteStore, through: int) -> list[Outcome]:
+    """Wait until events are kept, woken by the descriptor; gives all outcomes until then."""
+    outcomes: list[Outcome] = []
+    while Kept(through) not in outcomes:
+        outcomes += next_outcomes(store)
+    return outcomes
+
+
+def wait_for_failure(store: SqliteStore) -> NotKept:
+    """Wait until the store says that something is not kept."""
+    while True:
+        for outcome in next_outcomes(store):
+            if isinstance(outcome, NotKept):
+                return outcome
+
+
+def next_outcomes(store: SqliteStore) -> list[Outcome]:
+    """Wait for the next outcomes."""
+    began = time.monotonic()
+    descriptor = store.fileno()
+    assert descriptor is not None
+    ready, _, _ = select.select([descriptor], [], [], PATIENCE)
+    assert ready, f"no outcome in {time.monotonic() - began:.0f} s"
+    return store.take_outcomes()

@@ -1,0 +1,90 @@
+"""The shell between engine, store and links."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import Committed, Outgoing, StoreFailed
+from mav_tasks.runner import Pump, Runner
+from mav_tasks.serve import open_store
+from mav_tasks.settings import Settings
+from mav_tasks.store import MemoryStore
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.events import VehicleSeen
+from tests.kit.store import LateStore
+
+
+class Recorder(Engine):
+    """An engine that keeps what comes in."""
+
+    def __init__(self) -> None:
+        super().__init__(Settings(), now=0.0)
+        self.inputs: list[object] = []
+
+    def handle(self, item: object, *, now: float) -> None:
+        self.inputs.append(item)
+
+
+def send(outgoing: Outgoing) -> None:
+    """Nobody is there."""
+
+
+def test_a_failing_store_is_told_to_the_engine_and_ends_nothing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    engine, store = Recorder(), LateStore()
+    pump = Pump(engine, store, send)
+    with caplog.at_level(logging.INFO, "mav_tasks"):
+        for _ in range(2):
+            store.fail("store x: the disk is full")
+            pump.turn(now=1.0)
+        store.append([VehicleSeen(1, "found", 1.0)])
+        pump.turn(now=2.0)
+    assert engine.inputs == [StoreFailed("store x: the disk is full")] * 2 + [Committed(1)]
+    assert [record.levelname for record in caplog.records] == ["ERROR", "ERROR", "WARNING"]
+    assert not pump.is_over
+
+
+def test_what_the_store_says_comes_in_at_once(tmp_path: Path) -> None:
+    async def run() -> int:
+        loop = asyncio.get_running_loop()
+        engine = Recorder()
+        store = SqliteStore(tmp_path / "s.sqlite3", wall_offset=lambda: 0.0)
+        committed = asyncio.Event()
+
+        def handle(item: object, *, now: float) -> None:
+            if isinstance(item, Committed):
+                committed.set()
+
+        engine.handle = handle  # type: ignore[method-assign]
+        engine.handle_deadline = lambda *, now: None  # type: ignore[method-assign]
+        running = loop.create_task(Runner(engine, store, clients=[], vehicles=[]).run())
+        await asyncio.sleep(0)
+        store.append([VehicleSeen(1, "found", 1.0)])
+        await asyncio.wait_for(committed.wait(), 10)
+        for _ in range(2):  # the second leaves at once: this engine never ends in an orderly way
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.05)
+        return await asyncio.wait_for(running, 10)
+
+    assert threading.current_thread() is threading.main_thread()
+    assert asyncio.run(run()) == 0
+    with contextlib.closing(SqliteStore(tmp_path / "s.sqlite3", wall_offset=lambda: 0.0)) as store:
+        assert store.load().ended_well
+
+
+def test_where_the_store_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert isinstance(open_store(":memory:"), MemoryStore)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with contextlib.closing(open_store(None)) as store:
+        assert isinstance(store, SqliteStore)
+        assert Path(store.name).is_relative_to(tmp_path.resolve())
+        assert store.name.endswith("mav-tasks/mav-tasks.sqlite3")
