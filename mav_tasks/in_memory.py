@@ -9,6 +9,7 @@ from mav_tasks.links.memory import MemoryLink, MemoryNet
 from mav_tasks.runner import Pump, link_changed
 from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore, Store
+from mav_tasks.tasks.restored import Restored
 
 CLIENT_LINK = "server:clients"
 VEHICLE_LINK = "server:vehicles"
@@ -24,9 +25,10 @@ class InMemoryServer:
         vehicles: tuple[str, ...],
         settings: Settings | None = None,
         store: Store | None = None,
+        restored: Restored | None = None,
         now: float = 0.0,
     ) -> None:
-        self.engine = Engine(settings or Settings(), now=now)
+        self.engine = Engine(settings or Settings(), now=now, restored=restored)
         self.store = store or MemoryStore()
         self.pump = Pump(self.engine, self.store, self._send)
         clients = net.link(CLIENT_LINK)

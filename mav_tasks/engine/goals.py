@@ -5,7 +5,7 @@ Our own commands, and the standard ones that a stock client sends without knowin
 
 from collections.abc import Callable
 from hashlib import blake2b
-from math import degrees, inf, isnan, radians
+from math import degrees, inf, isnan, nan, radians
 from struct import Struct
 from typing import NamedTuple
 
@@ -85,13 +85,16 @@ def becomes_task(number: int) -> bool:
 
 
 def marks_of(command: Command, packet: bytes, *, nonce: int = 0) -> Marks:
-    """Give by what a submission is recognised when it comes again; NaN is equal to NaN."""
-    system_id, component_id = command.target
+    """Give by what a submission is recognised when it comes again; NaN is equal to NaN.
+
+    With a nonce nothing else is asked, so that the packet's own digest is not needed.
+    """
+    params: tuple[float, ...] = command.params
+    if isnan(sum(params)):  # at least one: NaN has many forms
+        params = tuple(nan if isnan(p) else p for p in params)
     frame = -1 if command.frame is None else command.frame
-    params = (0.0 if isnan(p) else p + 0.0 for p in command.params)
-    given = "".join("n" if isnan(p) else "." for p in command.params)
-    packed = _MARK.pack(system_id, component_id, command.command, frame, *params)
-    return Marks(nonce, _digest(packed + given.encode()), _digest(packet))
+    packed = _MARK.pack(*command.target, command.command, frame, *params)
+    return Marks(nonce, _digest(packed), "" if nonce else _digest(packet))
 
 
 def _digest(data: bytes) -> str:

@@ -31,6 +31,7 @@ SAME_GOAL = 5.0  # s, equal absolute goals (rule 4)
 NEAR = 1.0  # m between two places that mean the same (rule 4)
 SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
+PACKETS = 1_000  # of each client, for rule 1; while the server runs its receiver has its own
 MANY_CLIENTS = 256  # remembered; beyond, those whose last submission is old are forgotten
 
 
@@ -136,7 +137,7 @@ class Recollection:
         client.of_command[task.command] = last
         if marks.packet:
             client.packets[marks.packet] = last
-            while now - next(iter(client.packets.values())).at > SAME_PACKET:
+            if len(client.packets) > PACKETS:
                 del client.packets[next(iter(client.packets))]
 
     def forget(self, task: Task) -> None:

@@ -25,6 +25,7 @@ ON_SPOT = 0.02  # m from where it was: as good as there
 OFF_LINE = 1.0  # m, lifecycle: further off its line than this is no resumption after a takeover
 PAST_END = 0.1  # m, the same for the end of the line
 CONVERGES = 6.0  # m of line for each metre beside it, in which steering comes back to it
+ALIGNED = radians(10)  # a heading that differs by less is put right on the way
 TURNED = radians(30)  # a heading that differs by less cannot be mistaken by a whole turn
 
 
@@ -75,6 +76,8 @@ def way_back(goal: Goal, progress: Progress, motion: Motion) -> Course | None:
     match leg:
         case Move():
             place = _entry(anchor, pose, leg, progress.done)
+            if place is None and abs(wrap(anchor.yaw - pose.yaw)) > ALIGNED:
+                place = LocalPlace(pose.north, pose.east)  # turn here, or it would leave the line
             return None if place is None else _course(place, anchor.yaw, pose)
         case Rotate(angle=angle):
             yaw = wrap(anchor.yaw + copysign(progress.done, angle))

@@ -174,6 +174,11 @@ class Observer:
                     self._violation(now, f"two sources of setpoints: {before}, {source}")
             self._last_source = (now, source)
 
+    def server_restarted(self) -> None:
+        """Another server knows nothing of what the first one saw, and drives nothing yet."""
+        self.armed, self.mode = False, -1
+        self._moved_last = self._zero_in_mode = False
+
     def check(self, *, now: float = float("inf")) -> None:
         """Raise AssertionError if anything was wrong."""
         self._check_stop(now)

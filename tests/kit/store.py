@@ -2,9 +2,38 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from pathlib import Path
+from select import select
 
 from mav_tasks.store import Kept, NotKept, Outcome
+from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event
+
+
+class PromptSqliteStore(SqliteStore):
+    """The real one, on a real file; in virtual time, which does not pass while it writes."""
+
+    def __init__(self, path: Path, *, wall_offset: float) -> None:
+        super().__init__(path, wall_offset=lambda: wall_offset)
+        self.events: list[Event] = []
+        self._kept = 0
+
+    def append(self, events: Sequence[Event]) -> None:
+        super().append(events)
+        self.events += events
+
+    def take_outcomes(self) -> list[Outcome]:
+        outcomes = super().take_outcomes()
+        while self._kept < len(self.events):
+            for outcome in outcomes:
+                assert isinstance(outcome, Kept), outcome
+                self._kept = outcome.through
+            if self._kept < len(self.events):
+                mail = self.fileno()
+                assert mail is not None, "closed"
+                assert select([mail], [], [], 10)[0], "the disk does not answer"
+                outcomes += super().take_outcomes()
+        return outcomes
 
 
 class LateStore:

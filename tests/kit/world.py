@@ -9,9 +9,10 @@ from typing import TypeVar
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
 from mav_tasks.settings import Settings
-from mav_tasks.store import MemoryStore, Store
+from mav_tasks.store import Store
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
+from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task, TaskId
 from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
@@ -84,6 +85,7 @@ class World(VirtualWorld):
             self.rover_parties.append(party)
             self.join(party)
         names = tuple(f"rover{number}" for number in range(1, rovers + 1))
+        self._names, self._settings = names, settings
         self.server = InMemoryServer(self.net, vehicles=names, settings=settings, store=store)
         self.join(self.server)
         self.client = self.add_client("client")
@@ -138,6 +140,27 @@ class World(VirtualWorld):
         self.run(seconds)
         self.watched.is_server_away = False
         self.join(self.server)
+
+    def end_server(self) -> None:
+        """Let the server be gone from one moment to the next, with all that it had in memory."""
+        self.leave(self.server)
+        self.watched.is_server_away = True
+        self.watched.forget_unread()
+
+    def start_server(self, store: Store, restored: Restored) -> None:
+        """Start another server on what an earlier one had stored."""
+        self.watched.is_server_away = False
+        self.server = InMemoryServer(
+            self.net,
+            vehicles=self._names,
+            settings=self._settings,
+            store=store,
+            restored=restored,
+            now=self.now,
+        )
+        self.join(self.server)
+        for observer in self.observers:
+            observer.server_restarted()
 
     # what a person at the rover does, and what breaks
 
@@ -234,8 +257,9 @@ class World(VirtualWorld):
     def events(self, kind: type[E]) -> list[E]:
         """Give the journal's events of one kind, in order."""
         store = self.server.store
-        assert isinstance(store, MemoryStore | LateStore)
-        return [event for event in store.events if isinstance(event, kind)]
+        kept = getattr(store, "events", None)
+        assert kept is not None, f"{store} shows no events"
+        return [event for event in kept if isinstance(event, kind)]
 
     def history(self, task_id: int) -> list[tuple[TaskState, TaskReason]]:
         """Give the states that a task went through, with reasons."""
@@ -287,6 +311,10 @@ class ObservedNet(MemoryNet):
         elif link.name in (VEHICLE_LINK, CLIENT_LINK):
             self._unread.append((link.name, source, data))
         super().arrive(link, source, data)
+
+    def forget_unread(self) -> None:
+        """What waited at the server is gone with it."""
+        self._unread.clear()
 
     def deliver(self) -> None:
         """Deliver, and show what the server now knows: what waits while it is away it does not."""

@@ -20,7 +20,9 @@ from .child import HOST, READY
 
 #: no task of a measurement is ever begun: the scripted vehicle stays disarmed
 SETTINGS = Settings(
-    queueing=Queueing(capacity=10_000_000), clients=Clients(stream_interval=0.0), arming="operator"
+    queueing=Queueing(capacity=10_000_000, quota=10_000_000),
+    clients=Clients(stream_interval=0.0),
+    arming="operator",
 )
 
 

@@ -1,0 +1,238 @@
+"""A server ends, well or not, and another one goes on from what it had stored."""
+
+from pathlib import Path
+from shutil import copy
+
+import pytest
+
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, DENIED, MOVE
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+UTC = 1.8e9  # s, when the worlds begin
+RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
+STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "tasks.sqlite3"
+
+
+@pytest.fixture
+def world(make_world: MakeWorld, path: Path) -> World:
+    store = PromptSqliteStore(path, wall_offset=UTC)
+    settings = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
+    return make_world(store=store, settings=settings)
+
+
+def restart(world: World, path: Path, *, well: bool = False, away: float = STOP_TIME) -> None:
+    """Let the server be killed, or end; and start another one on a copy of what is on the disk."""
+    store = world.server.store
+    world.end_server()
+    if well:
+        store.close()
+    again = path.with_name(f"{path.stem}+{path.suffix}")
+    for suffix in ("", "-wal"):
+        if Path(f"{path}{suffix}").exists():
+            copy(f"{path}{suffix}", f"{again}{suffix}")
+    store.close()
+    world.run(away)
+    later = PromptSqliteStore(again, wall_offset=UTC)
+    world.start_server(later, later.load())
+    world.run(2.5)
+
+
+def in_mode(world: World) -> Mode:
+    return world.rover.autopilot.mode
+
+
+def release(world: World, task: int, how: int) -> tuple[int, int] | None:
+    sent = world.client.command(RELEASE, task, how)
+    world.run(0.1)
+    return sent.answer
+
+
+def test_what_ran_is_held_and_the_rover_is_put_to_hold(world: World, path: Path) -> None:
+    world.client.move(3)
+    world.run(0.1)
+    for number in range(3):
+        world.client.move(0.2 + number / 10, priority=5 + number)
+        world.run(0.1)
+    world.run(3)
+    before = [(t.id, t.goal, t.terms, t.state) for t in world.tasks() if t.id != 1]
+    assert in_mode(world) == Mode.GUIDED
+    restart(world, path)
+    assert world.state(1) == (S.HELD, R.OUTCOME_UNKNOWN)
+    assert in_mode(world) == Mode.HOLD
+    assert world.paused() is R.RESTARTED
+    assert [(t.id, t.goal, t.terms, t.state) for t in world.tasks() if t.id != 1] == before
+    where = world.pose()
+    world.run(5)
+    assert world.pose() == where
+
+
+@pytest.mark.parametrize("how", [AGAIN, REMAINDER, SKIP])
+def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, how: int) -> None:
+    world.client.move(5.0)
+    world.run(0.1)
+    world.client.rotate(90)
+    world.run(3)
+    restart(world, path)
+    driven = world.pose()[0]
+    assert 1.5 < driven < 4
+    assert release(world, 1, how) == (ACCEPTED, 1)
+    proceeded = world.client.proceed()
+    world.until_idle(tasks=2)
+    assert proceeded.result == ACCEPTED
+    end = {AGAIN: driven + 5.0, REMAINDER: 5.0, SKIP: driven}[how]
+    assert near_pose(world.pose(), (end, 0.0, 90.0), metres=0.04)
+    assert world.state(1) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
+
+
+def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> None:
+    world.client.move(2.0)
+    world.run(3)
+    restart(world, path)
+    sent = world.client.proceed()
+    world.run(0.1)
+    assert sent.answer == (DENIED, R.WRONG_STATE)
+    assert any("release it first" in text for text in world.client.texts())
+
+
+def test_a_turn_of_which_nobody_knows_how_far_it_came_is_not_resumed(
+    world: World, path: Path
+) -> None:
+    world.client.rotate(700)
+    world.run(4)
+    restart(world, path)
+    assert release(world, 1, REMAINDER) == (DENIED, R.WRONG_STATE)
+    assert release(world, 1, SKIP) == (ACCEPTED, 1)
+
+
+def test_the_stop_latch_is_kept(world: World, path: Path) -> None:
+    world.client.move(3)
+    world.run(0.1)
+    world.client.rotate(20)
+    world.run(3)
+    world.client.stop()
+    world.run(0.1)
+    restart(world, path, away=0.0)
+    assert world.paused() is R.STOPPED
+    assert in_mode(world) == Mode.HOLD
+    assert [world.state(i) for i in (1, 2)] == [(S.KILLED, R.STOP), (S.QUEUED, R.NONE)]
+    world.run(3)
+    assert world.stands()
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert world.state(2)[0] is S.COMPLETED
+
+
+def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
+    world: World, path: Path
+) -> None:
+    world.client.move(2, priority=1)
+    world.run(3)
+    world.client.rotate(90, priority=8)
+    world.until_state(2, S.EXECUTING)
+    world.run(0.5)
+    world.client.pause()
+    world.run(2)
+    restart(world, path)
+    assert [world.state(i) for i in (1, 2)] == [(S.PAUSED, R.PREEMPTED), (S.PAUSED, R.OPERATOR)]
+    assert world.paused() is R.OPERATOR
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
+    assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=1.5)
+
+
+def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
+    world: World, path: Path
+) -> None:
+    world.client.move(2)
+    world.run(3)
+    world.client.pause()
+    world.run(3)
+    store = world.server.store
+    world.end_server()
+    store.close()
+    world.rover_parties[0].vehicle.autopilot.reboot(now=world.now)
+    world.run(8)
+    later = PromptSqliteStore(path, wall_offset=UTC)
+    world.start_server(later, later.load())
+    world.run(3)
+    world.operator_mode(Mode.HOLD)
+    world.run(1)
+    world.client.proceed()
+    world.run(1)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+
+
+@pytest.mark.parametrize(("idle", "paused"), [(60.0, R.NONE), (700.0, R.RESTARTED)])
+def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
+    world: World, path: Path, idle: float, paused: R
+) -> None:
+    world.client.command(MOVE, 0.5, 0, 0, 0, 0, 30, 5)
+    world.run(1)
+    store = world.server.store
+    world.end_server()
+    store.close()
+    later = PromptSqliteStore(path, wall_offset=UTC + idle)
+    world.start_server(later, later.load())
+    world.run(1)
+    assert world.paused() is paused
+    if paused is R.NONE:
+        world.until_idle(tasks=1)  # its time has come while nobody looked
+        assert world.state(1)[0] is S.COMPLETED
+
+
+def test_a_submission_is_known_again(world: World, path: Path) -> None:
+    world.client.pause()
+    first = world.client.move(1, nonce=77)
+    world.run(0.3)
+    plain = world.client.move(2)
+    world.run(0.3)
+    ids = first.task_id, plain.task_id
+    restart(world, path, away=0.0)
+    again = world.client.move(1, nonce=77)
+    world.run(0.3)
+    other = world.client.move(3, nonce=77)
+    world.run(0.3)
+    later = world.client.command(MOVE, 2, 0, 0, 0, 0, 0, 5, confirmation=1)
+    world.run(0.3)
+    assert (again.task_id, later.task_id) == ids
+    assert other.answer == (DENIED, R.NONCE_REUSED)
+    new = world.client.move(4)
+    world.run(0.3)
+    assert new.task_id == 3
+
+
+def test_the_speed_that_was_set_and_a_modified_task_are_kept(world: World, path: Path) -> None:
+    world.client.pause()
+    world.client.move(4)
+    world.run(0.2)
+    world.client.command(54012, 1, 1, 9)
+    world.client.command(178, 1, 0.9, -1)
+    world.run(0.3)
+    restart(world, path)
+    assert world.task(1).priority == 9
+    world.client.proceed()
+    world.run(3)
+    assert world.truth.forward_speed > 0.55
+
+
+def test_a_place_on_earth_is_driven_to_after_a_restart(world: World, path: Path) -> None:
+    world.client.pause()
+    x, y = -353_632_484, 149_165_2370
+    world.client.command_int(192, -1, 1, 0, float("nan"), x=x, y=y, frame=0)
+    world.run(0.3)
+    restart(world, path)
+    world.client.proceed()
+    world.until_idle(tasks=1)
+    assert world.pose()[0] == pytest.approx(1.51, abs=0.04)
