@@ -109,7 +109,7 @@ class Commands:
         if command.command == MavCmd.TASK_STOP:
             self._stop(client, packet, command, now=now)
             return
-        vehicle = self._vehicles.vehicles.get(command.target.system_id)
+        vehicle = self._vehicles.get(command.target.system_id)
         if vehicle is None:
             return  # clients send everything to everyone: it is for somebody else
         receiver = client.receiver(packet.source)
@@ -181,7 +181,7 @@ class Commands:
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
     ) -> None:
         """COMMAND_CANCEL: nothing acknowledges it; the task's own status tells."""
-        vehicle = self._vehicles.vehicles.get(message.target_system)
+        vehicle = self._vehicles.get(message.target_system)
         if vehicle is not None:
             submitter = client.submitter(packet.source)
             self._control.cancel_latest(vehicle, submitter, message.command, now=now)
@@ -210,7 +210,7 @@ class Commands:
         self, client: GcsClient, packet: Packet, message: m.SetMode, *, now: float
     ) -> None:
         """See to the message SET_MODE, which nothing acknowledges."""
-        vehicle = self._vehicles.vehicles.get(message.target_system)
+        vehicle = self._vehicles.get(message.target_system)
         if vehicle is None:
             return
         actor = str(client.submitter(packet.source))
@@ -249,9 +249,8 @@ class Commands:
         target = command.target
         targets = [
             vehicle
-            for system_id, vehicle in sorted(self._vehicles.vehicles.items())
-            if target.system_id in (0, system_id)
-            and target.component_id
+            for vehicle in self._vehicles.addressed_by(target.system_id)
+            if target.component_id
             in (0, AUTOPILOT, MavComponent.ONBOARD_COMPUTER, vehicle.server_component)
         ]
         if not targets:

@@ -92,7 +92,7 @@ class Displays:
     ) -> None:
         """Send a task's TASK_STATUS, from the task server of its vehicle."""
         task = self._book.get(task_id)
-        vehicle = None if task is None else self._vehicles.vehicles.get(task.vehicle)
+        vehicle = None if task is None else self._vehicles.get(task.vehicle)
         if task is None or vehicle is None:
             return
         status = translate.task_status(

@@ -104,11 +104,8 @@ class Engine:
             case LinkChanged():
                 self._vehicles.change_link(item, now=now)
             case Committed(through=through):
-                waiting = [vehicle for vehicle in self._vehicles if vehicle.tasks.awaits_commit]
-                self._book.durable = through
                 self._submissions.committed(through, now=now)
-                for vehicle in waiting:
-                    vehicle.step(now=now)
+                self._vehicles.commit(through, now=now)
             case StoreFailed():
                 self._submissions.store_failed()
             case SettingsChanged(settings=settings):
@@ -152,12 +149,7 @@ class Engine:
 
     def take_packets(self) -> list[Outgoing]:
         """Give the datagrams to send, in order."""
-        self.last_words = tuple(
-            words
-            for vehicle in self._vehicles
-            if vehicle.control.is_engaged
-            for words in vehicle.requests.last_words
-        )
+        self.last_words = self._vehicles.last_words
         packets = self._packets.copy()
         self._packets.clear()  # the list itself is shared with every outlet
         return packets
@@ -221,23 +213,19 @@ class Engine:
         """Pass a client's packet to the vehicles that it is for; what is for us ends here."""
         message = received.message
         target = EVERYBODY if message is None else _target(message)
-        for vehicle in self._vehicles:
-            if (
-                target.system_id in (0, vehicle.system_id)
-                and target != vehicle.server_address
-                and may_pass(vehicle, client.key, message, now=now)
-            ):
+        for vehicle in self._vehicles.addressed_by(target.system_id):
+            if target != vehicle.server_address and may_pass(vehicle, client.key, message, now=now):
                 vehicle.requests.forward(received.packet)
 
     def _settle(self, *, now: float) -> None:
         """Bring vehicles' answers to clients, and what happened to clients and the journal."""
-        for vehicle in self._vehicles:
-            for answered in vehicle.requests.take_answers():
-                self._commands.deliver(vehicle, answered, now=now)
         for system_id in self._fleet.room.take_woken():
-            woken = self._vehicles.vehicles.get(system_id)
+            woken = self._vehicles.get(system_id)
             if woken is not None:
                 woken.wake(now=now)
+        for vehicle in self._vehicles.settle():
+            for answered in vehicle.requests.take_answers():
+                self._commands.deliver(vehicle, answered, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
         events = self._book.take_events()
@@ -256,7 +244,7 @@ class Engine:
     def _shut_down(self, *, now: float) -> None:
         self._submissions.close()
         self._stop_by = now + self._settings.watch.shutdown
-        for vehicle in self._vehicles:
+        for vehicle in self._vehicles.addressed_by(0):
             vehicle.shut_down(now=now)
 
     def _note_stopped(self, *, now: float) -> None:

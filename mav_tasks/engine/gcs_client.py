@@ -103,6 +103,10 @@ class GcsClient:
         """Whether the client has seen a heartbeat of this vehicle's autopilot."""
         return system_id in self._introduced
 
+    def knows_all(self, count: int) -> bool:
+        """Whether the client has seen as many vehicles as there are."""
+        return len(self._introduced) >= count
+
     def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
         """Show a vehicle by its latest heartbeat, before anything else of its system.
 

@@ -26,6 +26,8 @@ class Publisher:
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
         """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
+        if client.knows_all(len(self._vehicles)):
+            return
         for vehicle in self._vehicles:
             if client.knows(vehicle.system_id) or not vehicle.is_heard(now=now):
                 continue  # a silent one must not look alive
@@ -43,7 +45,7 @@ class Publisher:
             spoken = translate.text_of(event)
             if spoken is not None:
                 system_id, severity, text = spoken
-                vehicle = self._vehicles.vehicles.get(system_id)
+                vehicle = self._vehicles.get(system_id)
                 if vehicle is not None:
                     self._gcs.tell(text, severity, vehicle.server_address, now=now)
             if isinstance(event, TaskChanged | TaskModified | TaskAdvanced | TaskWaits):

@@ -6,7 +6,9 @@ changes anything.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import inf
 
+from mav_tasks.engine.agenda import Agenda
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicle import Vehicle
@@ -73,11 +75,45 @@ class VehicleSide:
         self._decoder = Decoder()
         self._links: dict[str, _Link] = {}
         self._router = Router()
+        self._agenda = Agenda()
         self._noted: set[str] = set()
-        self.vehicles: dict[int, Vehicle] = {}
+        self._vehicles: dict[int, Vehicle] = {}
 
     def __iter__(self) -> Iterator[Vehicle]:
-        return iter(self.vehicles.values())
+        """Give every vehicle, to be looked at only."""
+        return iter(self._vehicles.values())
+
+    def __len__(self) -> int:
+        return len(self._vehicles)
+
+    def get(self, system_id: int) -> Vehicle | None:
+        """Give a vehicle, to do something to it."""
+        vehicle = self._vehicles.get(system_id)
+        if vehicle is not None:
+            self._agenda.touch(vehicle)
+        return vehicle
+
+    def addressed_by(self, system_id: int) -> list[Vehicle]:
+        """Give the vehicles that a target_system means, 0 all of them, to do something to them."""
+        wanted = sorted(self._vehicles) if system_id == 0 else [system_id]
+        return [vehicle for vehicle in map(self.get, wanted) if vehicle is not None]
+
+    def settle(self) -> list[Vehicle]:
+        """Look at what became of those to which something was done; gives them."""
+        return self._agenda.settle()
+
+    @property
+    def last_words(self) -> tuple[Outgoing, ...]:
+        """Zero and HOLD for every vehicle that is being driven."""
+        return self._agenda.last_words
+
+    def commit(self, durable: int, *, now: float) -> None:
+        """Let begin what waited for nothing but that events are durable up to this number."""
+        waiting = self._agenda.awaiting_commit()
+        self._book.durable = durable
+        for vehicle in waiting:
+            self._agenda.touch(vehicle)
+            vehicle.step(now=now)
 
     @property
     def counts(self) -> DecodeCounts:
@@ -119,7 +155,7 @@ class VehicleSide:
         if self._is_intruder(packet):
             self._note_intruder(link, packet, message, now=now)
             return None
-        vehicle = self.vehicles.get(packet.system_id)
+        vehicle = self.get(packet.system_id)
         if vehicle is None:
             if not isinstance(message, m.Heartbeat):
                 return None
@@ -145,14 +181,16 @@ class VehicleSide:
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
+        if self._agenda.next_deadline() + self._settings.watch.late_tick >= now:
+            return
         for vehicle in self:
+            self._agenda.touch(vehicle)
             vehicle.check_late(now=now)
 
-    def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
-        deadlines = [link.heartbeat.next_deadline() for link in self._links.values()]
-        deadlines += [vehicle.next_deadline() for vehicle in self]
-        return min(deadlines, default=None)
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do; inf: never, as things are."""
+        heartbeats = [link.heartbeat.next_deadline() for link in self._links.values()]
+        return min(self._agenda.next_deadline(), *heartbeats, inf)
 
     def handle_deadline(self, *, now: float) -> None:
         """Send heartbeats and let each vehicle do what is due."""
@@ -161,8 +199,9 @@ class VehicleSide:
             if link.heartbeat.is_due(now=now):
                 for outlet in link.outlets.values():
                     outlet.send(gcs_heartbeat(), source)
-        for vehicle in self:
-            if now >= vehicle.next_deadline():
+        for system_id in self._agenda.take_due(now=now):
+            vehicle = self.get(system_id)
+            if vehicle is not None:
                 vehicle.handle_deadline(now=now)
 
     @property
@@ -209,7 +248,8 @@ class VehicleSide:
             or (self._settings.arming == "auto" and link.is_local),
             now=now,
         )
-        self.vehicles[packet.system_id] = vehicle
+        self._vehicles[packet.system_id] = vehicle
+        self._agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
         vehicle.step(now=now)
@@ -238,6 +278,7 @@ class VehicleSide:
         for vehicle in self:
             place = self._router.place_of(vehicle.system_id)
             if target in (0, vehicle.system_id) and place is not None and place[0] == link:
+                self._agenda.touch(vehicle)
                 vehicle.second_controller(packet.source, now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
