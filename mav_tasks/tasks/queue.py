@@ -6,6 +6,7 @@ how long each has waited so far but when each came. 10 is a class of its own, wh
 into.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from sortedcontainers import SortedList
@@ -59,6 +60,13 @@ class TaskQueue:
         self._order.add((rank, task_id))
         if is_preemptive:
             self._preemptive.add((rank, task_id))
+
+    def put_all(self, tasks: Iterable[tuple[TaskId, Rank, bool]]) -> None:
+        """Put many tasks in: id, rank, and whether it is pre-emptive; none of them is here yet."""
+        places = [((rank, task_id), is_preemptive) for task_id, rank, is_preemptive in tasks]
+        self._places.update((TaskId(place[1]), place) for place, _ in places)
+        self._order.update(place for place, _ in places)
+        self._preemptive.update(place for place, is_preemptive in places if is_preemptive)
 
     def discard(self, task_id: TaskId) -> None:
         """Take a task out, if it is here."""

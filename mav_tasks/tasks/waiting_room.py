@@ -114,10 +114,16 @@ class WaitingRoom:
             due = self.due_at(task)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
             self._enter(task, now=came_at)
+        ready: dict[int, list[tuple[TaskId, Rank, bool]]] = {}
         for task in waiting:
-            if task.terms.after and self._book.get(task.terms.after) is None:
-                continue  # it was over, and has been forgotten since
-            self._settle(self._book[task.id], now=now)
+            if task.state is S.QUEUED and self._state_by(task.terms, now=now) is S.QUEUED:
+                place = (task.id, self._waiters[task.id].rank, task.terms.is_preemptive)
+                ready.setdefault(task.vehicle, []).append(place)
+        for vehicle, places in ready.items():
+            self.queue(vehicle).put_all(places)
+        for task in waiting:
+            if task.id not in self.queue(task.vehicle):
+                self._settle(task, now=now)
 
     def _check_room(self, draft: Draft) -> None:
         queueing = self._settings.queueing

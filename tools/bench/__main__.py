@@ -7,11 +7,15 @@ and ``forwarding`` writes cProfile's figures of the server process.
 import argparse
 from collections.abc import Callable
 
-from . import commands, forwarding, simulation, start
+from . import commands, forwarding, queue, setpoints, simulation, start, stop
 from .table import Row, render
 
 MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "commands": commands.measure,
+    "durable": commands.measure_durable,
+    "stop": stop.measure,
+    "setpoints": setpoints.measure,
+    "queue": queue.measure,
     "forwarding": forwarding.measure,
     "simulation": simulation.measure,
     "start": start.measure,

@@ -14,26 +14,31 @@ END_WITHIN = 10.0  # s
 
 
 @contextmanager
-def child(module: str, *arguments: str, quiet: bool = False) -> Iterator[None]:
+def child(
+    module: str, *arguments: str, quiet: bool = False, pass_fds: tuple[int, ...] = ()
+) -> Iterator[list[str]]:
     """Run a module of this package as a process of its own while the block runs.
 
-    What a ``quiet`` one writes to stderr, its log, is thrown away by the system.
+    What a ``quiet`` one writes to stderr, its log, is thrown away by the system. The list that it
+    gives holds, after the block, the lines that the process printed in the end.
     """
+    said: list[str] = []
     process = subprocess.Popen(
         [sys.executable, "-m", f"tools.bench.{module}", *arguments],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL if quiet else None,
         text=True,
+        pass_fds=pass_fds,
     )
     try:
         assert process.stdout is not None
         if process.stdout.readline().strip() != READY:
             raise RuntimeError(f"{module} did not start")
-        yield
+        yield said
     finally:
         process.terminate()
-        process.wait(END_WITHIN)
+        said += process.communicate(timeout=END_WITHIN)[0].splitlines()
 
 
 def free_port() -> int:

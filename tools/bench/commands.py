@@ -4,9 +4,13 @@ The client is one process with blocking sockets; it packs everything beforehand 
 nothing of an answer but its message id.
 """
 
+import os
 import socket
+from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 from statistics import quantiles
+from tempfile import TemporaryDirectory
 from time import monotonic, perf_counter
 
 from mav_tasks.mavlink import messages as m
@@ -26,24 +30,17 @@ BEAT = 0.5  # s, between the vehicle's heartbeats
 
 GOAL_RATIO = 4.0
 GOAL_RATE = 20_000
+GOAL_DURABLE_RATIO = 2.0
+GOAL_DURABLE_RATE = 10_000
+SYNCS = 1_000
+PAGE = 4_096  # bytes
 
 
 def measure(profile: str | None = None) -> list[Row]:
-    """Give the rows of latency and of rate."""
+    """Give the rows of latency and of rate, with the store in memory."""
     packets = _packets()
-    port = free_port()
-    with child("bare", "echo", str(port)), udp_socket() as client:
-        client.connect(loopback(port))
-        echo = _run(client, packets, answer_id=m.CommandLong.id, vehicle=None)
-    port = free_port()
-    extra = () if profile is None else (profile,)
-    with udp_socket() as client, udp_socket() as vehicle_socket:
-        vehicle_port: int = vehicle_socket.getsockname()[1]
-        with child("server", str(port), str(vehicle_port), *extra, quiet=True):
-            vehicle = ScriptedVehicle(vehicle_socket)
-            meet(vehicle, client, loopback(port))
-            client.connect(loopback(port))
-            ours = _run(client, packets, answer_id=m.CommandAck.id, vehicle=vehicle)
+    echo = _echo(packets)
+    ours = _server(packets, *(() if profile is None else ("--profile", profile)))
     return [
         _latency("command → ack, p50", ours[0], echo[0], goal=GOAL_RATIO),
         _latency("command → ack, p99", ours[1], echo[1], goal=None),
@@ -56,6 +53,61 @@ def measure(profile: str | None = None) -> list[Row]:
             ours[2] >= GOAL_RATE,
         ),
     ]
+
+
+def measure_durable() -> list[Row]:
+    """Give the same with the store on a disk, beside an echo and one fsync of that disk."""
+    packets = _packets()
+    with TemporaryDirectory(dir=Path.cwd()) as folder:  # the disk that the project is on
+        sync = _fsync(Path(folder))
+        echo = _echo(packets)
+        ours = _server(packets, "--store", str(Path(folder) / "tasks.sqlite3"))
+    yardstick = echo[0] + sync[0], echo[1] + sync[1]
+    rows = [
+        _latency("durable → ack, p50", ours[0], yardstick[0], goal=GOAL_DURABLE_RATIO),
+        _latency("durable → ack, p99", ours[1], yardstick[1], goal=None),
+    ]
+    rows = [replace(row, yardstick=row.yardstick.replace("echo", "echo + fsync")) for row in rows]
+    rate = Row(
+        f"durable acks, {OUTSTANDING} outstanding",
+        f"{ours[2]:,.0f} /s",
+        f"{echo[2]:,.0f} /s echo",
+        f"{ours[2] / echo[2]:.0%}",
+        f"≥ {GOAL_DURABLE_RATE:,} /s",
+        ours[2] >= GOAL_DURABLE_RATE,
+    )
+    return [*rows, rate]
+
+
+def _echo(packets: list[bytes]) -> tuple[float, float, float]:
+    port = free_port()
+    with child("bare", "echo", str(port)), udp_socket() as client:
+        client.connect(loopback(port))
+        return _run(client, packets, answer_id=m.CommandLong.id, vehicle=None)
+
+
+def _server(packets: list[bytes], *options: str) -> tuple[float, float, float]:
+    port = free_port()
+    with udp_socket() as client, udp_socket() as vehicle_socket:
+        vehicle_port: int = vehicle_socket.getsockname()[1]
+        with child("server", str(port), str(vehicle_port), *options, quiet=True):
+            vehicle = ScriptedVehicle(vehicle_socket)
+            meet(vehicle, client, loopback(port))
+            client.connect(loopback(port))
+            return _run(client, packets, answer_id=m.CommandAck.id, vehicle=vehicle)
+
+
+def _fsync(folder: Path) -> tuple[float, float]:
+    """Give p50 and p99, in seconds, of appending a page to a file and forcing it to the disk."""
+    times: list[float] = []
+    with (folder / "bare").open("ab", buffering=0) as file:
+        for _ in range(SYNCS):
+            start = perf_counter()
+            file.write(b"x" * PAGE)
+            os.fsync(file.fileno())
+            times.append(perf_counter() - start)
+    cuts = quantiles(times, n=100)
+    return cuts[49], cuts[98]
 
 
 def _latency(what: str, ours: float, echo: float, *, goal: float | None) -> Row:

@@ -50,7 +50,7 @@ def _bare() -> float:
 
 def _ours(profile: str | None) -> float:
     port = free_port()
-    extra = () if profile is None else (profile,)
+    extra = () if profile is None else ("--profile", profile)
     with udp_socket() as client, udp_socket() as vehicle_socket:
         vehicle_port: int = vehicle_socket.getsockname()[1]
         with child("server", str(port), str(vehicle_port), *extra, quiet=True):

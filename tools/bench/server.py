@@ -1,49 +1,99 @@
 """A real server on loopback with room for every task of a measurement, and no thinning.
 
-``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [PROFILE]``; with PROFILE, cProfile's
-figures of the whole run are written to that file.
+``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [--store FILE] [--profile FILE] [--drive]``.
+With ``--profile``, cProfile's figures of the whole run are written to that file. With ``--drive``
+the server arms and drives; otherwise no task is ever begun. When it ends it prints, as JSON, by
+how many seconds each interval between two setpoints to one vehicle missed 1/20 s.
 """
 
+import argparse
 import asyncio
 import cProfile
+import json
 import logging
 import sys
+import time
 
 from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import Peer
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl
+from mav_tasks.mavlink import messages as m
 from mav_tasks.runner import Runner
+from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Clients, Queueing, Settings
 from mav_tasks.store import MemoryStore
+from mav_tasks.store.sqlite import SqliteStore
 
 from .child import HOST, READY
 
-#: no task of a measurement is ever begun: the scripted vehicle stays disarmed
-SETTINGS = Settings(
-    queueing=Queueing(capacity=10_000_000, quota=10_000_000),
-    clients=Clients(stream_interval=0.0),
-    arming="operator",
-)
+PERIOD = 0.05  # s between setpoints
+SETPOINT = m.SetPositionTargetLocalNed.id
+TARGET_SYSTEM = 10 + 50  # its place in a whole MAVLink 2 SET_POSITION_TARGET_LOCAL_NED
+MOVING = 2 * PERIOD  # s; after a longer interval the stream had ended in between
 
 
-async def _serve(client_port: int, vehicle_port: int) -> int:
+class TimedLink(UdpLink):
+    """A vehicle link that keeps when setpoints left it."""
+
+    def __init__(self, url: LinkUrl) -> None:
+        super().__init__(url)
+        self._last: dict[int, float] = {}
+        self.errors: list[float] = []
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send, and note the time of a setpoint."""
+        super().send(peer, data)
+        if data[7] == SETPOINT and data[8] == 0 and len(data) > TARGET_SYSTEM:
+            now = time.monotonic()
+            interval = now - self._last.get(data[TARGET_SYSTEM], -1.0)
+            self._last[data[TARGET_SYSTEM]] = now
+            if interval < MOVING:
+                self.errors.append(abs(interval - PERIOD))
+
+
+def _settings(*, drives: bool) -> Settings:
+    return Settings(
+        queueing=Queueing(capacity=10_000_000, quota=10_000_000),
+        clients=Clients(stream_interval=0.0),
+        arming="server" if drives else "operator",
+    )
+
+
+async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
-    engine = Engine(SETTINGS, now=asyncio.get_running_loop().time())
-    clients = [UdpLink(LinkUrl("udpin", HOST, client_port))]
-    vehicles = [UdpLink(LinkUrl("udpout", HOST, vehicle_port))]
+    store = (
+        SqliteStore(options.store, wall_offset=lambda: time.time() - time.monotonic())
+        if options.store
+        else MemoryStore()
+    )
+    now = asyncio.get_running_loop().time()
+    engine = Engine(_settings(drives=options.drive), now=now)
+    tame_collector()
+    clients = [UdpLink(LinkUrl("udpin", HOST, options.client_port))]
     print(READY, flush=True)
-    return await Runner(engine, MemoryStore(), clients=clients, vehicles=vehicles).run()
+    return await Runner(engine, store, clients=clients, vehicles=[vehicle_link]).run()
 
 
-def _main(client_port: int, vehicle_port: int, profile: str | None) -> int:
-    if profile is None:
-        return asyncio.run(_serve(client_port, vehicle_port))
-    profiler = cProfile.Profile()
-    try:
-        return profiler.runcall(asyncio.run, _serve(client_port, vehicle_port))
-    finally:
-        profiler.dump_stats(profile)
+def main() -> int:
+    """Serve until a signal."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("client_port", type=int)
+    parser.add_argument("vehicle_port", type=int)
+    parser.add_argument("--store")
+    parser.add_argument("--profile")
+    parser.add_argument("--drive", action="store_true")
+    options = parser.parse_args()
+    link = TimedLink(LinkUrl("udpout", HOST, options.vehicle_port))
+    if options.profile is None:
+        code = asyncio.run(_serve(options, link))
+    else:
+        profiler = cProfile.Profile()
+        code = profiler.runcall(asyncio.run, _serve(options, link))
+        profiler.dump_stats(options.profile)
+    print(json.dumps(link.errors), flush=True)
+    return code
 
 
 if __name__ == "__main__":
-    sys.exit(_main(int(sys.argv[1]), int(sys.argv[2]), (*sys.argv[3:], None)[0]))
+    sys.exit(main())

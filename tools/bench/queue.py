@@ -1,0 +1,120 @@
+"""100,000 waiting tasks: what one costs to submit and to take, to keep, and to have back."""
+
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic, perf_counter
+
+from mav_tasks.engine.engine import Engine
+from mav_tasks.serve import tame_collector
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.task import Draft, Marks, Move, Submitter, Terms
+from mav_tasks.tasks.waiting_room import WaitingRoom
+
+from .table import Row
+
+FEW, MANY = 1_000, 100_000
+SAMPLE = 2_000  # tasks submitted and taken on top of those that wait
+GOAL_RATIO = 2.0
+GOAL_BYTES = 2_048
+GOAL_RESTART = 3.0  # s
+SETTINGS = replace(Settings(), queueing=Queueing(capacity=10 * MANY, quota=10 * MANY))
+SUBMITTER = Submitter("link", "127.0.0.1:50000", 255, 190)
+KEPT_EVENTS = 10_000
+
+
+def measure() -> list[Row]:
+    """Give the rows of time, memory and restart."""
+    tame_collector()  # as the server does
+    few, _ = _times(FEW)
+    many, kept = _times(MANY)
+    restart = _restart()
+    return [
+        Row(
+            f"submit + take a task, {MANY:,} wait",
+            f"{many * 1e6:.1f} µs",
+            f"{few * 1e6:.1f} µs with {FEW:,}",
+            f"{many / few:.2f}×",
+            f"≤ {GOAL_RATIO:.0f}×",
+            many <= GOAL_RATIO * few,
+        ),
+        Row(
+            "memory of a waiting task",
+            f"{kept:,.0f} bytes",
+            "",
+            "",
+            f"< {GOAL_BYTES:,} bytes",
+            kept < GOAL_BYTES,
+        ),
+        Row(
+            f"restart with {MANY:,} waiting",
+            f"{restart:.2f} s",
+            "",
+            "",
+            f"< {GOAL_RESTART:.0f} s",
+            restart < GOAL_RESTART,
+        ),
+    ]
+
+
+def _draft(number: int) -> Draft:
+    marks = Marks(number, f"{number:018x}", f"{number:018x}")
+    return Draft(1, 54000, Move(1.0 + number), SUBMITTER, Terms(priority=number % 11), marks)
+
+
+def _fill(count: int) -> tuple[TaskBook, WaitingRoom]:
+    book = TaskBook()
+    room = WaitingRoom(book, SETTINGS)
+    for number in range(count):
+        room.submit(_draft(number), now=number * 1e-3)
+        if number % KEPT_EVENTS == 0:
+            book.take_events()
+    book.take_events()
+    return book, room
+
+
+def _times(count: int) -> tuple[float, float]:
+    """Give seconds for each task submitted and taken, and bytes for each that waits."""
+    book, room = _fill(count)
+    drafts = [_draft(count + number) for number in range(SAMPLE)]
+    start = perf_counter()
+    for draft in drafts:
+        room.submit(draft, now=count * 1e-3)
+    for _ in range(SAMPLE):
+        first = room.queue(1).first()
+        assert first is not None
+        room.leave(book[first])
+    taken = (perf_counter() - start) / SAMPLE
+    del book, room
+    tracemalloc.start()
+    kept = _fill(count)
+    size = tracemalloc.get_traced_memory()[0] / count
+    tracemalloc.stop()
+    del kept
+    return taken, size
+
+
+def _restart() -> float:
+    """Give the seconds from opening the store to an engine that has all tasks again."""
+    with TemporaryDirectory(dir=Path.cwd()) as folder:
+        path = Path(folder) / "tasks.sqlite3"
+        store = SqliteStore(path, wall_offset=_no_offset)
+        book = TaskBook()
+        room = WaitingRoom(book, SETTINGS)
+        for number in range(MANY):
+            room.submit(_draft(number), now=monotonic())
+        store.append(book.take_events())
+        store.close()
+        start = perf_counter()
+        store = SqliteStore(path, wall_offset=_no_offset)
+        Engine(SETTINGS, now=monotonic(), restored=store.load())
+        taken = perf_counter() - start
+        store.close()
+        return taken
+
+
+def _no_offset() -> float:
+    return 0.0
