@@ -11,6 +11,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted, TaskWithdrawn
+from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.lifecycle import (
     ACTIVE,
     TERMINAL,
@@ -20,7 +21,6 @@ from mav_tasks.tasks.lifecycle import (
     TaskState,
 )
 from mav_tasks.tasks.task import Move, Pose, TaskId
-from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.samples import draft, idle_vehicle, ours
 
@@ -37,7 +37,7 @@ class TasksOfAVehicle(RuleBasedStateMachine):
         self.now = 10.0
         self.book = TaskBook()
         limits = Settings(queueing=Queueing(capacity=CAPACITY))
-        self.tasks = VehicleTasks(1, self.book, limits)
+        self.tasks = Fleet(self.book, limits).of(1)
         self.along = 0.0
         self.armed = False
         # the model: what must be waiting, in order, and what is known of every task

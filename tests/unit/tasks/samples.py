@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Goal, Move, Pose, Submitter
+from mav_tasks.tasks.task import Draft, Goal, Marks, Move, Pose, Submitter, Terms
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 SOMEBODY = Submitter("udpin:127.0.0.1:14560", "127.0.0.1:50000", 255, 190)
@@ -15,7 +15,8 @@ FORWARD_2 = Move(2.0)
 
 
 def draft(goal: Goal = FORWARD_2, *, priority: int = 5, vehicle: int = 1, nonce: int = 0) -> Draft:
-    return Draft(vehicle, TASK_MOVE, goal, priority, SOMEBODY, nonce)
+    terms = Terms(priority=priority)
+    return Draft(vehicle, TASK_MOVE, goal, SOMEBODY, terms, Marks(nonce))
 
 
 def motion(

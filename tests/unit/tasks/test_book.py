@@ -7,7 +7,7 @@ from mav_tasks.tasks import book as book_module
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import MAX_TASK_ID, Progress, Task, TaskId
+from mav_tasks.tasks.task import MAX_TASK_ID, Marks, Progress, Task, TaskId, Terms
 from tests.unit.tasks.samples import ORIGIN, SOMEBODY, draft
 
 S, R = TaskState, TaskReason
@@ -31,10 +31,10 @@ def test_a_submission_becomes_a_queued_task() -> None:
         vehicle=1,
         command=54000,
         goal=draft().goal,
-        priority=8,
         submitter=SOMEBODY,
-        nonce=77,
+        marks=Marks(77),
         submitted_at=1.5,
+        terms=Terms(priority=8),
         state=S.QUEUED,
         reason=R.NONE,
         version=1,

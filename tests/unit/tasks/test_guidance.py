@@ -17,7 +17,7 @@ from mav_tasks.tasks.guidance import (
     steer,
     wrap,
 )
-from mav_tasks.tasks.task import Goal, Move, Pose, Rotate
+from mav_tasks.tasks.task import Move, Pose, Rotate
 
 DRIVING = Driving()
 NORTHWARDS = Pose(0.0, 0.0, 0.0)
@@ -28,7 +28,9 @@ angles = st.floats(-4 * pi, 4 * pi)
 poses = st.builds(Pose, lengths, lengths, st.floats(-pi, pi))
 
 
-def steered(goal: Goal, pose: Pose, *, anchor: Pose = NORTHWARDS, before: float = 0.0) -> Velocity:
+def steered(
+    goal: Move | Rotate, pose: Pose, *, anchor: Pose = NORTHWARDS, before: float = 0.0
+) -> Velocity:
     length = abs(goal.distance) if isinstance(goal, Move) else abs(goal.angle)
     done = done_so_far(goal, anchor, pose, before=before)
     return steer(goal, anchor, pose, remaining=length - done, driving=DRIVING)
@@ -192,7 +194,9 @@ class TestRotating:
         (Rotate(1.0), radians(-0.51), False),
     ],
 )
-def test_it_has_arrived_within_the_tolerance(goal: Goal, remaining: float, arrived: bool) -> None:
+def test_it_has_arrived_within_the_tolerance(
+    goal: Move | Rotate, remaining: float, arrived: bool
+) -> None:
     assert has_arrived(goal, remaining, within=1.0, driving=DRIVING) is arrived
     assert has_arrived(goal, remaining / 2, within=0.5, driving=DRIVING) is arrived
 
@@ -207,7 +211,7 @@ def test_it_has_arrived_within_the_tolerance(goal: Goal, remaining: float, arriv
     st.floats(-1e4, 1e4),
 )
 def test_no_pose_makes_anything_but_bounded_numbers(
-    goal: Goal, anchor: Pose, pose: Pose, remaining: float
+    goal: Move | Rotate, anchor: Pose, pose: Pose, remaining: float
 ) -> None:
     wish = steer(goal, anchor, pose, remaining=remaining, driving=DRIVING)
     assert abs(wish.forward) <= DRIVING.max_speed

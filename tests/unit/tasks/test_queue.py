@@ -1,64 +1,103 @@
+"""The order of waiting tasks."""
+
+from itertools import pairwise
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from mav_tasks.errors import Rejection
-from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.queue import TaskQueue
-from mav_tasks.tasks.task import Task
-from tests.unit.tasks.samples import draft
+from mav_tasks.tasks.queue import Rank, TaskQueue, rank_of
+from mav_tasks.tasks.task import TaskId
 
-
-def tasks(*priorities: int) -> list[Task]:
-    """Tasks with ids 1, 2, … of these priorities."""
-    book = TaskBook()
-    return [book.submit(draft(priority=priority), now=0.0) for priority in priorities]
+AGING = 60.0
 
 
-def queue_of(waiting: list[Task], *, capacity: int = 10) -> TaskQueue:
-    queue = TaskQueue(capacity)
-    for task in waiting:
-        queue.add(task)
+def rank(priority: int, came_at: float, task_id: int = 1, *, aging: float = AGING) -> Rank:
+    return rank_of(priority, came_at=came_at, task_id=TaskId(task_id), aging=aging)
+
+
+def queue_of(*ranks: Rank) -> TaskQueue:
+    queue = TaskQueue()
+    for each in ranks:
+        queue.put(TaskId(each.task_id), each)
     return queue
 
 
+def ids(*numbers: int) -> list[TaskId]:
+    return [TaskId(number) for number in numbers]
+
+
 def test_a_higher_priority_runs_first_and_equals_in_order_of_arrival() -> None:
-    queue = queue_of(tasks(5, 10, 0, 5, 10))
+    priorities = (5, 10, 0, 5, 10)
+    queue = queue_of(*(rank(p, 0.0, n) for n, p in enumerate(priorities, 1)))
     assert queue.in_order() == [2, 5, 1, 4, 3]
     assert queue.first() == 2
 
 
-def test_the_order_is_by_arrival_of_the_task_not_by_when_it_was_put_in() -> None:
-    assert queue_of(list(reversed(tasks(5, 5, 5)))).in_order() == [1, 2, 3]
+def test_a_minute_of_waiting_counts_as_one_priority() -> None:
+    assert rank(5, 0.0, 1) < rank(6, 60.1, 2)
+    assert rank(6, 59.9, 2) < rank(5, 0.0, 1)
+
+
+def test_nothing_ages_past_the_highest_priority() -> None:
+    assert rank(10, 1e6, 2) < rank(9, 0.0, 1)
+
+
+def test_without_aging_nothing_overtakes() -> None:
+    assert rank(6, 1e6, 2, aging=0) < rank(5, 0.0, 1, aging=0)
+
+
+@given(st.lists(st.tuples(st.integers(0, 10), st.floats(0, 1e4)), min_size=2, max_size=30))
+def test_within_a_priority_first_come_is_first_served(came: list[tuple[int, float]]) -> None:
+    ranks = [rank(p, at, n) for n, (p, at) in enumerate(came, 1)]
+    order = queue_of(*ranks).in_order()
+    for before, after in pairwise(order):
+        one, other = came[before - 1], came[after - 1]
+        assert one[0] != other[0] or (one[1], before) < (other[1], after)
 
 
 def test_a_position_is_how_many_run_before() -> None:
-    waiting = tasks(5, 10, 0)
-    queue = queue_of(waiting)
-    assert [queue.position(task) for task in waiting] == [1, 0, 2]
-
-
-def test_what_does_not_wait_here_has_no_position() -> None:
-    one, other = tasks(5, 5)
-    queue = queue_of([one])
-    assert queue.position(other) is None
-    with pytest.raises(KeyError):
-        queue.remove(other)
+    queue = queue_of(rank(5, 0, 1), rank(10, 0, 2), rank(0, 0, 3))
+    assert [queue.position(task_id) for task_id in ids(1, 2, 3, 4)] == [1, 0, 2, None]
 
 
 def test_what_was_taken_out_leaves_the_others_in_order() -> None:
-    waiting = tasks(5, 5, 8)
-    queue = queue_of(waiting)
-    queue.remove(waiting[0])
+    queue = queue_of(rank(5, 0, 1), rank(5, 0, 2), rank(8, 0, 3))
+    queue.discard(TaskId(1))
+    queue.discard(TaskId(9))
     assert (queue.in_order(), len(queue)) == ([3, 2], 2)
+    assert TaskId(1) not in queue
 
 
-def test_a_full_queue_refuses_and_keeps_what_it_has() -> None:
-    waiting = tasks(5, 5, 5)
-    queue = queue_of(waiting[:2], capacity=2)
-    with pytest.raises(Rejection, match="queue full: 2 tasks wait") as refusal:
-        queue.add(waiting[2])
-    assert (refusal.value.reason, queue.in_order()) == (TaskReason.QUEUE_FULL, [1, 2])
+def test_what_is_put_in_again_has_its_new_place_only() -> None:
+    queue = queue_of(rank(5, 0, 1), rank(6, 0, 2))
+    queue.put(TaskId(1), rank(7, 0, 1))
+    assert (queue.in_order(), len(queue)) == ([1, 2], 2)
+
+
+def test_the_first_that_may_interrupt_is_not_the_first_of_all() -> None:
+    queue = queue_of(rank(9, 0, 1))
+    assert queue.first_preemptive() is None
+    queue.put(TaskId(2), rank(1, 0, 2), is_preemptive=True)
+    queue.put(TaskId(3), rank(2, 0, 3), is_preemptive=True)
+    assert (queue.first(), queue.first_preemptive()) == (1, 3)
+    queue.put(TaskId(3), rank(2, 0, 3))
+    assert queue.first_preemptive() == 2
+
+
+@pytest.mark.parametrize(("first", "count", "page"), [(0, 2, [1, 2]), (2, 9, [3]), (7, 2, [])])
+def test_a_page_is_a_part_of_the_order(first: int, count: int, page: list[int]) -> None:
+    queue = queue_of(*(rank(5, n, n) for n in (1, 2, 3)))
+    assert queue.page(first, count) == page
+
+
+def test_many_at_once_are_the_same_as_one_by_one() -> None:
+    ranks = [rank(n % 11, n % 7, n) for n in range(1, 200)]
+    at_once = TaskQueue()
+    at_once.put_all((TaskId(r.task_id), r, r.task_id % 3 == 0) for r in ranks)
+    assert at_once.in_order() == queue_of(*ranks).in_order()
+    assert at_once.first_preemptive() is not None
 
 
 def test_an_empty_queue_has_no_first() -> None:
-    assert (TaskQueue(1).first(), repr(TaskQueue(1))) == (None, "TaskQueue(0/1, next=None)")
+    assert (TaskQueue().first(), repr(TaskQueue())) == (None, "TaskQueue(0, next=None)")

@@ -10,9 +10,9 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import QueueContinued, QueuePaused, TaskChanged
+from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Goal, Move, Pose, Rotate, Task, TaskId
-from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.samples import FORWARD_2, draft, idle_vehicle, ours
 
@@ -42,7 +42,8 @@ class Rig:
     def __init__(self, *, settings: Settings = SETTINGS) -> None:
         self.now = 10.0
         self.book = TaskBook()
-        self.tasks = VehicleTasks(1, self.book, settings)
+        self.fleet = Fleet(self.book, settings)
+        self.tasks = self.fleet.of(1)
         self.keeps = True
 
     def submit(self, goal: Goal = FORWARD_2, *, priority: int = 5) -> Task:
@@ -160,7 +161,7 @@ class TestFromQueueToEnd:
         rig.step(lambda now: ours(at=now, pose=turned, still=True))
         rig.step(lambda now: ours(at=now, pose=replace(turned, east=6.0)))
         assert rig.book[TaskId(1)].progress.anchor == turned
-        assert rig.book[TaskId(1)].remaining == pytest.approx(1.0)
+        assert rig.book[TaskId(1)].progress.done == pytest.approx(1.0)
 
     def test_a_rotation_of_more_than_a_turn_goes_all_the_way(self) -> None:
         rig = Rig().executing(Rotate(3 * pi))
