@@ -28,6 +28,7 @@ class Fleet:
         self._of: dict[int, VehicleTasks] = {}
         self.room = WaitingRoom(book, settings)
         self._was_driven: set[int] = set()
+        self._comes_up_paused = False
 
     def __iter__(self) -> Iterator[VehicleTasks]:
         return iter(self._of.values())
@@ -38,6 +39,8 @@ class Fleet:
         if tasks is None:
             tasks = VehicleTasks(vehicle, self._book, self.room, self._settings)
             self._of[vehicle] = tasks
+            if self._comes_up_paused:
+                tasks.restore((), paused=R.RESTARTED, speed=None, uid="")
         return tasks
 
     def was_driven(self, vehicle: int) -> bool:
@@ -70,12 +73,14 @@ class Fleet:
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
+        pauses = self._settings.on_restart == "pause"
+        self._comes_up_paused = pauses and not restored.ended_well
         of_note = {*restored.paused, *restored.speeds, *restored.uids}
         for vehicle in begun.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
-            is_doubtful = self._is_doubtful(restored) and (vehicle in begun or vehicle in waiting)
-            if not paused and (has_paused or is_doubtful):
+            is_late = restored.idle > LONG_IDLE and (vehicle in begun or vehicle in waiting)
+            if not paused and (has_paused or self._comes_up_paused or (is_late and pauses)):
                 paused = R.RESTARTED
                 self._book.record(QueuePaused(vehicle, paused, SERVER, now))
             self.of(vehicle).restore(
@@ -84,9 +89,3 @@ class Fleet:
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),
             )
-
-    def _is_doubtful(self, restored: Restored) -> bool:
-        """Whether somebody should look before what was queued runs."""
-        if self._settings.on_restart == "continue":
-            return False
-        return not restored.ended_well or restored.idle > LONG_IDLE

@@ -1,5 +1,7 @@
 """Tasks are what their events add up to."""
 
+from dataclasses import replace
+
 import pytest
 
 from mav_tasks.errors import IllegalTransition, Rejection
@@ -7,8 +9,8 @@ from mav_tasks.tasks import book as book_module
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import MAX_TASK_ID, Marks, Progress, Task, TaskId, Terms
-from tests.unit.tasks.samples import ORIGIN, SOMEBODY, draft
+from mav_tasks.tasks.task import MAX_TASK_ID, Marks, Progress, Submitter, Task, TaskId, Terms
+from tests.unit.tasks.samples import ORIGIN, SOMEBODY, TASK_MOVE, draft
 
 S, R = TaskState, TaskReason
 
@@ -147,3 +149,38 @@ def test_the_oldest_finished_are_forgotten_and_no_other(monkeypatch: pytest.Monk
         finish(book, task_id)
     assert [task.id for task in book.all()] == [1, 2, 3, 5]
     assert book.get(4) is None
+
+
+class TestTheLatest:
+    """What COMMAND_CANCEL means: a client's latest task of a command that is not over."""
+
+    def test_is_by_client_command_and_vehicle(self) -> None:
+        book = TaskBook()
+        other = replace(SOMEBODY, endpoint="127.0.0.1:50001")
+        wishes = [draft(), draft(), draft(vehicle=2), replace(draft(), submitter=other)]
+        for wish in [*wishes, replace(draft(), command=16)]:
+            book.submit(wish, now=0.0)
+
+        def latest(submitter: Submitter, command: int, vehicle: int) -> int | None:
+            task = book.latest(submitter, command, vehicle=vehicle)
+            return None if task is None else task.id
+
+        assert latest(SOMEBODY, TASK_MOVE, 1) == 2
+        assert latest(SOMEBODY, TASK_MOVE, 2) == 3
+        assert latest(other, TASK_MOVE, 1) == 4
+        assert latest(SOMEBODY, 16, 1) == 5
+        assert latest(other, 16, 1) is None
+
+    def test_is_the_one_before_once_it_is_over_or_withdrawn_also_after_a_restart(self) -> None:
+        book = TaskBook()
+        for _ in range(4):
+            book.submit(draft(), now=0.0)
+        finish(book, 4)
+        book.withdraw(TaskId(3), now=0.0)
+        again = TaskBook()
+        again.restore(book.all(), next_id=5)
+        for each in (book, again):
+            assert each.latest(SOMEBODY, TASK_MOVE, vehicle=1) == each[TaskId(2)]
+            finish(each, 2)
+            finish(each, 1)
+            assert each.latest(SOMEBODY, TASK_MOVE, vehicle=1) is None
