@@ -44,6 +44,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.store",
             "mav_tasks.settings",
             "mav_tasks.runner",
+            "mav_tasks.tasks",
         }
     ),
     "mav_tasks.serve": frozenset(
