@@ -110,8 +110,8 @@ class VehicleTasks:
     @property
     def awaits_commit(self) -> bool:
         """Whether the next task waits for nothing but its submission being durable."""
-        first = self._next()
-        return first is not None and self.begun is None and not self._book.is_durable(first)
+        first = None if self.begun is not None else self._next()
+        return first is not None and not self._book.is_durable(first)
 
     def position(self, task: Task) -> int | None:
         """Give how many tasks run before this one, or None if it is not ready to run."""
@@ -172,9 +172,9 @@ class VehicleTasks:
     @property
     def _is_held_ahead(self) -> bool:
         begun = self.begun
-        return (begun is not None and begun.state is S.HELD) or any(
-            task.state is S.HELD for task in self.aside
-        )
+        if begun is not None and begun.state is S.HELD:
+            return True
+        return bool(self._aside) and any(task.state is S.HELD for task in self.aside)
 
     # coming, changing, going
 
@@ -462,6 +462,8 @@ class VehicleTasks:
         if self._paused:
             return None
         first = self._queue.first()
+        if not self._aside:
+            return first
         resumable = [task for task in self.aside if task.state is S.PAUSED]
         if not resumable:
             return first
