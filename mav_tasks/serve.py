@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import logging
+import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -50,6 +51,8 @@ def serve(
         for host, port in pushed:
             refuse_insecure(LinkUrl("udpout", host, port))
     log_to_stderr()
+    for number in (signal.SIGINT, signal.SIGTERM):  # until the loop takes them over
+        signal.signal(number, _leave_before_serving)
     with ExitStack() as opened:
         # Pushing from the first client link: who answers is served by the socket that called.
         client_links = [
@@ -67,6 +70,11 @@ def serve(
         _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
         sys.stdout.flush()
         return asyncio.run(_run(settings, journal, restored, client_links, vehicle_links))
+
+
+def _leave_before_serving(_number: int, _frame: object) -> None:
+    """Nothing is driven yet: an orderly end is simply to go."""
+    raise SystemExit(0)
 
 
 def tame_collector() -> None:

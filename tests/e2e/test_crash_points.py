@@ -5,9 +5,10 @@ nothing moves before somebody says so; what ran is held; what waited is in order
 """
 
 import signal
+import sqlite3
 import struct
 from collections.abc import Callable
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,19 @@ def stop(story: Story) -> None:
     story.stop()
 
 
+def stop_and_store(story: Story) -> None:
+    """STOP is answered without waiting for the disk: wait for it here."""
+    stop(story)
+    path = story.stand.truth_file.with_name("tasks.sqlite3")
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as file:
+        query = "SELECT paused FROM vehicles WHERE vehicle = 1"
+        wait_until(
+            lambda: file.execute(query).fetchone() == (R.STOPPED,),
+            within=5,
+            what="the latch on the disk",
+        )
+
+
 def stop_idle(story: Story) -> None:
     story.stop()
 
@@ -173,7 +187,7 @@ STATES: dict[str, Callable[[Story], None]] = {
     "queued": waiting,
     "executing": drive,
     "paused": pause,
-    "stopped": stop,
+    "stopped": stop_and_store,
     "cleared": cleared,
 }
 POINTS = [f"{when}:{event}" for event in WRITES for when in ("before", "after")] + list(STATES)
