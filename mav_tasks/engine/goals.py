@@ -5,7 +5,7 @@ Our own commands, and the standard ones that a stock client sends without knowin
 
 from collections.abc import Callable
 from hashlib import blake2b
-from math import degrees, inf, isnan, nan, radians
+from math import degrees, inf, isnan, nan, radians, tau
 from struct import Struct
 from typing import NamedTuple
 
@@ -51,6 +51,8 @@ NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT, which has no NaN there
 LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
 MAX_WAIT = 86_400.0  # s
 MAX_DELAY = 31_536_000.0  # s, a year
+CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
+MAX_FLAGS = 0xFFFFFF  # of a bit mask in a float32
 HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own time-out of a setpoint
 
 _MARK = Struct("<BBHh7d")
@@ -177,10 +179,13 @@ def _place(command: Command) -> Place:
     return place
 
 
-def _yaw(command: Command, index: int) -> float | None:
-    """Give a heading in radians, None where none is asked for."""
-    value = number(command, index, "yaw", low=-360.0, high=360.0, default=inf)
-    return None if value == inf else radians(value)
+def _yaw(command: Command, index: int, *, turn: float) -> float | None:
+    """Give a heading of at most a full ``turn``, None where none is asked for.
+
+    Many clients leave a 0 there that is not meant as north.
+    """
+    value = number(command, index, "yaw", low=-turn, high=turn, default=0.0)
+    return value or None
 
 
 def _speed(command: Command, index: int, driving: Driving) -> float | None:
@@ -235,18 +240,22 @@ def _refuse_reserved(command: Command, index: int) -> None:
 def _waypoint(command: Command, _driving: Driving) -> Goal:
     hold = number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0)
     radius = number(command, 2, "acceptance radius", low=0.0, high=1000.0, default=0.0)
-    return GoTo(_place(command), None, radius or None, _yaw_if_given(command), hold)
+    yaw = _yaw(command, 4, turn=360.0)  # degrees; DO_REPOSITION's is in radians
+    return GoTo(_place(command), None, radius or None, yaw and radians(yaw), hold)
 
 
-def _yaw_if_given(command: Command) -> float | None:
-    """NAV_WAYPOINT's yaw: many clients leave a 0 there that is not meant as north."""
-    return None if command.params[3] == 0.0 else _yaw(command, 4)
+def reposition_flags(command: Command) -> int:
+    """Give the MAV_DO_REPOSITION_FLAGS of a "go to"."""
+    return whole(command, 2, "flags", high=MAX_FLAGS)
 
 
 def _reposition(command: Command, driving: Driving) -> Goal:
     speed = _speed(command, 1, driving)
     radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
-    return GoTo(_place(command), speed, max(radius, 0.0) or None, _yaw_if_given(command))
+    yaw = _yaw(command, 4, turn=tau)
+    if yaw is not None and reposition_flags(command) & RELATIVE_YAW:
+        raise Rejection(R.BAD_PARAMETER, "param2 relative yaw: not supported, give it from north")
+    return GoTo(_place(command), speed, max(radius, 0.0) or None, yaw)
 
 
 def _loiter_time(command: Command, _driving: Driving) -> Goal:

@@ -5,7 +5,7 @@ from functools import partial
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import wish_of
+from mav_tasks.engine.goals import CHANGE_MODE, reposition_flags, wish_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -17,9 +17,6 @@ from mav_tasks.tasks.recollection import Known, Recollection, Rule
 from mav_tasks.tasks.task import Draft, Task, TaskId, describe
 
 R = TaskReason
-
-CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS
-PARAM2_FLAGS = 1  # index of DO_REPOSITION's flags
 
 
 class Submissions:
@@ -121,7 +118,7 @@ class Submissions:
             self._settings.guided == "now"
             and command.command == MavCmd.DO_REPOSITION
             and command.target.component_id == AUTOPILOT
-            and int(command.params[PARAM2_FLAGS]) & CHANGE_MODE == CHANGE_MODE
+            and bool(reposition_flags(command) & CHANGE_MODE)
         )
 
     def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
