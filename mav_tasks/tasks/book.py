@@ -40,6 +40,9 @@ class TaskBook:
     def __repr__(self) -> str:
         return f"TaskBook({len(self._tasks)} tasks, event {self.recorded}, durable {self.durable})"
 
+    def __len__(self) -> int:
+        return len(self._tasks)
+
     def __getitem__(self, task_id: TaskId) -> Task:
         return self._tasks[task_id]
 

@@ -32,6 +32,7 @@ NEAR = 1.0  # m between two places that mean the same (rule 4)
 SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
 PACKETS = 1_000  # of each client, for rule 1; while the server runs its receiver has its own
+SPARE = 1_000  # nonces of tasks that are not kept any more
 MANY_CLIENTS = 256  # remembered; beyond, those whose last submission is old are forgotten
 
 
@@ -112,6 +113,7 @@ class Recollection:
             and goal.draft.vehicle == draft.vehicle
             and _same_place(goal.draft, draft, origin)
         ):
+            client.of_command[draft.command] = _Last(goal.task_id, draft, now)  # copies may follow
             return Known(goal.task_id, Rule.SAME_GOAL)
         return None
 
@@ -119,7 +121,7 @@ class Recollection:
         """Keep a submission that became a task."""
         submitter, marks = task.submitter, task.marks
         if marks.nonce:
-            self._nonces[_key(submitter, marks.nonce)] = task.id
+            self._keep_nonce(_key(submitter, marks.nonce), task.id)
         if now - at > LONGEST:
             return
         client = self._clients.get(submitter)
@@ -165,6 +167,12 @@ class Recollection:
             words = f"nonce {draft.marks.nonce} was used for something else"
             raise Rejection(TaskReason.NONCE_REUSED, words)
         return Known(task_id, Rule.NONCE)
+
+    def _keep_nonce(self, key: tuple[int, int, int], task_id: TaskId) -> None:
+        self._nonces[key] = task_id
+        if len(self._nonces) > 2 * len(self._book) + SPARE:  # most are of tasks not kept any more
+            kept = {k: t for k, t in self._nonces.items() if self._book.get(t) is not None}
+            self._nonces = kept
 
     def _forget_old(self, *, now: float) -> None:
         for submitter in [s for s, c in self._clients.items() if now - c.at > LONGEST]:

@@ -162,7 +162,15 @@ class TestAPlace:
         task = rig.submit(rig.draft("a", command=192, goal=PLACE))
         again = rig.draft("b", command=16, goal=goal)
         assert rig.known(again, now=SAME_GOAL) == Known(task.id, Rule.SAME_GOAL)
-        assert rig.known(again, now=SAME_GOAL + EPSILON) is None
+        later = rig.draft("c", command=16, goal=goal)
+        assert rig.known(later, now=SAME_GOAL + EPSILON) is None
+
+    def test_what_was_the_same_goal_may_be_repeated_as_any_other(self) -> None:
+        rig = Rig()
+        task = rig.submit(rig.draft("a", command=16, goal=PLACE))
+        again = rig.draft("b", command=192, goal=PLACE)
+        rules = [rig.known(again, now=at) for at in (4.0, 4.5, 5.0, 5.5)]
+        assert rules == [Known(task.id, Rule.SAME_GOAL)] + 3 * [Known(task.id, Rule.SAME_PAYLOAD)]
 
     def test_farther_off_is_another(self) -> None:
         rig = Rig()
