@@ -21,8 +21,6 @@ from mav_tasks.tasks.task import Face, GoTo, Progress, Task, TaskId, Wait
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
 from mav_tasks.tasks.way_back import is_off_line, resumed, way_back
 
-JUMP = 2.0  # m, a position that moved further than the vehicle can have driven
-
 S, R = TaskState, TaskReason
 
 #: interruptions that end by themselves when the vehicle is back
@@ -40,7 +38,6 @@ class Executor:
         self._way_back: Course | None = None  # driven before it
         self._since = 0.0  # when the present state was entered
         self._executed_before = 0.0  # s of EXECUTING in earlier stretches
-        self._last_motion: Motion | None = None
         self._last_velocity = ZERO
         self._last_tick = 0.0
         self._moved_at = 0.0  # when a velocity other than zero was last asked for
@@ -163,8 +160,6 @@ class Executor:
                 return self._start(task, seen, now)
             case S.EXECUTING:
                 return self._execute(task, seen, now, elapsed)
-            case S.PAUSED if self._has_jumped(seen):
-                self._change(S.HELD, R.FRAME_RESET, actor=SERVER, now=now)
             case S.PAUSED:
                 self._wait_for_return(seen, now)
             case S.CANCELLING if seen.still:
@@ -192,9 +187,6 @@ class Executor:
             return view.STAND
         if not seen.still:  # the heading at the start is that of a vehicle at rest
             return view.STAND
-        if self._has_jumped(seen):
-            self._change(S.HELD, R.FRAME_RESET, actor=SERVER, now=now)
-            return view.HOLD
         progress = _begun(task, seen, motion)
         if progress is None:
             self.pause(R.POSITION_LOST, actor=SERVER, now=now)
@@ -213,9 +205,6 @@ class Executor:
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
-        if self._has_jumped(seen):
-            self._change(S.HELD, R.FRAME_RESET, actor=SERVER, now=now)
-            return view.HOLD
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"
         is_held_back = not self._book.is_durable(task.id)
@@ -282,20 +271,6 @@ class Executor:
         self._course.progress = replace(self._course.progress, execution_time=executed)
         self._book.note_progress(task.id, self._course.progress)
 
-    def _has_jumped(self, seen: VehicleView) -> bool:
-        """Whether the position moved further since the last look than a vehicle can drive."""
-        last, motion = self._last_motion, seen.motion
-        if motion is None:
-            return False
-        self._last_motion = motion
-        if last is None:
-            return False
-        elapsed = max(0.0, motion.at - last.at)
-        north = motion.pose.north - last.pose.north
-        east = motion.pose.east - last.pose.east
-        reach = JUMP + 2 * self._settings.driving.max_speed * elapsed
-        return north * north + east * east > reach * reach
-
     # states
 
     def _begun(self, state: TaskState) -> Task:
@@ -325,7 +300,6 @@ class Executor:
 
     def _finish(self, state: TaskState, reason: TaskReason, *, actor: str, now: float) -> None:
         self._change(state, reason, actor=actor, now=now)
-        self._last_motion = None
         self.give_up()
 
 

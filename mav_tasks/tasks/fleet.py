@@ -29,6 +29,7 @@ class Fleet:
         self.room = WaitingRoom(book, settings)
         self._was_driven: set[int] = set()
         self._comes_up_paused = False
+        self._began_at = 0.0
 
     def __iter__(self) -> Iterator[VehicleTasks]:
         return iter(self._of.values())
@@ -41,6 +42,7 @@ class Fleet:
             self._of[vehicle] = tasks
             if self._comes_up_paused:
                 tasks.restore((), paused=R.RESTARTED, speed=None, uid="")
+                self._book.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self._began_at))
         return tasks
 
     def was_driven(self, vehicle: int) -> bool:
@@ -74,13 +76,14 @@ class Fleet:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
         pauses = self._settings.on_restart == "pause"
-        self._comes_up_paused = pauses and not restored.ended_well
+        self._began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids}
         for vehicle in begun.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
             is_late = restored.idle > LONG_IDLE and (vehicle in begun or vehicle in waiting)
-            if not paused and (has_paused or self._comes_up_paused or (is_late and pauses)):
+            is_unclean = pauses and not restored.ended_well
+            if not paused and (has_paused or is_unclean or (is_late and pauses)):
                 paused = R.RESTARTED
                 self._book.record(QueuePaused(vehicle, paused, SERVER, now))
             self.of(vehicle).restore(
@@ -89,3 +92,4 @@ class Fleet:
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),
             )
+        self._comes_up_paused = pauses and not restored.ended_well  # those that come now

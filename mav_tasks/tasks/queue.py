@@ -13,7 +13,7 @@ from sortedcontainers import SortedList
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import MAX_PRIORITY, TaskId
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, TaskId
 
 
 class Rank(NamedTuple):
@@ -33,13 +33,35 @@ def rank_of(priority: int, *, came_at: float, task_id: TaskId, aging: float) -> 
     return Rank(True, urgency, came_at, task_id)
 
 
+class Entry(NamedTuple):
+    """One task in the queue; ``rank`` may be another's, of a task that waits for this one."""
+
+    task_id: TaskId
+    rank: Rank
+    priority: int = DEFAULT_PRIORITY
+    is_preemptive: bool = False
+
+
+class _Place(NamedTuple):
+    """Where a task is in the sorted lists."""
+
+    in_order: tuple[Rank, int]
+    by_priority: tuple[int, tuple[Rank, int]]
+
+
+def _place_of(entry: Entry) -> _Place:
+    in_order = entry.rank, entry.task_id
+    return _Place(in_order, (-entry.priority, in_order))
+
+
 class TaskQueue:
     """The tasks of one vehicle that are ready, in the order in which they will run."""
 
     def __init__(self) -> None:
         self._order = SortedList()
+        self._by_priority = SortedList()
         self._preemptive = SortedList()
-        self._places: dict[TaskId, tuple[Rank, int]] = {}
+        self._places: dict[TaskId, _Place] = {}
 
     def __repr__(self) -> str:
         return f"TaskQueue({len(self)}, next={self.first()})"
@@ -50,47 +72,53 @@ class TaskQueue:
     def __contains__(self, task_id: TaskId) -> bool:
         return task_id in self._places
 
-    def put(self, task_id: TaskId, rank: Rank, *, is_preemptive: bool = False) -> None:
-        """Put a task in its place, or in its new place.
+    def put(self, entry: Entry) -> None:
+        """Put a task in its place, or in its new place."""
+        self.discard(entry.task_id)
+        place = _place_of(entry)
+        self._places[entry.task_id] = place
+        self._order.add(place.in_order)
+        self._by_priority.add(place.by_priority)
+        if entry.is_preemptive:
+            self._preemptive.add(place.by_priority)
 
-        ``rank`` may be another's, of a task that waits for this one.
-        """
-        self.discard(task_id)
-        self._places[task_id] = (rank, task_id)
-        self._order.add((rank, task_id))
-        if is_preemptive:
-            self._preemptive.add((rank, task_id))
-
-    def put_all(self, tasks: Iterable[tuple[TaskId, Rank, bool]]) -> None:
-        """Put many tasks in: id, rank, and whether it is pre-emptive; none of them is here yet."""
-        places = [((rank, task_id), is_preemptive) for task_id, rank, is_preemptive in tasks]
-        self._places.update((TaskId(place[1]), place) for place, _ in places)
-        self._order.update(place for place, _ in places)
-        self._preemptive.update(place for place, is_preemptive in places if is_preemptive)
+    def put_all(self, entries: Iterable[Entry]) -> None:
+        """Put many tasks in, of which none is here yet."""
+        places = {entry: _place_of(entry) for entry in entries}
+        self._places.update((entry.task_id, place) for entry, place in places.items())
+        self._order.update(place.in_order for place in places.values())
+        self._by_priority.update(place.by_priority for place in places.values())
+        self._preemptive.update(p.by_priority for e, p in places.items() if e.is_preemptive)
 
     def discard(self, task_id: TaskId) -> None:
         """Take a task out, if it is here."""
         place = self._places.pop(task_id, None)
         if place is not None:
-            self._order.remove(place)
-            self._preemptive.discard(place)
+            self._order.remove(place.in_order)
+            self._by_priority.remove(place.by_priority)
+            self._preemptive.discard(place.by_priority)
 
     def first(self) -> TaskId | None:
         """Give the task that runs next."""
         return TaskId(self._order[0][1]) if self._order else None
 
-    def first_preemptive(self) -> TaskId | None:
-        """Give the first of those that may interrupt others."""
-        return TaskId(self._preemptive[0][1]) if self._preemptive else None
+    def interrupters(self) -> list[TaskId]:
+        """Give the tasks that may interrupt if any here may: the first marked so, the first of all.
+
+        By their own priority, and by their order within it: neither aging nor the urgency of
+        others makes a task interrupt.
+        """
+        firsts = (self._preemptive[:1], self._by_priority[:1])
+        return [TaskId(first[0][1][1]) for first in firsts if first]
 
     def rank(self, task_id: TaskId) -> Rank:
         """Give the rank by which a task waits here."""
-        return self._places[task_id][0]
+        return self._places[task_id].in_order[0]
 
     def position(self, task_id: TaskId) -> int | None:
         """Give how many tasks here run before this one, or None if it is not here."""
         place = self._places.get(task_id)
-        return None if place is None else int(self._order.index(place))
+        return None if place is None else int(self._order.index(place.in_order))
 
     def page(self, first: int, count: int) -> list[TaskId]:
         """Give up to ``count`` tasks from the position ``first`` on."""

@@ -24,6 +24,7 @@ from mav_tasks.tasks.events import (
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
+from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.scheduler import outranks, start_blocker
@@ -46,6 +47,7 @@ class VehicleTasks:
         self._queue = room.queue(vehicle)
         self._settings = settings
         self._executor = Executor(book, settings)
+        self._jumps = JumpWatch()
         self._aside: dict[TaskId, None] = {}
         self._of_earlier_run: set[TaskId] = set()
         self._uid = ""  # of the vehicle, as far as it was heard
@@ -302,7 +304,7 @@ class VehicleTasks:
         if self.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
         begun = self.begun
-        if begun is not None and begun.id != task.id and begun.state is not S.HELD:
+        if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
             words = f"task {begun.id} is {begun.state.name.lower()}"
             raise Rejection(R.WRONG_STATE, words)
         self._check_start(seen, task, now=now)
@@ -346,12 +348,12 @@ class VehicleTasks:
         """Release the STOP latch or any other pause; gives the task that goes on, if one does.
 
         A task that could not take the vehicle now is not resumed: Rejection says what is in its
-        way, and everything stays as it is.
+        way, and everything stays as it is. A held task keeps the queue standing all the same.
         """
         begun = self.begun
         resumes = begun is not None and begun.state is S.PAUSED
         held = next((t for t in (begun, *self.aside) if t is not None and t.state is S.HELD), None)
-        if held is not None:
+        if held is not None and not self.is_stopped:
             words = f"task {held.id} is held ({words_of(held.reason)}): release it first"
             raise Rejection(R.WRONG_STATE, words)
         if resumes:
@@ -412,6 +414,9 @@ class VehicleTasks:
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Begin what can begin, and give what the vehicle must be made to do now."""
+        has_jumped = self._jumps.has_jumped(seen.motion, max_speed=self._settings.driving.max_speed)
+        if has_jumped and self.is_driving:
+            self.hold(R.FRAME_RESET, now=now)
         if self.is_stopped:
             return view.STOP
         if self._is_halting:
@@ -432,12 +437,12 @@ class VehicleTasks:
     def _is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Set the running task aside if a waiting one may interrupt it, and could begin."""
         running = self.begun
-        if running is None or self._paused or not self._queue:
+        if running is None or self._paused or not self._queue or self._is_held_ahead:
             return False
         if now - self._begun_at < self._settings.queueing.preemption_rest:
             return False
-        for task_id in (self._queue.first_preemptive(), self._queue.first()):
-            if task_id is None or not self._book.is_durable(task_id):
+        for task_id in self._queue.interrupters():
+            if not self._book.is_durable(task_id):
                 continue
             waiting = self._book[task_id]
             if outranks(waiting, running, queueing=self._settings.queueing) and not start_blocker(

@@ -15,7 +15,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
-from mav_tasks.tasks.queue import Rank, TaskQueue, full, rank_of
+from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, full, rank_of
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
 
 R, S = TaskReason, TaskState
@@ -79,7 +79,9 @@ class WaitingRoom:
     def rank(self, task: Task) -> Rank:
         """Give a task's rank among those that are ready; of a begun one, as if it were."""
         waiter = self._waiters.get(task.id)
-        return self._own_rank(task, task.submitted_at) if waiter is None else waiter.rank
+        if waiter is not None:
+            return waiter.rank
+        return self._most_urgent(task.id, self._own_rank(task, task.submitted_at))
 
     def due_at(self, task: Task) -> float:
         """Give the monotonic time before which a task does not begin; -inf without one."""
@@ -114,15 +116,19 @@ class WaitingRoom:
             due = self.due_at(task)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
             self._enter(task, now=came_at)
-        ready: dict[int, list[tuple[TaskId, Rank, bool]]] = {}
+        ready: dict[int, list[Entry]] = {}
         for task in waiting:
             if task.state is S.QUEUED and self._state_by(task.terms, now=now) is S.QUEUED:
-                place = (task.id, self._waiters[task.id].rank, task.terms.is_preemptive)
-                ready.setdefault(task.vehicle, []).append(place)
-        for vehicle, places in ready.items():
-            self.queue(vehicle).put_all(places)
+                ready.setdefault(task.vehicle, []).append(self._entry(task))
+        for vehicle, entries in ready.items():
+            self.queue(vehicle).put_all(entries)
         for task in waiting:
-            if task.id not in self.queue(task.vehicle):
+            if task.id not in self._waiters or task.id in self.queue(task.vehicle):
+                continue
+            if self._has_failed_dependency(task):  # the end of it was kept, what follows was not
+                self._fail(task.id, now=now)
+                self.ended(task.id, now=now)
+            else:
                 self._settle(task, now=now)
 
     def _check_room(self, draft: Draft) -> None:
@@ -151,7 +157,8 @@ class WaitingRoom:
         self._note_times(task)
         if task.terms.after:
             self._dependents.setdefault(TaskId(task.terms.after), {})[task.id] = None
-            self._lift(TaskId(task.terms.after))
+        if task.terms.after or task.id in self._dependents:  # after a modification, in any order
+            self._lift(task.id)
 
     def _note_times(self, task: Task) -> None:
         due = self.due_at(task)
@@ -186,8 +193,11 @@ class WaitingRoom:
         return task
 
     def _line_up(self, task: Task) -> None:
+        self.queue(task.vehicle).put(self._entry(task))
+
+    def _entry(self, task: Task) -> Entry:
         rank = self._waiters[task.id].rank
-        self.queue(task.vehicle).put(task.id, rank, is_preemptive=task.terms.is_preemptive)
+        return Entry(task.id, rank, task.priority, task.terms.is_preemptive)
 
     def _state_by(self, terms: Terms, *, now: float) -> TaskState:
         if self._due_by(terms) > now:
@@ -277,11 +287,12 @@ class WaitingRoom:
         self.ended(task.id, now=now)
 
     def withdraw(self, task: Task, *, now: float) -> None:
-        """Take back a submission that did not become durable; nothing can run after it yet."""
+        """Take back a submission that did not become durable, and what waits for it."""
         self.leave(task)
         self._book.withdraw(task.id, now=now)
         for dependent in self._dependents.pop(task.id, {}):
             self._fail(dependent, now=now)
+            self.ended(dependent, now=now)
 
     def clear(self, vehicle: int, reason: TaskReason, *, actor: str, now: float) -> None:
         """Cancel all that wait for a vehicle."""
@@ -313,6 +324,10 @@ class WaitingRoom:
         self.leave(self._book[task_id])
         self._book.change(task_id, S.FAILED, reason=R.DEPENDENCY_FAILED, actor=SERVER, now=now)
 
+    def _has_failed_dependency(self, task: Task) -> bool:
+        ahead = self._book.get(task.terms.after) if task.terms.after else None
+        return ahead is not None and ahead.state in TERMINAL and ahead.state is not S.COMPLETED
+
     def _waiting(self, task_id: TaskId) -> Task | None:
         return self._book[task_id] if task_id in self._waiters else None
 
@@ -333,6 +348,11 @@ class WaitingRoom:
         waiter.own = self._own_rank(task, waiter.came_at)
         self._lift(task.id)
 
+    def _most_urgent(self, task_id: TaskId, own: Rank) -> Rank:
+        """Give a task's own rank, or that of one that waits for it."""
+        dependents = map(self._waiters.get, self._dependents.get(task_id, ()))
+        return min([own, *(waiter.rank for waiter in dependents if waiter is not None)])
+
     def _lift(self, task_id: TaskId) -> None:
         """Give a task, and through it those that it waits for, the rank of who waits for it."""
         seen = task_id
@@ -340,8 +360,7 @@ class WaitingRoom:
             waiter = self._waiters.get(seen)
             if waiter is None:
                 return
-            dependents = (self._waiters.get(d) for d in self._dependents.get(seen, ()))
-            rank = min([waiter.own, *(d.rank for d in dependents if d is not None)])
+            rank = self._most_urgent(seen, waiter.own)
             if rank == waiter.rank and seen != task_id:
                 return
             waiter.rank = rank

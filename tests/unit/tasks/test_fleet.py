@@ -146,6 +146,14 @@ class TestTheQueue:
         events = [e for e in book.take_events() if isinstance(e, QueuePaused)]
         assert [e.reason for e in events] == ([paused] if paused else [])
 
+    def test_of_a_vehicle_met_after_an_unclean_end_stands_and_is_remembered(self) -> None:
+        fleet, book = restored(in_state(S.QUEUED), ended_well=False)
+        book.take_events()
+        assert fleet.of(7).paused is R.RESTARTED
+        (event,) = book.take_events()
+        assert isinstance(event, QueuePaused)
+        assert (event.vehicle, event.reason) == (7, R.RESTARTED)
+
     def test_goes_on_by_setting(self) -> None:
         book = TaskBook()
         fleet = Fleet(book, Settings(on_restart="continue"))

@@ -7,7 +7,7 @@ import pytest
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import GoTo, LocalPlace, Move, Pose, Terms, Wait
+from mav_tasks.tasks.task import Frame, GoTo, LocalPlace, Move, Pose, Terms, Wait
 from mav_tasks.tasks.view import DemandKind, ModeKind
 from tests.unit.tasks.rig import (
     BY,
@@ -15,6 +15,7 @@ from tests.unit.tasks.rig import (
     TICK,
     Rig,
     Rover,
+    at,
     idle,
     in_control,
     run,
@@ -25,6 +26,7 @@ from tests.unit.tasks.samples import draft, ours
 
 S, R, K = TaskState, TaskReason, DemandKind
 LONG = Wait(1000.0)
+HERE = Frame(473_977_418, 85_455_938, 0.0)
 
 
 def begun() -> Rig:
@@ -125,9 +127,9 @@ class TestHeldTasks:
         assert rig.state(1) is S.HELD
         return rig
 
-    def release(self, rig: Rig, rover: Rover, *, again: bool) -> None:
+    def release(self, rig: Rig, rover: Rover, *, again: bool, task_id: int = 1) -> None:
         seen = rover.view(rig.now)
-        rig.tasks.release(rig.task(1), again=again, seen=seen, actor=BY, now=rig.now)
+        rig.tasks.release(rig.task(task_id), again=again, seen=seen, actor=BY, now=rig.now)
         rig.keep()
 
     @pytest.mark.parametrize(("again", "end"), [(True, 5.0), (False, 4.0)])
@@ -180,6 +182,42 @@ class TestHeldTasks:
         rig.steps(in_control, seconds=2 * TICK)
         rig.tasks.release(rig.task(2), again=True, seen=seen, actor=BY, now=rig.now)
         assert rig.states() == [S.CANCELLED, S.STARTING]
+
+    def test_a_jump_holds_what_was_set_aside_too(self) -> None:
+        rig = Rig().executing(Move(4.0))
+        rig.drive(1.0)
+        rig.steps(at(1.0), seconds=1.0)
+        rig.submit(LONG, terms=Terms(is_preemptive=True))
+        rig.steps(at(1.0, still=True), seconds=0.5)
+        assert rig.states() == [S.PAUSED, S.EXECUTING]
+        rig.step(at(51.0, still=True))
+        assert [(t.state, t.reason) for t in rig.book.all()] == [(S.HELD, R.FRAME_RESET)] * 2
+
+    def test_where_it_was_before_a_reset_is_not_held_against_it(self) -> None:
+        rig, rover = self.held(R.FRAME_RESET), Rover(Pose(500.0, 0.0, 0.0))
+        run(rig, rover, seconds=10.0)
+        self.release(rig, rover, again=True)
+        run(rig, rover, seconds=2.0)
+        assert rig.state(1) is S.EXECUTING
+
+    def test_released_before_a_paused_one_it_takes_its_place(self) -> None:
+        rig, rover = Rig(), Rover(frame=HERE)
+        rig.submit(LONG)
+        run(rig, rover, seconds=1.0)
+        rig.tasks.run_now(draft(LONG), actor=BY, now=rig.now)
+        rig.keep()
+        run(rig, rover, seconds=1.0)
+        assert rig.states() == [S.PAUSED, S.EXECUTING]
+        rig = rig.restarted(paused={1: R.OPERATOR})
+        assert rig.states() == [S.PAUSED, S.HELD]
+        self.release(rig, rover, again=True, task_id=2)
+        run(rig, rover, seconds=1.0)
+        assert rig.states() == [S.PAUSED, S.EXECUTING]
+        rig.cancel(2)
+        run(rig, rover, seconds=1.0)
+        rig.tasks.proceed(rover.view(rig.now), actor=BY, now=rig.now)
+        run(rig, rover, seconds=1.0)
+        assert rig.states() == [S.EXECUTING, S.CANCELLED]
 
     def test_continuing_says_that_it_must_be_released(self) -> None:
         rig = self.held()
@@ -272,6 +310,20 @@ class TestStop:
         rig.submit(vehicle=2, terms=Terms(after=2))
         rig.tasks.stop(clear=True, actor=BY, now=rig.now)
         assert rig.states() == [S.CANCELLED, S.KILLED, S.CANCELLED, S.FAILED]
+
+    def test_is_released_first_and_then_what_is_held(self) -> None:
+        rig = interrupted()
+        rig.tasks.hold(R.FRAME_RESET, now=rig.now)
+        rig.tasks.stop(clear=False, actor=BY, now=rig.now)
+        assert rig.states() == [S.HELD, S.KILLED]
+        assert rig.tasks.proceed(in_control(rig.now), actor=BY, now=rig.now) is None
+        rig.steps(in_control, seconds=1.0)
+        assert rig.states() == [S.HELD, S.KILLED]
+        seen = in_control(rig.now)
+        rig.tasks.release(rig.task(1), again=True, seen=seen, actor=BY, now=rig.now)
+        rig.keep()
+        rig.steps(in_control, seconds=2 * TICK)
+        assert rig.states() == [S.EXECUTING, S.KILLED]
 
     def test_fails_what_waits_for_what_it_killed(self) -> None:
         rig = begun()

@@ -80,6 +80,14 @@ class TestWhoMayInterrupt:
         rig.steps(in_control, seconds=3.0)
         assert rig.states() == [S.EXECUTING, S.QUEUED, S.BLOCKED]
 
+    def test_who_outranks_is_not_hidden_by_who_has_waited_long(self) -> None:
+        rig = running(Terms(priority=2), queueing=Queueing(preemption_gap=3, aging=60.0))
+        rig.submit(LONG, priority=4)
+        rig.pass_time(600.0)
+        rig.submit(LONG, priority=9)
+        rig.steps(in_control, seconds=3.0)
+        assert rig.states() == [S.PAUSED, S.QUEUED, S.EXECUTING]
+
     def test_nobody_whom_the_running_task_forbids_it(self) -> None:
         rig = running(Terms(is_preemptible=False), queueing=Queueing(preemption_gap=1))
         rig.submit(LONG, terms=replace(URGENT, priority=10))
@@ -179,6 +187,27 @@ class TestAfterwards:
         rig.steps(in_control, seconds=3.0)
         assert rig.states() == [S.HELD, S.CANCELLED, S.QUEUED]
         assert rig.tasks.wait_reason(third) is R.HELD_AHEAD
+
+    def test_a_held_task_aside_blocks_who_is_marked_too(self) -> None:
+        rig = running(Terms())
+        rig.submit(LONG, terms=URGENT)
+        rig.step(in_control)
+        rig.tasks.hold(R.FRAME_RESET, now=rig.now)
+        seen = in_control(rig.now)
+        rig.tasks.release(rig.task(1), again=True, seen=seen, actor=BY, now=rig.now)
+        rig.submit(LONG, terms=replace(URGENT, priority=9))
+        rig.steps(in_control, seconds=4.0)
+        assert rig.states() == [S.EXECUTING, S.HELD, S.QUEUED]
+
+    def test_an_interrupted_one_is_as_urgent_as_who_waits_for_it(self) -> None:
+        rig = running(Terms(priority=0))
+        rig.submit(LONG, terms=URGENT)
+        rig.step(in_control)
+        rig.submit(LONG, priority=5)
+        rig.submit(terms=Terms(priority=9, after=1))
+        rig.cancel(2)
+        rig.steps(in_control, seconds=1.0)
+        assert rig.states() == [S.EXECUTING, S.CANCELLED, S.QUEUED, S.BLOCKED]
 
 
 def end_of(goal: Goal, start: Pose) -> Pose:

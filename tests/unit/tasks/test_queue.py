@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.tasks.queue import Rank, TaskQueue, rank_of
+from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
 from mav_tasks.tasks.task import TaskId
 
 AGING = 60.0
@@ -16,10 +16,14 @@ def rank(priority: int, came_at: float, task_id: int = 1, *, aging: float = AGIN
     return rank_of(priority, came_at=came_at, task_id=TaskId(task_id), aging=aging)
 
 
+def entry(each: Rank, *, priority: int = 5, is_preemptive: bool = False) -> Entry:
+    return Entry(TaskId(each.task_id), each, priority, is_preemptive)
+
+
 def queue_of(*ranks: Rank) -> TaskQueue:
     queue = TaskQueue()
     for each in ranks:
-        queue.put(TaskId(each.task_id), each)
+        queue.put(entry(each))
     return queue
 
 
@@ -71,18 +75,24 @@ def test_what_was_taken_out_leaves_the_others_in_order() -> None:
 
 def test_what_is_put_in_again_has_its_new_place_only() -> None:
     queue = queue_of(rank(5, 0, 1), rank(6, 0, 2))
-    queue.put(TaskId(1), rank(7, 0, 1))
+    queue.put(entry(rank(7, 0, 1)))
     assert (queue.in_order(), len(queue)) == ([1, 2], 2)
 
 
-def test_the_first_that_may_interrupt_is_not_the_first_of_all() -> None:
-    queue = queue_of(rank(9, 0, 1))
-    assert queue.first_preemptive() is None
-    queue.put(TaskId(2), rank(1, 0, 2), is_preemptive=True)
-    queue.put(TaskId(3), rank(2, 0, 3), is_preemptive=True)
-    assert (queue.first(), queue.first_preemptive()) == (1, 3)
-    queue.put(TaskId(3), rank(2, 0, 3))
-    assert queue.first_preemptive() == 2
+def test_those_that_may_interrupt_are_found_by_their_own_priority() -> None:
+    queue = TaskQueue()
+    assert queue.interrupters() == []
+    queue.put(entry(rank(9, 0, 1), priority=4))  # as urgent as one that waits for it
+    assert queue.interrupters() == [1]
+    queue.put(entry(rank(1, 0, 2), priority=1, is_preemptive=True))
+    queue.put(entry(rank(2, 600, 3), priority=2, is_preemptive=True))  # behind the aged one
+    assert (queue.first(), queue.interrupters()) == (1, [3, 1])
+    queue.put(entry(rank(5, 900, 4), priority=5))
+    assert (queue.first(), queue.interrupters()) == (1, [3, 4])
+    queue.put(entry(rank(2, 0, 3), priority=2))
+    assert queue.interrupters() == [2, 4]
+    queue.discard(TaskId(2))
+    assert queue.interrupters() == [4]
 
 
 @pytest.mark.parametrize(("first", "count", "page"), [(0, 2, [1, 2]), (2, 9, [3]), (7, 2, [])])
@@ -94,9 +104,13 @@ def test_a_page_is_a_part_of_the_order(first: int, count: int, page: list[int]) 
 def test_many_at_once_are_the_same_as_one_by_one() -> None:
     ranks = [rank(n % 11, n % 7, n) for n in range(1, 200)]
     at_once = TaskQueue()
-    at_once.put_all((TaskId(r.task_id), r, r.task_id % 3 == 0) for r in ranks)
-    assert at_once.in_order() == queue_of(*ranks).in_order()
-    assert at_once.first_preemptive() is not None
+    one_by_one = TaskQueue()
+    entries = [entry(r, priority=r.task_id % 11, is_preemptive=r.task_id % 3 == 0) for r in ranks]
+    at_once.put_all(entries)
+    for each in entries:
+        one_by_one.put(each)
+    assert at_once.in_order() == one_by_one.in_order()
+    assert at_once.interrupters() == one_by_one.interrupters()
 
 
 def test_an_empty_queue_has_no_first() -> None:

@@ -156,8 +156,8 @@ class TestFromQueueToEnd:
     def test_a_move_counts_from_the_heading_at_its_start(self) -> None:
         rig = Rig()
         rig.submit()
-        rig.step(idle)
         turned = Pose(5.0, 5.0, pi / 2)
+        rig.step(lambda now: idle_vehicle(at=now, pose=turned))
         rig.step(lambda now: ours(at=now, pose=turned, still=True))
         rig.step(lambda now: ours(at=now, pose=replace(turned, east=6.0)))
         assert rig.book[TaskId(1)].progress.anchor == turned

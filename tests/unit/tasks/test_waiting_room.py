@@ -147,8 +147,9 @@ class TestDependencies:
         rig = Rig()
         first = rig.submit()
         second = rig.submit(after=first)
+        third = rig.submit(after=second, vehicle=2)
         rig.room.withdraw(rig.book[first], now=rig.now)
-        assert rig.state(second) == (S.FAILED, R.DEPENDENCY_FAILED)
+        assert [rig.state(t) for t in (second, third)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
 
 
 class TestUrgency:
@@ -174,9 +175,17 @@ class TestUrgency:
     def test_of_a_preemptive_one_is_seen(self) -> None:
         rig = Rig()
         task = rig.submit()
-        assert rig.room.queue(1).first_preemptive() is None
+        rig.submit(priority=9)
+        assert task not in rig.room.queue(1).interrupters()
         rig.modify(task, is_preemptive=True)
-        assert rig.room.queue(1).first_preemptive() == task
+        assert task in rig.room.queue(1).interrupters()
+
+    def test_of_what_has_begun_is_inherited_too(self) -> None:
+        rig = Rig()
+        begun, other = rig.submit(priority=0), rig.submit(priority=5)
+        rig.room.leave(rig.book[begun])
+        rig.submit(priority=9, after=begun)
+        assert rig.room.rank(rig.book[begun]) < rig.room.rank(rig.book[other])
 
 
 class TestBounds:
@@ -209,3 +218,29 @@ def test_what_is_restored_waits_as_before() -> None:
     assert again.room.count(1) == 4
     again.pass_to(300.0)
     assert again.state(tasks[1])[0] is S.QUEUED
+
+
+def test_the_failure_of_what_is_needed_is_not_forgotten_over_a_restart() -> None:
+    rig = Rig()
+    needed = rig.submit()
+    rig.submit(after=needed)
+    rig.submit(after=2, vehicle=2)
+    # the end of the one was kept, the failures that follow from it were not
+    over = replace(rig.book[needed], state=S.CANCELLED)
+    before = [over, *rig.book.all()[1:]]
+    again = Rig()
+    again.book.restore(before, next_id=4)
+    again.room.restore(before, now=150.0)
+    assert [again.state(t) for t in (2, 3)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
+    assert (again.order(1), again.order(2)) == ([], [])
+
+
+def test_inherited_urgency_is_restored_whatever_the_order_of_ids() -> None:
+    rig = Rig()
+    first, second, third = rig.submit(priority=10), rig.submit(priority=1), rig.submit(priority=5)
+    rig.modify(first, after=second)
+    before = rig.book.all()
+    again = Rig()
+    again.book.restore(before, next_id=4)
+    again.room.restore(before, now=150.0)
+    assert again.order() == rig.order() == [second, third]
