@@ -6,6 +6,7 @@ from math import isfinite
 from mav_tasks.engine import translate
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -24,7 +25,8 @@ MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
 class Displays:
     """Answers to REQUEST_MESSAGE and to the commands about intervals."""
 
-    def __init__(self, vehicles: VehicleSide, book: TaskBook) -> None:
+    def __init__(self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook) -> None:
+        self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
 
@@ -99,7 +101,7 @@ class Displays:
             task,
             vehicle.tasks,
             reader=reader,
-            link_number=0,
+            link_number=self._gcs.link_number(task.submitter.link),
             with_position=with_position,
             now=now,
         )

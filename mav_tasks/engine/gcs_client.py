@@ -39,6 +39,7 @@ class GcsClient:
         self.statuses = TaskStatusSender(rate=settings.status_rate, now=now)
         self._texts = RateLimit(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
+        self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
         self._introduced: set[int] = set()
         self._submitters: dict[Address, Submitter] = {}  # made once: each command asks for it
         self._receivers: dict[Address, CommandReceiver] = {}
@@ -134,7 +135,17 @@ class GcsClient:
         if not self.is_heard or not self.knows(source.system_id):
             return
         if severity > MavSeverity.WARNING and not self._texts.take(now=now):
+            self._left_out[source] = self._left_out.get(source, 0) + 1
             return
+        self._say(text, severity, source)
+
+    def tell_what_was_left_out(self, *, now: float) -> None:
+        """Say how many texts were too many, in one for each who said them."""
+        while self._left_out and self._texts.take(now=now):
+            source, count = self._left_out.popitem()
+            self._say(f"{count} more messages: see the queue", MavSeverity.INFO, source)
+
+    def _say(self, text: str, severity: MavSeverity, source: Address) -> None:
         self._text_id = self._text_id % 0xFFFF + 1
         for chunk in statustext.chunks(severity, text, text_id=self._text_id):
             self.outlet.send(chunk, source)

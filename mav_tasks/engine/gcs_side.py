@@ -18,6 +18,8 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatSender
 from mav_tasks.settings import Settings
 
+MAX_LINK_NUMBER = 255  # of its field in TASK_STATUS
+
 
 class Received(NamedTuple):
     """A packet of a client. ``message`` is None when its id is not in the dialect."""
@@ -38,6 +40,7 @@ class GcsSide:
         self._settings = settings
         self._decoder = Decoder()
         self._links: set[str] = set()
+        self._link_numbers: dict[str, int] = {}  # from 1, in the order in which links came
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
         self.heartbeat = HeartbeatSender(now=now)
 
@@ -57,8 +60,13 @@ class GcsSide:
                 del self._clients[key]
             return
         self._links.add(change.link)
+        self._link_numbers.setdefault(change.link, len(self._link_numbers) + 1)
         for peer in change.peers:
             self._add(change.link, peer, is_configured=True, now=now)
+
+    def link_number(self, link: str) -> int:
+        """Give a client link's number, from 1; 0 for one that is not there in this run."""
+        return min(self._link_numbers.get(link, 0), MAX_LINK_NUMBER)
 
     def owns(self, link: str) -> bool:
         """Whether a link of this name is a client link."""

@@ -74,6 +74,8 @@ class Publisher:
         if self._gcs.heartbeat.is_due(now=now):
             self._gcs.forget_silent(now=now)
             self._send_heartbeats(now=now)
+            for client in self._gcs:
+                client.tell_what_was_left_out(now=now)
         self.send_statuses(now=now)
 
     def send_statuses(self, *, now: float) -> None:

@@ -1,0 +1,60 @@
+"""What people at ground stations read, and what TASK_STATUS says of who submitted."""
+
+import re
+
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import REQUEST, TASK_STATUS
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+INFO, NOTICE, WARNING, ERROR = 6, 5, 4, 3
+TEXTS = 300
+
+
+def test_what_is_too_much_at_once_is_counted_and_nothing_urgent_is_left_out(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world()
+    listener = world.add_client("listener", system_id=254)
+    world.run(1)
+    listener.received.clear()
+    for number in range(TEXTS):
+        world.client.command(54000, 1.0, 0, 0, number + 1, 0, 500.0, 5)
+        if number % 50 == 0:
+            world.client.command(54000, float("nan"))  # refused, and said to who asked
+        world.run(0.01)
+    world.run(3)
+    texts = listener.texts()
+    queued = [text for text in texts if re.fullmatch(r"Task \d+ queued: move 1 m", text)]
+    left_out = [int(found[1]) for text in texts if (found := re.match(r"(\d+) more ", text))]
+    assert 10 <= len(queued) < 100
+    assert len(queued) + sum(left_out) == TEXTS
+    assert len(texts) == len(queued) + len(left_out)
+    refused = [text for text in world.client.texts() if "not given" in text]
+    assert len(refused) == TEXTS // 50
+
+
+def test_each_change_has_its_severity(world: World) -> None:
+    world.client.move(1)
+    world.client.command(54000, 1.0, 0, 0, 9, 0, 0, 5, repeats=(0.0,))
+    world.until_idle(tasks=2)
+    world.client.command(54000, 1.0, 0, 0, 0, 0, 500.0, 5)
+    world.client.command(54012, 3, 3, 0.2)  # a deadline
+    world.until_state(3, S.EXPIRED)
+    world.run(0.2)
+    said = {m.text: m.severity for m in world.client.of_type("STATUSTEXT")}
+    assert said["Task 1 queued: move 1 m"] == INFO
+    assert said["Task 1 started"] == INFO
+    assert said["Task 1 done"] == NOTICE
+    assert next(s for text, s in said.items() if text.startswith("Task 3 expired")) == ERROR
+    assert not any(text.endswith("\t") for text in said)
+
+
+def test_a_status_says_from_which_link_a_task_came(world: World) -> None:
+    world.client.move(1)
+    world.run(0.1)
+    world.client.command(REQUEST, TASK_STATUS, 1)
+    world.run(0.1)
+    (*_, status) = world.client.statuses(1)
+    submitter = status.submitter_system, status.submitter_component, status.submitter_link
+    assert submitter == (255, 190, 1)
