@@ -1,5 +1,6 @@
 """Every setting of the server, as frozen values with unit, default and effect. Pure."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import radians
 
@@ -38,6 +39,7 @@ class Watch:
     lost_timeout: float = 30.0  # paused LINK_LOST or POSITION_LOST for longer than this fails
     fresh_before_resume: float = 2.0  # of good data, before a lost task resumes by itself
     stuck: float = 10.0  # commanded without progress for this long fails, STUCK
+    operator_lost: float = 5.0  # without a ground station's heartbeat; ArduPilot's FS_GCS_TIMEOUT
     other_controller: float = 2.0  # since the last setpoint of somebody else
     commit: float = 0.4  # a submission not durable by then is withdrawn
     forward_answer: float = 0.4  # a forwarded command not answered by then is refused
@@ -68,8 +70,11 @@ class Clients:
     forget_after: float = 60.0  # s, a client silent for longer is forgotten
     push_lost: float = 5.0  # s, an address pushed to that is silent for longer gets heartbeats only
     stream_interval: float = 0.1  # s, between telemetry messages of one id, unless asked otherwise
-    text_rate: float = 10.0  # STATUSTEXT per second to one client; beyond that they are dropped
+    text_rate: float = 10.0  # STATUSTEXT per second to one client; beyond they are only counted
     status_rate: float = 50.0  # pushed TASK_STATUS per second to one client; beyond: coalesced
+    #: priority of the standard commands of a client, 0–10, by its MAVLink address, "255/190", or by
+    #: address and endpoint, "255/190@127.0.0.1:14550"; of others 5
+    priorities: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +100,8 @@ class Settings:
     claim: bool = True
     #: what a "go to" that changes the mode does: "queue", or run at once, "now"
     guided: str = "queue"
+    #: when no ground station is heard any more: "continue", or "pause" every vehicle's tasks
+    operator_lost: str = "continue"
     #: after a failed task that had moved: "pause" the queue or "continue"
     on_failure: str = "pause"
     #: after an unclean end, or a long one: "pause" the queues or "continue"

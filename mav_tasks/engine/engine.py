@@ -25,6 +25,7 @@ from mav_tasks.engine.inputs import (
     WallClock,
 )
 from mav_tasks.engine.motion_gate import may_pass
+from mav_tasks.engine.operator_watch import OperatorWatch
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
@@ -73,7 +74,7 @@ class Engine:
         if restored is not None:
             recollection.restore(restored.tasks, now=now)
         self._submissions = Submissions(self._gcs, self._book, recollection, settings)
-        displays = Displays(self._vehicles, self._book)
+        displays = Displays(self._gcs, self._vehicles, self._book)
         self._commands = Commands(
             self._gcs,
             self._vehicles,
@@ -84,6 +85,7 @@ class Engine:
             settings,
         )
         self._publisher = Publisher(self._gcs, self._vehicles, self._book, displays)
+        self._operator = OperatorWatch()
         self._stop_by: float | None = None
         self._stopped = False
         #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``:
@@ -125,6 +127,7 @@ class Engine:
             self._vehicles.next_deadline(),
             self._submissions.next_deadline(),
             self._fleet.room.next_deadline(),
+            self._operator.next_deadline(limit=self._settings.watch.operator_lost),
             None if self._stopped else self._stop_by,
         ]
         due = min((d for d in deadlines if d is not None), default=inf)
@@ -136,6 +139,7 @@ class Engine:
         self._vehicles.handle_deadline(now=now)
         self._submissions.handle_deadline(now=now)
         self._fleet.room.handle_deadline(now=now)
+        self._watch_operator(now=now)
         self._settle(now=now)
         self._publisher.handle_deadline(now=now)
 
@@ -207,6 +211,8 @@ class Engine:
         elif isinstance(message, m.SetMode):
             self._commands.set_mode(client, packet, message, now=now)
         elif packet.message_id not in CLAIMED:
+            if isinstance(message, m.Heartbeat):
+                self._operator.receive(message, now=now)
             self._forward(client, received, now=now)
 
     def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
@@ -216,6 +222,12 @@ class Engine:
         for vehicle in self._vehicles.addressed_by(target.system_id):
             if target != vehicle.server_address and may_pass(vehicle, client.key, message, now=now):
                 vehicle.requests.forward(received.packet)
+
+    def _watch_operator(self, *, now: float) -> None:
+        is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)
+        if is_lost and self._settings.operator_lost == "pause":
+            for vehicle in self._vehicles.addressed_by(0):
+                vehicle.operator_lost(now=now)
 
     def _settle(self, *, now: float) -> None:
         """Bring vehicles' answers to clients, and what happened to clients and the journal."""

@@ -66,19 +66,29 @@ class Wish(NamedTuple):
     marks: Marks
 
 
-def wish_of(command: Command, packet: bytes, driving: Driving, *, now: float) -> Wish:
-    """Give what a command that becomes a task asks for; Rejection names a bad parameter."""
+def wish_of(
+    command: Command,
+    packet: bytes,
+    driving: Driving,
+    *,
+    now: float,
+    priority: int = DEFAULT_PRIORITY,
+) -> Wish:
+    """Give what a command that becomes a task asks for; Rejection names a bad parameter.
+
+    ``priority`` is that of a standard command, which cannot name one.
+    """
     if command.frame is not None and command.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
     goal = _GOALS[command.command](command, driving)
     if command.command not in OURS:
-        return Wish(goal, Terms(), marks_of(command, packet))
+        return Wish(goal, Terms(priority=priority), marks_of(command, packet))
     marks = marks_of(command, packet, nonce=whole(command, 4, "nonce", high=MAX_TASK_ID))
     after = whole(command, 5, "run after", high=MAX_TASK_ID)
     delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
-    priority = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
+    named = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
     start_at = now + delay if delay > 0 else None
-    return Wish(goal, Terms(priority=priority, after=after, start_at=start_at), marks)
+    return Wish(goal, Terms(priority=named, after=after, start_at=start_at), marks)
 
 
 def becomes_task(number: int) -> bool:

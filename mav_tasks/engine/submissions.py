@@ -14,7 +14,16 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.recollection import Known, Recollection, Rule
-from mav_tasks.tasks.task import Draft, Task, TaskId, describe
+from mav_tasks.tasks.task import (
+    DEFAULT_PRIORITY,
+    Draft,
+    Goal,
+    GoTo,
+    Submitter,
+    Task,
+    TaskId,
+    describe,
+)
 
 R = TaskReason
 
@@ -63,14 +72,17 @@ class Submissions:
         """Take in the task that a command asks for; Rejection says why not."""
         command, vehicle = asked.command, asked.vehicle
         asked.client.uses_dialect = True
-        wish = wish_of(command, asked.packet.raw, self._settings.driving, now=now)
+        submitter = asked.client.submitter(asked.packet.source)
+        wish = wish_of(
+            command,
+            asked.packet.raw,
+            self._settings.driving,
+            now=now,
+            priority=self._priority_of(submitter),
+        )
+        self._check_reach(vehicle, wish.goal)
         draft = Draft(
-            vehicle.system_id,
-            command.command,
-            wish.goal,
-            asked.client.submitter(asked.packet.source),
-            wish.terms,
-            wish.marks,
+            vehicle.system_id, command.command, wish.goal, submitter, wish.terms, wish.marks
         )
         known = self._recollection.known(
             draft, confirmation=command.confirmation, origin=vehicle.origin, now=now
@@ -104,6 +116,23 @@ class Submissions:
             self._check_open()
             task = vehicle.run_now(draft, actor=actor, now=now)
             self._recollection.remember(task, at=now, now=now)
+
+    def _priority_of(self, submitter: Submitter) -> int:
+        priorities = self._settings.clients.priorities
+        if not priorities:
+            return DEFAULT_PRIORITY
+        by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
+        return priorities.get(str(submitter), by_address)
+
+    def _check_reach(self, vehicle: Vehicle, goal: Goal) -> None:
+        """A slip of a digit in a place is a drive that nobody meant."""
+        if not isinstance(goal, GoTo):
+            return
+        far = vehicle.distance_to(goal)
+        longest = self._settings.driving.max_distance
+        if far is not None and far > longest:
+            words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+            raise Rejection(R.BAD_PARAMETER, words)
 
     def _check_open(self) -> None:
         if self._is_closing:

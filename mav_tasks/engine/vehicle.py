@@ -23,8 +23,10 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Draft, GlobalPlace, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, GlobalPlace, GoTo, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
@@ -381,6 +383,19 @@ class Vehicle:
     def home(self) -> GlobalPlace | None:
         """Where the vehicle returns to, if it has said so."""
         return self._frame.home
+
+    def distance_to(self, goal: GoTo) -> float | None:
+        """Give the metres to the place that a goal means, or None while that is not known."""
+        motion, origin = self._motion.latest(), self._frame.origin
+        place = local_place(self.home if goal.place is None else goal.place, origin)
+        return None if motion is None or place is None else distance(motion.pose, place)
+
+    def operator_lost(self, *, now: float) -> None:
+        """No ground station is heard any more: nothing runs unseen."""
+        if self.tasks.is_empty or self.tasks.paused:
+            return
+        self._note("no ground station is heard: paused", now=now)
+        self.pause(actor=SERVER, now=now)
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
         """Let task and queue stand; zeros leave in this very step."""

@@ -8,7 +8,7 @@ places are metres apart at 10 km.
 
 from math import cos, radians
 
-from mav_tasks.tasks.task import GlobalPlace, LocalPlace
+from mav_tasks.tasks.task import GlobalPlace, LocalPlace, Place
 
 METRES_PER_DEGE7 = 0.011131884502145034
 HALF_TURN = 1_800_000_000  # degE7
@@ -22,6 +22,13 @@ def to_local(place: GlobalPlace, origin: GlobalPlace) -> LocalPlace:
         (place.latitude_degE7 - origin.latitude_degE7) * METRES_PER_DEGE7,
         east * METRES_PER_DEGE7 * scale,
     )
+
+
+def local_place(place: Place | None, origin: GlobalPlace | None) -> LocalPlace | None:
+    """Give a place of either kind in the local frame, or None while that is not known."""
+    if isinstance(place, GlobalPlace):
+        return None if origin is None else to_local(place, origin)
+    return place
 
 
 def to_global(place: LocalPlace, origin: GlobalPlace) -> GlobalPlace:

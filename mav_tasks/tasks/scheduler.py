@@ -1,9 +1,9 @@
 """Which task may run, what it waits for, and which may interrupt which: pure decisions."""
 
 from mav_tasks.settings import Queueing, Watch
-from mav_tasks.tasks.frames import to_local
+from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import GlobalPlace, Goal, GoTo, LocalPlace, Task
+from mav_tasks.tasks.task import Goal, GoTo, LocalPlace, Task
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 
@@ -31,10 +31,7 @@ def start_blocker(
 
 def place_of(goal: GoTo, view: VehicleView) -> LocalPlace | None:
     """Give the place that a goal means in the vehicle's frame, or None while that is not known."""
-    place = view.home if goal.place is None else goal.place
-    if isinstance(place, GlobalPlace):
-        return None if view.origin is None else to_local(place, view.origin)
-    return place
+    return local_place(view.home if goal.place is None else goal.place, view.origin)
 
 
 def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:

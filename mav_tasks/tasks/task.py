@@ -191,7 +191,12 @@ class Submitter:
     component_id: int
 
     def __str__(self) -> str:
-        return f"{self.system_id}/{self.component_id}@{self.endpoint}"
+        return f"{self.address}@{self.endpoint}"
+
+    @property
+    def address(self) -> str:
+        """The MAVLink address in words."""
+        return f"{self.system_id}/{self.component_id}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,6 +110,11 @@ class VehicleTasks:
         return not self.is_driving and len(self._queue) == 0
 
     @property
+    def is_empty(self) -> bool:
+        """Whether there is no task at all that is not over."""
+        return not self.is_driving and self._room.count(self.vehicle) == 0
+
+    @property
     def awaits_commit(self) -> bool:
         """Whether the next task waits for nothing but its submission being durable."""
         first = None if self.begun is not None else self._next()

@@ -1,5 +1,6 @@
 """The commands that stock clients send without knowing of tasks become tasks all the same."""
 
+from dataclasses import replace
 from math import hypot, nan
 from typing import Any
 
@@ -228,3 +229,30 @@ def test_while_stopped_they_wait(world: World) -> None:
     assert [world.state(i)[0] for i in (1, 2)] == [S.QUEUED, S.QUEUED]
     assert world.stands()
     assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_clients_default_priority_is_that_of_its_standard_commands(
+    make_world: MakeWorld,
+) -> None:
+    priorities = {"255/190": 7, "245/190": 2, "245/190@script": 9}
+    clients = replace(Settings().clients, priorities=priorities)
+    world = make_world(settings=replace(Settings(), clients=clients))
+    others = [world.add_client(name, system_id=245) for name in ("script", "another")]
+    world.add_client("nobody", system_id=7).command(DELAY, 1.0)
+    for client in (world.client, *others):
+        world.run(0.1)
+        client.command(DELAY, 1.0)
+    world.run(0.1)
+    world.client.command(54000, 1.0, 0, 0, 0, 0, 0, nan)
+    world.run(0.1)
+    assert [task.priority for task in world.tasks()] == [5, 7, 9, 2, 5]
+
+
+def test_a_place_beyond_all_reach_is_refused(world: World) -> None:
+    far = world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(12_000.0, 0.0), frame=GLOBAL)
+    world.run(0.1)
+    assert far.answer == (DENIED, R.BAD_PARAMETER)
+    assert any("12.0 km away, more than 10 km" in text for text in world.client.texts())
+    near = world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(9_900.0, 0.0), frame=GLOBAL)
+    world.run(0.1)
+    assert near.answer == (ACCEPTED, 1)

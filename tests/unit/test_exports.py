@@ -58,6 +58,7 @@ def test_every_setting_is_known_by_name() -> None:
             "stream_interval",
             "text_rate",
             "status_rate",
+            "priorities",
         ],
         "Driving": [
             "speed",
@@ -83,6 +84,7 @@ def test_every_setting_is_known_by_name() -> None:
             "arming",
             "claim",
             "guided",
+            "operator_lost",
             "on_failure",
             "on_restart",
         ],
@@ -97,6 +99,7 @@ def test_every_setting_is_known_by_name() -> None:
             "lost_timeout",
             "fresh_before_resume",
             "stuck",
+            "operator_lost",
             "other_controller",
             "commit",
             "forward_answer",
