@@ -9,6 +9,7 @@ import logging
 import signal
 import time
 from collections.abc import Callable, Sequence
+from math import inf
 
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
@@ -34,7 +35,9 @@ from mav_tasks.tasks.events import (
 
 log = logging.getLogger("mav_tasks")
 
-DRAIN = 64  # datagrams read from one link before the others and the timer have their turn
+DRAIN = 64  # datagrams read from one link before the others have their turn
+AT_A_TIME = 8  # of them, taken in even when a setpoint is due
+EACH_TAKES = 1e-4  # s, about, to take one in: so many are, before the time asks for something
 WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 
 EXIT_FAILED = 70  # EX_SOFTWARE: the engine itself failed
@@ -145,9 +148,18 @@ class Runner:
             self._close_store()
 
     def _on_readable(self, link: Link) -> None:
+        """Take in what came, but let no setpoint wait for all of it."""
+        assert self._loop is not None
+        assert self._over is not None
         datagrams = link.receive(DRAIN)
-        if datagrams:
-            self._guarded(Packets(link.name, datagrams))
+        while datagrams and not self._over.done():
+            due = self._timer.when() if self._timer is not None else inf
+            left = due - self._loop.time()
+            count = max(AT_A_TIME, int(min(left / EACH_TAKES, DRAIN)))
+            self._guarded(Packets(link.name, datagrams[:count]))
+            datagrams = datagrams[count:]
+            if datagrams and self._timer is not None and self._timer.when() <= self._loop.time():
+                self._guarded(None)
 
     def _on_stored(self) -> None:
         self._guarded(None)

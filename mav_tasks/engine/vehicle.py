@@ -30,6 +30,7 @@ from mav_tasks.tasks.task import Draft, GlobalPlace, GoTo, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
+GOLDEN = 0.6180339887  # its multiples are never close together, modulo 1
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
@@ -81,6 +82,7 @@ class Vehicle:
         self.control.heard(armed=self._monitor.armed, mode=self._monitor.custom_mode, now=now)
         self._authority = Authority(persona, may_arm=may_arm)
         self._next_tick = inf
+        self._phase = system_id * GOLDEN % 1.0  # of a period: evenly spread, however many there are
         self._was_heard = True
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
@@ -323,7 +325,7 @@ class Vehicle:
 
     def _begin_stop(self, *, now: float) -> None:
         self.control.begin_stop(now=now)
-        self._next_tick = now + self._settings.watch.setpoint_period
+        self._next_tick = self._tick_after(now)
         self.requests.flush(now=now)
 
     def hold(self, *, actor: str, now: float) -> TaskId | None:
@@ -336,7 +338,7 @@ class Vehicle:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.control.begin_release(now=now)
         self.requests.flush(now=now)
-        self._next_tick = now + self._settings.watch.setpoint_period
+        self._next_tick = self._tick_after(now)
         return paused
 
     def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
@@ -480,9 +482,13 @@ class Vehicle:
         if not self.control.is_engaged and self.tasks.begun is None:
             self._next_tick = inf
         elif now >= self._next_tick or self._next_tick == inf:
-            period = self._settings.watch.setpoint_period
-            following = self._next_tick + period
-            self._next_tick = following if now < following < inf else now + period
+            following = self._next_tick + self._settings.watch.setpoint_period
+            self._next_tick = following if now < following < inf else self._tick_after(now)
+
+    def _tick_after(self, now: float) -> float:
+        """Give the next tick, within a period: each vehicle's are at another time than others'."""
+        period = self._settings.watch.setpoint_period
+        return now + period - (now - self._phase * period) % period
 
     def view(self, *, now: float) -> VehicleView:
         """Give one look at the vehicle for the task domain."""

@@ -1,5 +1,7 @@
 """What a task waits for, and what becomes of it when the rover does not want to."""
 
+from itertools import pairwise
+
 import pytest
 
 from mav_tasks.settings import Settings
@@ -158,3 +160,16 @@ def test_mode_zero_arm_zeros_motion(world: World) -> None:
     sent = [name for name in world.observer.sent_since(at) if name != "511"]
     order = [name for k, name in enumerate(sent) if k == 0 or sent[k - 1] != name]
     assert order == ["GUIDED", "zero", "arm", "zero", "move", "zero", "HOLD", "disarm"]
+
+
+def test_setpoints_to_many_rovers_leave_at_different_times(make_world: MakeWorld) -> None:
+    rovers = 5
+    world = make_world(rovers=rovers)
+    for number in range(1, rovers + 1):
+        world.client.move(20, target=(number, 191), nonce=number)
+    world.run(6)
+    period = Settings().watch.setpoint_period
+    phases = [observer.driven[-1][0] % period / period for observer in world.observers]
+    ordered = sorted(phases)
+    gaps = [b - a for a, b in pairwise([*ordered, ordered[0] + 1.0])]
+    assert min(gaps) > 0.5 / rovers

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import Committed, Outgoing, StoreFailed
+from mav_tasks.engine.inputs import Committed, Outgoing, Packets, StoreFailed
 from mav_tasks.runner import Pump, Runner
 from mav_tasks.serve import open_store
 from mav_tasks.settings import Settings
@@ -88,3 +88,62 @@ def test_where_the_store_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         assert isinstance(store, SqliteStore)
         assert Path(store.name).is_relative_to(tmp_path.resolve())
         assert store.name.endswith("mav-tasks/mav-tasks.sqlite3")
+
+
+class Flood:
+    """A link from which much is read at once; its descriptor is readable as long as it is open."""
+
+    name = "flood"
+    peers: tuple[object, ...] = ()
+    is_local = True
+
+    def __init__(self, count: int) -> None:
+        self.left = [(("127.0.0.1", 1), b"x")] * count
+        self._read, self._write = os.pipe()
+        os.write(self._write, b"!")
+
+    def fileno(self) -> int:
+        return self._read
+
+    def receive(self, limit: int) -> list[tuple[tuple[str, int], bytes]]:
+        taken, self.left = self.left[:limit], self.left[limit:]
+        return taken
+
+    def close(self) -> None:
+        os.close(self._read)
+        os.close(self._write)
+
+
+@pytest.mark.parametrize("is_due", [True, False])
+def test_what_is_due_does_not_wait_for_all_that_came(is_due: bool) -> None:
+    async def run() -> list[str]:
+        loop = asyncio.get_running_loop()
+        engine, seen, came = Engine(Settings(), now=loop.time()), list[str](), asyncio.Event()
+        engine.take_events = engine.take_packets = list  # type: ignore[method-assign]
+
+        def handle(item: object, *, now: float) -> None:
+            if isinstance(item, Packets):
+                seen.append(f"{len(item.datagrams)} in")
+                came.set()
+
+        def handle_deadline(*, now: float) -> None:
+            seen.append("due")
+
+        engine.handle = handle  # type: ignore[method-assign]
+        engine.handle_deadline = handle_deadline  # type: ignore[method-assign]
+        engine.next_deadline = lambda: loop.time() + (0.0 if is_due else 60.0)  # type: ignore[method-assign]
+        runner = Runner(engine, MemoryStore(), clients=[], vehicles=[Flood(40)])  # type: ignore[list-item]
+        running = loop.create_task(runner.run())
+        await asyncio.wait_for(came.wait(), 10)
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.02)
+        await asyncio.wait_for(running, 10)
+        return seen
+
+    seen = asyncio.run(run())
+    first = next(index for index, what in enumerate(seen) if "in" in what)
+    if is_due:
+        assert seen[first : first + 4] == ["8 in", "due", "8 in", "due"]
+    else:
+        assert seen[first] == "40 in"
