@@ -60,6 +60,7 @@ def serve(
             for number, url in enumerate(client_urls)
         ]
         vehicle_links = [_open_link(opened, url) for url in vehicle_urls]
+        tame_collector()  # before many tasks are read: it would look through them again and again
         journal = open_store(store)
         opened.callback(journal.close)
         restored = journal.load() if isinstance(journal, SqliteStore) else None

@@ -28,6 +28,9 @@ Format = Mapping[str, tuple[str, ...]]
 #: value, offset -> value for JSON, or back
 Converter = Callable[[Any, float], Any]
 
+SAMPLE = 50  # values of a kind, by which to see whether many are equal
+MOST_SHARED = 10_000  # equal values of a kind, of which one is made for all
+
 _PLAIN = frozenset({int, float, str, bool, NoneType})
 
 # Circles are looked for by an entry in a dict for each list: values have none.
@@ -202,17 +205,20 @@ def _builder(
             sources[field.name] = _builder(hints[field.name], places, f"{path}.")
     takes = tuple(sources.values())
     make = _maker(kind, tuple(sources))
+    shared: dict[tuple[Any, ...], Any] = {}
 
     def build(columns: list[Sequence[Any]]) -> list[Any]:
         parts = [take(columns) for take in takes]
         if not prefix:
             return list(map(make, *parts))
         rows = list(zip(*parts, strict=True))
-        different = dict.fromkeys(rows)
-        if 2 * len(different) > len(rows):
+        if 2 * len(set(rows[:SAMPLE])) > len(rows[:SAMPLE]):  # as marks are: all different
             return list(map(make, *parts))
-        shared = {row: make(*row) for row in different}  # as most terms and submitters are
-        return [shared[row] for row in rows]
+        different = dict.fromkeys(rows)
+        if len(shared) > MOST_SHARED:
+            shared.clear()
+        shared.update((row, make(*row)) for row in different if row not in shared)
+        return [shared[row] for row in rows]  # as most terms and submitters are
 
     return build
 

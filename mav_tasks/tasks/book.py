@@ -4,8 +4,8 @@ All state changes of tasks go through here, so that the journal and the tasks ca
 Events are numbered from 1; the store reports back up to which number they are durable.
 """
 
-from collections import deque
-from collections.abc import Iterable
+from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import replace
 
 from mav_tasks.errors import Rejection
@@ -58,13 +58,15 @@ class TaskBook:
         """Give how many tasks of a vehicle are in each state; the index is the TaskState."""
         return list(self._counts.get(vehicle, [0] * len(TaskState)))
 
-    def restore(self, tasks: Iterable[Task], *, next_id: int) -> None:
+    def restore(self, tasks: Sequence[Task], *, next_id: int) -> None:
         """Take over the tasks of an earlier run, all of them durable."""
         self._next_id = next_id
+        self._tasks.update((task.id, task) for task in tasks)
+        self._last_event.update(dict.fromkeys(self._tasks, 0))
+        counts = Counter((task.vehicle, task.state) for task in tasks)
+        for (vehicle, state), count in counts.items():
+            self._counts.setdefault(vehicle, [0] * len(TaskState))[state] += count
         for task in tasks:
-            self._tasks[task.id] = task
-            self._last_event[task.id] = 0
-            self._count(task, 1)
             if task.state in TERMINAL:
                 self._finished.append(task.id)
             else:

@@ -79,9 +79,12 @@ class Recollection:
         self._nonces: dict[tuple[int, int, int], TaskId] = {}
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
-        """Remember the tasks of an earlier run, oldest first."""
+        """Remember the tasks of an earlier run, oldest first: all nonces, and what came lately."""
         for task in tasks:
-            self.remember(task, at=task.submitted_at, now=now)
+            if now - task.submitted_at <= LONGEST:
+                self.remember(task, at=task.submitted_at, now=now)
+            elif task.marks.nonce:
+                self._nonces[_key(task.submitter, task.marks.nonce)] = task.id
 
     def known(
         self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
@@ -129,9 +132,11 @@ class Recollection:
             if len(self._clients) >= MANY_CLIENTS:
                 self._forget_old(now=now)
             client = self._clients[submitter] = _Client()
+        client.at = at
+        if marks.nonce and not isinstance(task.goal, GoTo):
+            return  # known by its nonce alone
         draft = Draft(task.vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
-        client.at = at
         if isinstance(task.goal, GoTo):
             client.goal = last
         if marks.nonce:

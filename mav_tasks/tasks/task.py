@@ -190,6 +190,9 @@ class Submitter:
     system_id: int
     component_id: int
 
+    def __hash__(self) -> int:
+        return hash(self.endpoint)  # nearly unique, and a string keeps its hash
+
     def __str__(self) -> str:
         return f"{self.address}@{self.endpoint}"
 

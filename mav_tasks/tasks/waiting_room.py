@@ -88,6 +88,8 @@ class WaitingRoom:
         return self._due_by(task.terms)
 
     def _due_by(self, terms: Terms) -> float:
+        if terms.start_utc is None and terms.start_at is None:  # as nearly always
+            return -inf
         from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
         return max(from_utc, -inf if terms.start_at is None else terms.start_at)
 
