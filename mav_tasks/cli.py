@@ -50,6 +50,12 @@ def serve(
             help="Where tasks are kept; default: mav-tasks.sqlite3 in the user's data folder.",
         ),
     ] = None,
+    keep_days: Annotated[
+        float, typer.Option(min=0.0, help="Forget finished tasks after so many days.")
+    ] = 30.0,
+    keep_tasks: Annotated[
+        int, typer.Option(min=0, help="Keep so many finished tasks at the most.")
+    ] = 10_000,
     insecure: Annotated[
         bool, typer.Option("--insecure", help="Allow links that other machines can reach.")
     ] = False,
@@ -65,6 +71,8 @@ def serve(
             arming=arming,
             store=store,
             insecure=insecure,
+            keep_days=keep_days,
+            keep_tasks=keep_tasks,
         )
     )
 

@@ -19,7 +19,7 @@ from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, parse_endpoint, parse_url, refuse_insecure
 from mav_tasks.runner import Runner
-from mav_tasks.settings import ARMING, Settings
+from mav_tasks.settings import ARMING, Retention, Settings
 from mav_tasks.store import MemoryStore
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.restored import Restored
@@ -36,11 +36,14 @@ def serve(
     arming: str,
     store: str | None,
     insecure: bool,
+    keep_days: float,
+    keep_tasks: int,
 ) -> int:
     """Run until a signal; gives the exit code. UsageError says what the operator can mend."""
     if arming not in ARMING:
         raise UsageError(f"--arming {arming}: expected one of {', '.join(ARMING)}")
-    settings = replace(Settings(), arming=arming)
+    retention = Retention(max_age=keep_days * 86_400.0, max_count=keep_tasks)
+    settings = replace(Settings(), arming=arming, retention=retention)
     client_urls = [parse_url(text) for text in clients]
     vehicle_urls = [parse_url(text) for text in vehicles]
     pushed = tuple(parse_endpoint(text, what=f"--push {text}") for text in push)
@@ -61,7 +64,7 @@ def serve(
         ]
         vehicle_links = [_open_link(opened, url) for url in vehicle_urls]
         tame_collector()  # before many tasks are read: it would look through them again and again
-        journal = open_store(store)
+        journal = open_store(store, retention)
         opened.callback(journal.close)
         restored = journal.load() if isinstance(journal, SqliteStore) else None
         for link in client_links:
@@ -88,14 +91,16 @@ def tame_collector() -> None:
     gc.set_threshold(10_000, 20, 1_000_000)
 
 
-def open_store(path: str | None) -> SqliteStore | MemoryStore:
+def open_store(path: str | None, retention: Retention | None = None) -> SqliteStore | MemoryStore:
     """Open the store at a path; None: in the user's data folder. StoreError says why not."""
     if path == IN_MEMORY:
         return MemoryStore()
     if path == "":
         raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
     chosen = Path(path) if path else user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE
-    return SqliteStore(chosen, wall_offset=lambda: time.time() - time.monotonic())
+    return SqliteStore(
+        chosen, wall_offset=lambda: time.time() - time.monotonic(), retention=retention
+    )
 
 
 def _open_link(opened: ExitStack, url: LinkUrl, *, push: tuple[Any, ...] = ()) -> UdpLink:

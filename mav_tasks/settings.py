@@ -78,6 +78,14 @@ class Clients:
 
 
 @dataclass(frozen=True, slots=True)
+class Retention:
+    """How long what is over is kept in the store; None: for ever."""
+
+    max_age: float | None = 30 * 86_400.0  # s since a task ended
+    max_count: int | None = 10_000  # finished tasks; the oldest are forgotten first
+
+
+@dataclass(frozen=True, slots=True)
 class Identity:
     """MAVLink addresses of the server."""
 
@@ -94,6 +102,7 @@ class Settings:
     watch: Watch = field(default_factory=Watch)
     queueing: Queueing = field(default_factory=Queueing)
     clients: Clients = field(default_factory=Clients)
+    retention: Retention = field(default_factory=Retention)
     #: who arms: "server", "operator", or "auto" = server where the vehicle link is loopback
     arming: str = "auto"
     #: whether standard commands and modes addressed to the autopilot become tasks, too

@@ -27,7 +27,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         }
     ),
     "mav_tasks.links": frozenset({"mav_tasks.errors"}),
-    "mav_tasks.store": frozenset({"mav_tasks.tasks", "mav_tasks.errors"}),
+    "mav_tasks.store": frozenset({"mav_tasks.tasks", "mav_tasks.settings", "mav_tasks.errors"}),
     "mav_tasks.runner": frozenset(
         {
             "mav_tasks.engine",

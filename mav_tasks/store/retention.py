@@ -4,25 +4,14 @@ A task that waits or is under way is never deleted, nor any event of it.
 """
 
 import sqlite3
-from dataclasses import dataclass
 from math import inf
+
+from mav_tasks.settings import Retention
 
 STEP = 250  # tasks deleted in one transaction
 SWEEP = 2_000  # journal rows looked at in one transaction
 
 _OVER = "state >= 9"  # the terminal states; as the index has it
-
-
-@dataclass(frozen=True, slots=True)
-class Retention:
-    """How long what is over is kept: ``max_age`` seconds, ``max_count`` tasks; None: for ever."""
-
-    max_age: float | None
-    max_count: int | None
-
-
-#: as many as the server itself remembers, for a month
-DEFAULT_RETENTION = Retention(max_age=30 * 86_400.0, max_count=10_000)
 
 
 class Trimmer:

@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from mav_tasks.errors import StoreError
+from mav_tasks.settings import Retention
 from mav_tasks.store.base import Outcome
 from mav_tasks.store.database import Database
 from mav_tasks.store.lock import Lock
 from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.reading import read_journal, read_restored
-from mav_tasks.store.retention import DEFAULT_RETENTION, Retention, Trimmer
+from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
@@ -31,7 +32,7 @@ class SqliteStore:
         path: str | Path,
         *,
         wall_offset: Callable[[], float],
-        retention: Retention = DEFAULT_RETENTION,
+        retention: Retention | None = None,
     ) -> None:
         self._wall_offset = wall_offset
         self._path = _real_path(Path(path))
@@ -46,7 +47,7 @@ class SqliteStore:
         self._ended_well = database.ended_well
         self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
         self._mail = Mailbox()
-        trimmer = Trimmer(retention)
+        trimmer = Trimmer(retention or Retention())
         self._writer = Writer(
             database,
             self._mail,

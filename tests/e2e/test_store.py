@@ -8,11 +8,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from time import monotonic
+from time import monotonic, time
 from typing import Any
 
 import pytest
 
+from mav_tasks.tasks.book import TaskBook
 from tests.kit.processes import (
     Stand,
     command_long,
@@ -22,6 +23,8 @@ from tests.kit.processes import (
     wait_for,
     wait_until,
 )
+from tests.unit.store.samples import finish, opened
+from tests.unit.tasks.samples import draft
 
 HOLD = 4
 MOVE, STOP, CONTINUE, MODIFY = 54000, 54003, 193, 54012
@@ -180,3 +183,22 @@ def test_a_damaged_store_is_refused_in_one_line(path: Path, content: bytes) -> N
     path.write_bytes(content)
     assert str(path) in refusal(path)
     assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("option", "kept"), [(("--keep-tasks", "2"), 2), (("--keep-days", "0"), 0)]
+)
+def test_as_much_of_what_is_over_is_kept_as_the_operator_says(
+    tmp_path: Path, path: Path, option: tuple[str, str], kept: int
+) -> None:
+    book = TaskBook()
+    for number in range(1, 7):
+        book.submit(draft(), now=1.0)
+        if number < 6:
+            finish(book, number, now=1.0)
+    with opened(path, offset=time() - monotonic()) as store:
+        store.append(book.take_events())
+    with stand(tmp_path, "--store", str(path), *option) as it:
+        wait_until(lambda: len(stored(path)) == kept + 1, within=10, what="the rest forgotten")
+        it.connect()
+    assert stored(path) == [*range(6 - kept, 6), 6]

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, NotKept, Outcome
-from mav_tasks.store.retention import Retention
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskSubmitted

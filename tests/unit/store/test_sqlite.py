@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, NotKept
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.database import Database
-from mav_tasks.store.retention import Retention
 from mav_tasks.store.schema import APPLICATION_ID, MIGRATIONS, migrate
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
