@@ -450,6 +450,8 @@ class VehicleTasks:
             if not self._book.is_durable(task_id):
                 continue
             waiting = self._book[task_id]
+            if self._room.is_too_late(waiting, now=now):
+                continue
             if outranks(waiting, running, queueing=self._settings.queueing) and not start_blocker(
                 seen, watch=self._settings.watch, now=now, goal=waiting.goal
             ):
@@ -490,6 +492,10 @@ class VehicleTasks:
         if first is None:
             return
         task = self._book[first]
+        if task.state is S.QUEUED and self._room.is_too_late(task, now=now):
+            self._room.handle_deadline(now=now)  # after a delay this may be looked at first
+            self._begin_next(seen, now=now)
+            return
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=task.goal)
         self._note_blocker(first, blocker, now=now)
         if not blocker and self._book.is_durable(first):

@@ -216,12 +216,16 @@ class WaitingRoom:
         first_start = self._starts[0][0] if self._starts else inf
         return min(first_start, self._deadlines[0][0] if self._deadlines else inf)
 
+    def is_too_late(self, task: Task, *, now: float) -> bool:
+        """Whether a waiting task must not begin any more."""
+        return task.terms.deadline is not None and task.terms.deadline <= now
+
     def handle_deadline(self, *, now: float) -> None:
         """Let go on whose time has come, and end whose time is over."""
         while self._deadlines and self._deadlines[0][0] <= now:
             at, task_id = heappop(self._deadlines)
             task = self._waiting(task_id)
-            if task is not None and task.terms.deadline == at:
+            if task is not None and task.terms.deadline == at:  # not modified since
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
         while self._starts and self._starts[0][0] <= now:
             _, task_id = heappop(self._starts)

@@ -383,3 +383,12 @@ def test_a_set_speed_is_that_of_the_running_task_and_of_those_that_name_none() -
     run_until(rig, rover, lambda: rig.state(2) is S.COMPLETED)
     run(rig, rover, seconds=5.0)
     assert rover.velocity.forward == pytest.approx(0.3)
+
+
+def test_what_is_too_late_is_not_begun_though_its_deadline_was_not_looked_at_yet() -> None:
+    rig = Rig()
+    rig.submit(terms=Terms(deadline=rig.now + 5.0))
+    rig.submit(priority=0)
+    rig.now += 5.0  # nobody was called meanwhile
+    assert rig.tasks.step(idle(rig.now), now=rig.now).kind is K.TAKE
+    assert rig.states() == [S.EXPIRED, S.STARTING]
