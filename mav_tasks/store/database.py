@@ -81,14 +81,17 @@ class Database:
             _insert(
                 connection, "journal (number, utc, kind, task_id, vehicle, body)", batch.journal
             )
-            connection.executemany(
-                "UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?",
-                batch.changed.values(),
-            )
-            connection.executemany(
-                "UPDATE tasks SET modified = ? WHERE id = ?", batch.modified.values()
-            )
-            self._withdraw(batch.withdrawn)
+            if batch.changed:  # a statement for nothing takes its time, too
+                connection.executemany(
+                    "UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?",
+                    batch.changed.values(),
+                )
+            if batch.modified:
+                connection.executemany(
+                    "UPDATE tasks SET modified = ? WHERE id = ?", batch.modified.values()
+                )
+            if batch.withdrawn:
+                self._withdraw(batch.withdrawn)
             for (column, vehicle), value in batch.vehicles.items():
                 connection.execute(
                     f"INSERT INTO vehicles (vehicle, {column}) VALUES (?, ?)"
