@@ -25,7 +25,6 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Move, Pose, Progress, TaskId, Terms
 from tests.unit.store.samples import (
-    FOR_EVER,
     OFFSET,
     finish,
     opened,
@@ -279,12 +278,3 @@ def test_a_migration_that_fails_changes_nothing() -> None:
     assert connection.execute("SELECT name FROM sqlite_master WHERE name = 'x'").fetchone() is None
     assert connection.execute("PRAGMA application_id").fetchone() == (APPLICATION_ID,)
     connection.close()
-
-
-def test_loading_many_waiting_tasks_is_quick(path: Path) -> None:
-    with opened(path, retention=FOR_EVER) as store:
-        store.append([submitted(number) for number in range(1, 20_001)])
-        wait_for(store, 20_000)
-        began = time.process_time()
-        assert len(store.load().tasks) == 20_000
-        assert time.process_time() - began < 2.0  # for five times as many it is promised
