@@ -64,8 +64,8 @@ class _Last:
 
 @dataclass(slots=True)
 class _Client:
-    of_command: dict[int, _Last] = field(default_factory=dict)
-    goal: _Last | None = None
+    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)  # vehicle, command
+    goals: dict[int, _Last] = field(default_factory=dict)  # by vehicle
     packets: dict[str, _Last] = field(default_factory=dict)
     at: float = 0.0
 
@@ -102,21 +102,21 @@ class Recollection:
         same = client.packets.get(draft.marks.packet)
         if same is not None and now - same.at <= SAME_PACKET:
             return Known(same.task_id, Rule.SAME_PACKET)
-        last = client.of_command.get(draft.command)
+        last = client.of_command.get((draft.vehicle, draft.command))
         if last is not None and last.draft.marks.payload == draft.marks.payload:
             if confirmation > 0 and now - last.at <= CONFIRMED:
                 return Known(last.task_id, Rule.CONFIRMED)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
                 return Known(last.task_id, Rule.SAME_PAYLOAD)
-        goal = client.goal
+        goal = client.goals.get(draft.vehicle)
         if (
             goal is not None
             and now - goal.at <= SAME_GOAL
-            and goal.draft.vehicle == draft.vehicle
             and _same_place(goal.draft, draft, origin)
         ):
-            client.of_command[draft.command] = _Last(goal.task_id, draft, now)  # copies may follow
+            copy = _Last(goal.task_id, draft, now)  # of which copies may follow
+            client.of_command[draft.vehicle, draft.command] = copy
             return Known(goal.task_id, Rule.SAME_GOAL)
         return None
 
@@ -138,10 +138,10 @@ class Recollection:
         draft = Draft(task.vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
         if isinstance(task.goal, GoTo):
-            client.goal = last
+            client.goals[task.vehicle] = last
         if marks.nonce:
             return
-        client.of_command[task.command] = last
+        client.of_command[task.vehicle, task.command] = last
         if marks.packet:
             client.packets[marks.packet] = last
             if len(client.packets) > PACKETS:
@@ -154,11 +154,12 @@ class Recollection:
         client = self._clients.get(task.submitter)
         if client is None:
             return
-        last = client.of_command.get(task.command)
+        last = client.of_command.get((task.vehicle, task.command))
         if last is not None and last.task_id == task.id:
-            del client.of_command[task.command]
-        if client.goal is not None and client.goal.task_id == task.id:
-            client.goal = None
+            del client.of_command[task.vehicle, task.command]
+        goal = client.goals.get(task.vehicle)
+        if goal is not None and goal.task_id == task.id:
+            del client.goals[task.vehicle]
         client.packets.pop(task.marks.packet, None)
 
     def _by_nonce(self, draft: Draft) -> Known | None:
