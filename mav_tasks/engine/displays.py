@@ -18,6 +18,7 @@ R = TaskReason
 
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
 EVERYBODY = Address(0, 0)
+NO_INTERVAL = -1  # of MESSAGE_INTERVAL: it is not sent
 PAGE = 16  # waiting tasks that one request shows
 MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
 
@@ -40,7 +41,8 @@ class Displays:
             raise Rejection(R.BAD_PARAMETER, f"param2 interval {interval_us:g} is not a number")
         if message_id == m.TaskStatus.id:
             client.uses_dialect = True
-            client.statuses.set_interval(interval_us / 1e6 if interval_us > 0 else None, now=now)
+            interval = interval_us / 1e6 if interval_us > 0 else None
+            client.statuses.set_interval(vehicle.system_id, interval, now=now)
             return
         client.thinner.set_interval(vehicle.system_id, message_id, interval_us)
         for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
@@ -52,7 +54,12 @@ class Displays:
         if not 0 <= message_id <= MAX_INTERVAL_ID:
             words = f"param1 message id {asked.command.params[0]:g} not in 0..{MAX_INTERVAL_ID}"
             raise Rejection(R.BAD_PARAMETER, words)
-        interval = asked.client.thinner.interval_us(asked.vehicle.system_id, message_id)
+        system_id = asked.vehicle.system_id
+        if message_id == m.TaskStatus.id:
+            seconds = asked.client.statuses.interval(system_id)
+            interval = NO_INTERVAL if seconds is None else round(seconds * 1e6)
+        else:
+            interval = asked.client.thinner.interval_us(system_id, message_id)
         asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
 
     def show(self, asked: Asked, *, now: float) -> bool:

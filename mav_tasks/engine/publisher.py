@@ -84,11 +84,11 @@ class Publisher:
             due = client.statuses.next_deadline()
             if due is None or now < due:
                 continue
-            active: list[int] = [
-                vehicle.tasks.begun.id
+            active: dict[int, int] = {
+                vehicle.system_id: vehicle.tasks.begun.id
                 for vehicle in self._vehicles
                 if vehicle.tasks.begun is not None
-            ]
+            }
             for task_id in client.statuses.due(active, now=now):
                 self._displays.push_status(client, task_id, now=now)
 

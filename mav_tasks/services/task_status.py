@@ -4,11 +4,20 @@ Pushed on each state change, and streamed for active tasks at the interval that 
 for. It keeps ids only; what is sent is the state at the time of sending.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 from mav_tasks.services.statustext import RateLimit
 
 BURST = 20
 MOST = 1000  # tasks whose news waits to be told to one client
 SHORTEST = 0.05  # s between reports of one task to one client
+
+
+@dataclass(slots=True)
+class _Stream:
+    interval: float  # s
+    next_at: float
 
 
 class TaskStatusSender:
@@ -18,8 +27,7 @@ class TaskStatusSender:
         self._limit = RateLimit(rate=rate, burst=BURST, now=now)
         self._wait = 1.0 / rate
         self._changed: dict[int, None] = {}  # an ordered set
-        self._interval: float | None = None
-        self._next_stream_at = now
+        self._streams: dict[int, _Stream] = {}  # by vehicle
         self._retry_at = 0.0
 
     def changed(self, task_id: int) -> None:
@@ -28,27 +36,27 @@ class TaskStatusSender:
         if len(self._changed) > MOST:  # the oldest news; a request still shows that task
             del self._changed[next(iter(self._changed))]
 
-    def set_interval(self, interval: float | None, *, now: float) -> None:
-        """Stream active tasks every ``interval`` seconds; None: not at all."""
-        self._interval = None if interval is None else max(interval, SHORTEST)
-        self._next_stream_at = now
+    def set_interval(self, vehicle: int, interval: float | None, *, now: float) -> None:
+        """Stream a vehicle's active task every ``interval`` seconds; None: not at all."""
+        if interval is None:
+            self._streams.pop(vehicle, None)
+        else:
+            self._streams[vehicle] = _Stream(max(interval, SHORTEST), now)
 
-    @property
-    def interval(self) -> float | None:
-        """The interval of the stream, seconds."""
-        return self._interval
+    def interval(self, vehicle: int) -> float | None:
+        """Give the interval of a vehicle's stream, seconds; None: there is none."""
+        stream = self._streams.get(vehicle)
+        return None if stream is None else stream.interval
 
     def next_deadline(self) -> float | None:
         """Give when ``due`` has something to give."""
-        deadlines = []
+        deadlines = [stream.next_at for stream in self._streams.values()]
         if self._changed:
             deadlines.append(self._retry_at)
-        if self._interval is not None:
-            deadlines.append(self._next_stream_at)
         return min(deadlines, default=None)
 
-    def due(self, active: list[int], *, now: float) -> list[int]:
-        """Give the tasks to report now; ``active`` are those that a stream reports."""
+    def due(self, active: Mapping[int, int], *, now: float) -> list[int]:
+        """Give the tasks to report now; ``active`` are those that streams report, by vehicle."""
         due: dict[int, None] = {}
         while self._changed and now >= self._retry_at:
             if not self._limit.take(now=now):
@@ -57,7 +65,9 @@ class TaskStatusSender:
             task_id = next(iter(self._changed))
             del self._changed[task_id]
             due[task_id] = None
-        if self._interval is not None and now >= self._next_stream_at:
-            self._next_stream_at = max(self._next_stream_at + self._interval, now)
-            due.update(dict.fromkeys(active))
+        for vehicle, stream in self._streams.items():
+            if now >= stream.next_at:
+                stream.next_at = max(stream.next_at + stream.interval, now)
+                if vehicle in active:
+                    due[active[vehicle]] = None
         return list(due)
