@@ -19,6 +19,7 @@ from mav_tasks.engine.inputs import (
     LinkSide,
     Outgoing,
     Packets,
+    Peer,
     SettingsChanged,
     Shutdown,
     StoreFailed,
@@ -30,6 +31,7 @@ from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
+from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -219,9 +221,15 @@ class Engine:
         """Pass a client's packet to the vehicles that it is for; what is for us ends here."""
         message = received.message
         target = EVERYBODY if message is None else _target(message)
+        behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
         for vehicle in self._vehicles.addressed_by(target.system_id):
-            if target != vehicle.server_address and may_pass(vehicle, client.key, message, now=now):
-                vehicle.requests.forward(received.packet)
+            if target != vehicle.server_address:
+                behind.setdefault(vehicle.requests.place, []).append(vehicle)
+        for vehicles in behind.values():
+            # each is asked: sticks off centre are a takeover of every one
+            passes = [may_pass(vehicle, client.key, message, now=now) for vehicle in vehicles]
+            if all(passes):
+                vehicles[0].requests.forward(received.packet)
 
     def _watch_operator(self, *, now: float) -> None:
         is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)

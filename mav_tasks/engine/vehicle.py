@@ -103,6 +103,11 @@ class Vehicle:
         """Whether the vehicle was last seen armed."""
         return self._monitor.armed
 
+    @property
+    def heard_at(self) -> float:
+        """When its last heartbeat came."""
+        return self._monitor.heard_at
+
     def is_heard(self, *, now: float) -> bool:
         """Whether its heartbeats are coming."""
         return self._monitor.is_heard(now=now)

@@ -5,7 +5,7 @@ It decides nothing but the order in which things leave.
 
 from collections.abc import Hashable
 
-from mav_tasks.engine.inputs import Outgoing
+from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -48,6 +48,11 @@ class VehicleRequests:
         self.is_identified = False
         #: zero and HOLD as packets, for an exit on which nothing can be computed any more
         self.last_words = self._prepare_last_words()
+
+    @property
+    def place(self) -> tuple[str, Peer]:
+        """Link and endpoint at which the vehicle is reached."""
+        return self._outlet.link, self._outlet.peer
 
     def move_to(self, outlet: Outlet) -> None:
         """The vehicle is heard at another endpoint now."""

@@ -26,6 +26,7 @@ from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 
 MAX_PEERS = 256  # endpoints on one vehicle link
+BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
 
 #: messages that nobody but a controller of the vehicle sends
 SETPOINTS = frozenset(
@@ -77,6 +78,9 @@ class VehicleSide:
         self._router = Router()
         self._agenda = Agenda()
         self._noted: set[str] = set()
+        self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
+        #: heartbeats of a known vehicle's id from another place: when the first one came
+        self._rivals: dict[tuple[int, str, Peer], float] = {}
         self._vehicles: dict[int, Vehicle] = {}
 
     def __iter__(self) -> Iterator[Vehicle]:
@@ -126,7 +130,9 @@ class VehicleSide:
             self._links.pop(change.link, None)
             return
         link = _Link(change.is_local, HeartbeatSender(now=now))
-        for peer in change.peers:
+        places = [self._router.place_of(vehicle.system_id) for vehicle in self]
+        known = [place[1] for place in places if place is not None and place[0] == change.link]
+        for peer in (*change.peers, *known):
             link.outlets[peer] = self._outlet(change.link, peer)
         self._links[change.link] = link
 
@@ -210,7 +216,10 @@ class VehicleSide:
         return Address(identity.system_id, identity.component_id)
 
     def _outlet(self, link: str, peer: Peer) -> Outlet:
-        return Outlet(link, peer, self._queue, self._packer)
+        outlet = self._outlets.get((link, peer))
+        if outlet is None:
+            outlet = self._outlets[link, peer] = Outlet(link, peer, self._queue, self._packer)
+        return outlet
 
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
@@ -256,13 +265,21 @@ class VehicleSide:
         return vehicle
 
     def _moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
-        """Whether a vehicle that fell silent is back at another place; two are not mixed."""
-        if vehicle.is_heard(now=now):
+        """Whether a vehicle that fell silent is back at another place; two are not mixed.
+
+        One that was there while the vehicle itself still was is another one, for good.
+        """
+        rival = vehicle.system_id, link, peer
+        if len(self._rivals) < MAX_PEERS:
+            self._rivals.setdefault(rival, now)
+        is_another = vehicle.heard_at > self._rivals.get(rival, -inf) + BOTH_THERE
+        if is_another or vehicle.is_heard(now=now):
             self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
             return False
         outlets = self._links[link].outlets
         if peer not in outlets and len(outlets) >= MAX_PEERS:
             return False
+        del self._rivals[rival]
         vehicle.requests.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
         self._router.learn(vehicle.system_id, (link, peer))
         return True

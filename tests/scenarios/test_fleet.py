@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
+from itertools import pairwise
 from math import radians, remainder, tau
 from typing import Any
 
@@ -9,13 +10,22 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from rover_sim.virtual import RoverParty
-from tests.kit.client import ACCEPTED, MOVE, REQUEST, ROTATE, TASK_STATUS
+from tests.kit.client import (
+    ACCEPTED,
+    ACK,
+    MOVE,
+    REPEATS,
+    REQUEST,
+    ROTATE,
+    SET_INTERVAL,
+    TASK_STATUS,
+)
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -230,3 +240,76 @@ def test_what_is_asked_of_one_rovers_queue_shows_no_other(make_world: MakeWorld)
     world.run(0.1)
     assert sent.result == ACCEPTED
     assert [status.task_id for status in world.client.statuses()] == [2, 4, 6]
+
+
+def test_who_repeats_itself_to_several_rovers_drives_each_of_them_once(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(rovers=3, vehicle_links=3)
+    until = world.now + 1.2
+    world.watched.loses = lambda source, _, data: (
+        source == CLIENT_LINK and data[7] == ACK and world.now < until
+    )
+    for number in (1, 2, 3):
+        world.client.command(MOVE, 1.0, 0, 0, 0, 0, 0, 5, target=(number, 191), repeats=REPEATS)
+    world.run(3)
+    assert [task.vehicle for task in world.tasks()] == [1, 2, 3]
+
+
+@pytest.mark.parametrize("is_driving", [False, True])
+def test_another_of_the_same_id_is_not_driven_either_when_the_first_falls_silent(
+    make_world: MakeWorld, is_driving: bool
+) -> None:
+    world = make_world(rovers=2, vehicle_links=2)
+    impostor, link = common.MAVLink(None, 1, 1), world.net.link("impostor")
+    heartbeat = common.MAVLink_heartbeat_message(10, 3, 1, 4, 4, 3)
+    if is_driving:
+        world.client.move(10)
+    for step in range(30):
+        if step == 6:
+            world.fault(Faults(silent=True))
+        link.send(f"{VEHICLE_LINK}2", heartbeat.pack(impostor))
+        world.run(0.5)
+    assert list(link.arrived) == []
+    assert not world.server.engine.snapshot(now=world.now).vehicles[0].heard
+
+
+def test_after_a_link_was_down_its_rovers_get_heartbeats_without_gaps(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(rovers=2, vehicle_links=2)
+    pump, name = world.server.pump, f"{VEHICLE_LINK}2"
+    seen: list[tuple[float, int]] = []
+    carry = world.net.send
+
+    def note(source: str, target: str, data: bytes) -> None:
+        if target == "rover2" and data[5] == 250:
+            seen.append((world.now, data[4]))
+        carry(source, target, data)
+
+    world.watched.send = note  # type: ignore[method-assign]
+    world.run(3)
+    pump.handle(LinkChanged(name, LinkSide.VEHICLES, up=False), now=world.now)
+    world.run(3)
+    at = world.now
+    pump.handle(LinkChanged(name, LinkSide.VEHICLES, up=True), now=world.now)
+    world.run(3)
+    assert sum(when > at for when, _ in seen) >= 2
+    numbers = [number for _, number in seen]
+    assert all((after - before) % 256 == 1 for before, after in pairwise(numbers))
+
+
+def test_a_stream_of_statuses_is_of_the_rover_that_was_asked(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2, vehicle_links=2)
+    watcher = world.add_client("watcher", system_id=77)
+    for number in (1, 2):
+        world.client.move(10, nonce=number, target=(number, 191))
+    world.run(3)
+    watcher.command(SET_INTERVAL, TASK_STATUS, 100_000, target=(1, 191))
+    world.run(1)
+    assert {packet.source for packet in watcher.of_id(TASK_STATUS)} == {(1, 191)}
+    watcher.command(510, TASK_STATUS, target=(1, 191))
+    watcher.command(510, TASK_STATUS, target=(2, 191))
+    world.run(0.1)
+    intervals = [m.interval_us for m in watcher.of_type("MESSAGE_INTERVAL")]
+    assert intervals == [100_000, -1]
