@@ -12,6 +12,7 @@ from mav_tasks.engine.authority import Authority
 from mav_tasks.engine.frame_monitor import FrameMonitor, Seen
 from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -30,7 +31,6 @@ from mav_tasks.tasks.task import Draft, GlobalPlace, GoTo, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
-GOLDEN = 0.6180339887  # its multiples are never close together, modulo 1
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
@@ -81,8 +81,7 @@ class Vehicle:
         )
         self.control.heard(armed=self._monitor.armed, mode=self._monitor.custom_mode, now=now)
         self._authority = Authority(persona, may_arm=may_arm)
-        self._next_tick = inf
-        self._phase = system_id * GOLDEN % 1.0  # of a period: evenly spread, however many there are
+        self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
@@ -145,11 +144,11 @@ class Vehicle:
             self._receive_heartbeat(message, now=now)
         elif isinstance(message, m.Attitude | m.LocalPositionNed):
             # read after a delay, it may have come at any time since
-            self._motion.receive(message, now=min(now, self._next_tick))
+            self._motion.receive(message, now=min(now, self._clock.next_at))
             if self._motion.rebooted:
                 self._rebooted(now=now)
             self._receive_of_frame(message, now=now)
-            if not self._is_ticking and not self.tasks.is_idle:
+            if not self._clock.is_running and not self.tasks.is_idle:
                 self.step(now=now)
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt):
             self._receive_of_frame(message, now=now)
@@ -178,7 +177,7 @@ class Vehicle:
         by_hand = self.persona.manual_mode in (was_mode, mode)
         if armed and by_hand and self.control.phase is Phase.ASKING_MODE:
             self._take_over("armed to be driven by hand", now=now)
-        if not self._is_ticking:
+        if not self._clock.is_running:
             self.step(now=now)
         self._ask_for_rates(now=now)
 
@@ -330,7 +329,7 @@ class Vehicle:
 
     def _begin_stop(self, *, now: float) -> None:
         self.control.begin_stop(now=now)
-        self._next_tick = self._tick_after(now)
+        self._clock.restart(now=now)
         self.requests.flush(now=now)
 
     def hold(self, *, actor: str, now: float) -> TaskId | None:
@@ -343,7 +342,7 @@ class Vehicle:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.control.begin_release(now=now)
         self.requests.flush(now=now)
-        self._next_tick = self._tick_after(now)
+        self._clock.restart(now=now)
         return paused
 
     def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
@@ -418,7 +417,7 @@ class Vehicle:
         seen = replace(self.view(now=now), may_arm=self._authority.may_arm_again)
         going_on = self.tasks.proceed(seen, actor=actor, now=now)
         self._authority.restore_arming()
-        if not self._is_ticking:
+        if not self._clock.is_running:
             self.step(now=now)
         return going_on
 
@@ -432,13 +431,9 @@ class Vehicle:
 
     # time
 
-    @property
-    def _is_ticking(self) -> bool:
-        return self._next_tick < inf
-
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do."""
-        deadline = min(self._next_tick, self.requests.next_deadline() or inf)
+        deadline = min(self._clock.next_at, self.requests.next_deadline() or inf)
         if not self._was_heard:  # nothing is asked of one that cannot answer
             return deadline
         silent_at = self._monitor.heard_at + self._settings.watch.heartbeat_lost + 1e-3
@@ -451,14 +446,14 @@ class Vehicle:
             self._was_heard = False
             self._note("silent", now=now)
         self.requests.handle_deadline(now=now)
-        if now >= self._next_tick or fell_silent:
+        if now >= self._clock.next_at or fell_silent:
             self.step(now=now)
         self.requests.flush(now=now)
         self._ask_for_rates(now=now)
 
     def wake(self, *, now: float) -> None:
         """Look at the tasks unless that is about to be done: another may be ready now."""
-        if not self._is_ticking:
+        if not self._clock.is_running:
             self.step(now=now)
 
     def step(self, *, now: float) -> None:
@@ -478,22 +473,16 @@ class Vehicle:
         What came in meanwhile looks fresh and is not, so nothing is steered by it.
         """
         begun = self.tasks.begun
-        late = now - self._next_tick > self._settings.watch.late_tick
+        late = self._clock.lateness(now=now) > self._settings.watch.late_tick
         if late and begun is not None and begun.state is TaskState.EXECUTING:
             self.requests.send_zero()
             self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
-        if not self.control.is_engaged and self.tasks.begun is None:
-            self._next_tick = inf
-        elif now >= self._next_tick or self._next_tick == inf:
-            following = self._next_tick + self._settings.watch.setpoint_period
-            self._next_tick = following if now < following < inf else self._tick_after(now)
-
-    def _tick_after(self, now: float) -> float:
-        """Give the next tick, within a period: each vehicle's are at another time than others'."""
-        period = self._settings.watch.setpoint_period
-        return now + period - (now - self._phase * period) % period
+        if self.control.is_engaged or self.tasks.begun is not None:
+            self._clock.plan(now=now)
+        else:
+            self._clock.stop()
 
     def view(self, *, now: float) -> VehicleView:
         """Give one look at the vehicle for the task domain."""
