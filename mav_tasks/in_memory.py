@@ -16,17 +16,13 @@ VEHICLE_LINK = "server:vehicles"
 
 
 class InMemoryServer:
-    """A server on a MemoryNet: clients find it as CLIENT_LINK, it finds ``vehicles`` by name.
-
-    ``more_vehicles`` are those of further vehicle links, VEHICLE_LINK and a number from 2.
-    """
+    """A server on a MemoryNet: clients find it as CLIENT_LINK, it finds ``vehicles`` by name."""
 
     def __init__(
         self,
         net: MemoryNet,
         *,
         vehicles: tuple[str, ...],
-        more_vehicles: tuple[tuple[str, ...], ...] = (),
         settings: Settings | None = None,
         store: Store | None = None,
         restored: Restored | None = None,
@@ -36,12 +32,9 @@ class InMemoryServer:
         self.store = store or MemoryStore()
         self.pump = Pump(self.engine, self.store, self._send)
         clients = net.link(CLIENT_LINK)
-        towards = [net.link(VEHICLE_LINK, peers=vehicles)]
-        for number, names in enumerate(more_vehicles, 2):
-            towards.append(net.link(f"{VEHICLE_LINK}{number}", peers=names))
-        self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, *towards)}
-        for link in towards:
-            self.pump.handle(link_changed(link, LinkSide.VEHICLES), now=now)
+        towards = net.link(VEHICLE_LINK, peers=vehicles)
+        self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, towards)}
+        self.pump.handle(link_changed(towards, LinkSide.VEHICLES), now=now)
         self.pump.handle(link_changed(clients, LinkSide.CLIENTS), now=now)
         self.pump.turn(now=now)
 

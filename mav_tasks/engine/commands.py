@@ -323,10 +323,12 @@ def _check_relay(asked: Asked, *, now: float) -> None:
     disarms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] == 0.0
     if vehicle.tasks.is_stopped and not disarms and number not in ASKING:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
-    if number in MOVING and not vehicle.may_move(asked.client.key, now=now):
+    if number in MOVING and not vehicle.may_move(asked.client.key):
         raise Rejection(R.NOT_ALLOWED, f"command {number}: not while tasks drive")
     if number == MavCmd.DO_CHANGE_SPEED and isnan(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
+    if number in MOVING:
+        vehicle.is_moved_by_client(now=now)
 
 
 def _relay(asked: Asked, *, now: float) -> None:

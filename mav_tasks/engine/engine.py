@@ -25,7 +25,7 @@ from mav_tasks.engine.inputs import (
     StoreFailed,
     WallClock,
 )
-from mav_tasks.engine.motion_gate import may_pass
+from mav_tasks.engine.motion_gate import may_pass, passed
 from mav_tasks.engine.operator_watch import OperatorWatch
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
@@ -226,9 +226,9 @@ class Engine:
             if target != vehicle.server_address:
                 behind.setdefault(vehicle.requests.place, []).append(vehicle)
         for vehicles in behind.values():
-            # each is asked: sticks off centre are a takeover of every one
-            passes = [may_pass(vehicle, client.key, message, now=now) for vehicle in vehicles]
-            if all(passes):
+            if all(may_pass(vehicle, client.key, message) for vehicle in vehicles):
+                for vehicle in vehicles:
+                    passed(vehicle, message, now=now)
                 vehicles[0].requests.forward(received.packet)
 
     def _watch_operator(self, *, now: float) -> None:

@@ -26,20 +26,28 @@ RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 
 
-def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, now: float) -> bool:
-    """Whether a client's message is passed on to the vehicle."""
-    if isinstance(message, m.MissionItem | m.MissionItemInt) and message.current not in GO_TO:
-        return True  # part of an upload
-    if isinstance(message, MOTION):
-        if not _is_finite(message):
-            return False
-        return vehicle.may_move(client, now=now)
+def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None) -> bool:
+    """Whether a client's message may be passed on to the vehicle; then ``passed`` is called."""
+    if _moves(message):
+        assert message is not None
+        return _is_finite(message) and vehicle.may_move(client)
     if isinstance(message, m.ManualControl | m.RcChannelsOverride):
-        if vehicle.tasks.is_stopped:
-            return False
-        if _off_centre(message):
-            vehicle.sticks_moved(now=now)
+        return not vehicle.tasks.is_stopped
     return True
+
+
+def passed(vehicle: Vehicle, message: m.Message | None, *, now: float) -> None:
+    """Note what a message that goes to the vehicle means for its tasks."""
+    if _moves(message):
+        vehicle.is_moved_by_client(now=now)
+    elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
+        vehicle.sticks_moved(now=now)
+
+
+def _moves(message: m.Message | None) -> bool:
+    if isinstance(message, m.MissionItem | m.MissionItemInt):
+        return message.current in GO_TO  # or else it is part of an upload
+    return isinstance(message, MOTION)
 
 
 def _is_finite(message: m.Message) -> bool:

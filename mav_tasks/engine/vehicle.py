@@ -287,18 +287,19 @@ class Vehicle:
         if self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
 
-    def may_move(self, client: Hashable, *, now: float) -> bool:
-        """Whether a client's motion message may pass; one that does makes tasks wait."""
-        allowed = (
+    def may_move(self, client: Hashable) -> bool:
+        """Whether a client's motion message may pass."""
+        return (
             self.armed
             and not self.tasks.is_driving
             and not self.tasks.is_stopped
             and not self.control.is_engaged
             and self._authority.has_granted(client)
         )
-        if allowed:
-            self._authority.note_other(now=now)
-        return allowed
+
+    def is_moved_by_client(self, *, now: float) -> None:
+        """A client's motion message goes to it: tasks wait."""
+        self._authority.note_other(now=now)
 
     def sticks_moved(self, *, now: float) -> None:
         """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""

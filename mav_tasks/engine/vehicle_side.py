@@ -270,9 +270,9 @@ class VehicleSide:
         One that was there while the vehicle itself still was is another one, for good.
         """
         rival = vehicle.system_id, link, peer
-        if len(self._rivals) < MAX_PEERS:
-            self._rivals.setdefault(rival, now)
-        is_another = vehicle.heard_at > self._rivals.get(rival, -inf) + BOTH_THERE
+        if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
+            del self._rivals[next(iter(self._rivals))]
+        is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
         if is_another or vehicle.is_heard(now=now):
             self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
             return False
@@ -282,6 +282,7 @@ class VehicleSide:
         del self._rivals[rival]
         vehicle.requests.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
         self._router.learn(vehicle.system_id, (link, peer))
+        self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
         return True
 
     def _is_intruder(self, packet: Packet) -> bool:

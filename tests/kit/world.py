@@ -61,7 +61,6 @@ class World(VirtualWorld):
         settings: Settings | None = None,
         store: Store | None = None,
         rovers: int = 1,
-        vehicle_links: int = 1,
         body: Callable[[Pose], Body] = kinematic_body,
         persona: Persona = PROMPT,
     ) -> None:
@@ -86,17 +85,8 @@ class World(VirtualWorld):
             self.rover_parties.append(party)
             self.join(party)
         names = tuple(f"rover{number}" for number in range(1, rovers + 1))
-        first, *more = (names[number::vehicle_links] for number in range(vehicle_links))
-        self._names, self._more, self._settings = first, tuple(more), settings
-        for number, of_link in enumerate(more, 2):
-            self.watched.links.update(dict.fromkeys(of_link, f"{VEHICLE_LINK}{number}"))
-        self.server = InMemoryServer(
-            self.net,
-            vehicles=self._names,
-            more_vehicles=self._more,
-            settings=settings,
-            store=store,
-        )
+        self._names, self._settings = names, settings
+        self.server = InMemoryServer(self.net, vehicles=names, settings=settings, store=store)
         self.join(self.server)
         self.client = self.add_client("client")
 
@@ -163,7 +153,6 @@ class World(VirtualWorld):
         self.server = InMemoryServer(
             self.net,
             vehicles=self._names,
-            more_vehicles=self._more,
             settings=self._settings,
             store=store,
             restored=restored,
@@ -300,7 +289,6 @@ class ObservedNet(MemoryNet):
     def __init__(self, *, seed: int, conditions: Conditions) -> None:
         super().__init__(seed=seed, conditions=conditions)
         self.observers: dict[str, Observer] = {}
-        self.links: dict[str, str] = {}  # of the server, by rover; where it is not VEHICLE_LINK
         self.is_server_away = False
         self._unread: list[tuple[str, str, bytes]] = []
         #: loses (source, target, datagram) for which it says so
@@ -308,7 +296,7 @@ class ObservedNet(MemoryNet):
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Show what the server sends to a rover."""
-        if source.startswith(VEHICLE_LINK) and target in self.observers:
+        if source == VEHICLE_LINK and target in self.observers:
             self.observers[target].sent(self.now, data)
         elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
             self.observers[f"rover{data[5]}"].answered(self.now, data)
@@ -320,7 +308,7 @@ class ObservedNet(MemoryNet):
         """Show what arrives at a rover or at the server."""
         if link.name in self.observers:
             self.observers[link.name].arrived(self.now, data)
-        elif link.name == CLIENT_LINK or link.name.startswith(VEHICLE_LINK):
+        elif link.name in (VEHICLE_LINK, CLIENT_LINK):
             self._unread.append((link.name, source, data))
         super().arrive(link, source, data)
 
@@ -337,9 +325,7 @@ class ObservedNet(MemoryNet):
             for name, observer in self.observers.items():
                 if link == CLIENT_LINK:
                     observer.asked(self.now, data, peer=source)
-                elif source == name or (
-                    source not in self.observers and link == self.links.get(name, VEHICLE_LINK)
-                ):
+                elif source == name or source not in self.observers:
                     observer.heard(self.now, data)
         self._unread.clear()
 

@@ -3,11 +3,12 @@
 import pytest
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import LinkChanged, LinkSide, Outgoing, Packets
+from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason
 
 RADIO, CLIENT = ("10.0.0.1", 1), ("10.0.0.2", 2)
 GCS = Address(255, 190)
@@ -46,7 +47,7 @@ class Rig:
     def asks_for_guided(self, system_id: int) -> None:
         self.handle("c", CLIENT, m.SetMode(system_id, 1, GUIDED), GCS)
 
-    def client_sends(self, message: m.Message) -> list[Outgoing]:
+    def client_sends(self, message: m.Message) -> list[bytes]:
         """What of it goes to the radio."""
         self.handle("c", CLIENT, message, GCS)
         return [
@@ -77,3 +78,15 @@ def test_what_moves_one_passes_for_that_one() -> None:
 
 def test_a_heartbeat_goes_there_once() -> None:
     assert len(Rig(second=(HOLD, 0)).client_sends(m.Heartbeat(6, 8, 0, 0, 4, 3))) == 1
+
+
+def test_what_is_withheld_changes_nothing_for_those_that_might_have_it() -> None:
+    rig = Rig(second=(HOLD, 0))
+    stop = m.CommandLong(2, 191, 54003, 0, 0, 0, 0, 0, 0, 0, 0)
+    rig.handle("c", CLIENT, stop, GCS)
+    rig.engine.take_events()
+    assert rig.client_sends(setpoint(0)) == []
+    assert rig.client_sends(m.RcChannelsOverride(0, 1, 1900, 0, 1900, 0, 0, 0, 0, 0)) == []
+    assert rig.engine.take_events() == []
+    first = rig.engine.snapshot(now=rig.now).vehicles[0]
+    assert first.paused is TaskReason.NONE

@@ -76,3 +76,15 @@ def test_who_was_there_at_the_same_time_is_never_followed() -> None:
     assert rig.reached_at(41.0) == {OLD}
     rig.heard(41.0, old=True)
     assert rig.reached_at(41.5) == {OLD}
+
+
+def test_however_many_have_called_a_vehicle_can_come_back_elsewhere() -> None:
+    rig = Rig()
+    rig.heard(0.0, old=True)
+    data = rig.packer.pack(HEARTBEAT, Address(1, 1), seq=0)
+    for port in range(1_000):
+        rig.engine.handle(Packets("w", [(("10.9.9.9", port), data)]), now=0.5)
+    rig.heard(2.0, old=True)
+    rig.heard(2.0 + LOST + 1.0, old=False)
+    assert rig.reached_at(7.0) == {NEW}
+    assert "vehicle 1: is at ('10.0.0.1', 2) now" in " ".join(map(str, rig.engine.take_events()))

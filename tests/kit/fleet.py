@@ -1,0 +1,293 @@
+"""Many rovers on many links: worlds in which links go down and several rovers share a radio."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from math import degrees
+from random import Random
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.engine.inputs import LinkChanged, LinkSide
+from mav_tasks.engine.snapshot import VehicleSnapshot
+from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
+from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.runner import link_changed
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.task import Task
+from rover_sim.body import Pose
+from rover_sim.faults import Faults
+from rover_sim.vehicle import Vehicle, make_vehicle
+from rover_sim.virtual import VirtualWorld
+from tests.kit.observer import Observer
+from tests.kit.world import (
+    PROMPT,
+    ObservedNet,
+    World,
+    is_ready_to_be_driven,
+    kinematic_body,
+)
+
+WORK = (75, 76, 84)  # COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED
+GOOD = Conditions()
+
+#: link, endpoint on it, and the rovers behind that: more than one, as behind a radio
+Layout = Mapping[str, Mapping[str, tuple[int, ...]]]
+
+
+# several vehicle links in one world
+
+
+class FleetNet(ObservedNet):
+    """A net with several vehicle links, as bad as told; that of the clients is a good one.
+
+    Each pair of ends has a luck of its own, so that what one rover says more or less does not
+    change what becomes of another's packets.
+    """
+
+    def __init__(self, *, seed: int, conditions: Conditions) -> None:
+        super().__init__(seed=seed, conditions=conditions)
+        self._seed = seed
+        self._bad = conditions
+        self._luck: dict[tuple[str, str], Random] = {}
+        self._decoder = common.MAVLink(None)
+        #: the server's link that an endpoint reaches, and nothing else
+        self.link_of: dict[str, str] = {}
+        #: links that carry nothing now
+        self.down: set[str] = set()
+        #: who looks at what comes from an endpoint and goes to it
+        self.observers_at: dict[str, tuple[Observer, ...]] = {}
+        #: s that all that a rover says takes, by its system id
+        self.late: dict[int, float] = {}
+        #: what left the server for each endpoint
+        self.towards: dict[str, list[tuple[float, bytes]]] = {}
+
+    def send(self, source: str, target: str, data: bytes) -> None:
+        """Show what the server sends, and carry it if these two ends can reach each other."""
+        if target in self.link_of and source.startswith("server:"):
+            self.towards.setdefault(target, []).append((self.now, data))
+            for observer in self._meant(target, data):
+                observer.sent(self.now, data)
+        elif source == CLIENT_LINK:
+            for observer in self._all_observers():
+                if observer.system_id == data[5]:
+                    observer.answered(self.now, data)
+        endpoint = target if target in self.link_of else source
+        other = source if target in self.link_of else target
+        if self.link_of.get(endpoint, other) != other or other in self.down:
+            return
+        if self.loses(source, target, data):
+            return
+        luck = self._luck.get((source, target))
+        if luck is None:
+            luck = self._luck[source, target] = Random(f"{self._seed} {source} {target}")
+        self._random = luck
+        self.conditions = self._bad if endpoint in self.link_of else GOOD
+        if data[5] in self.late and source in self.link_of:
+            self.conditions = replace(self._bad, delay=self.late[data[5]])
+        MemoryNet.send(self, source, target, data)
+
+    def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
+        """Show what arrives at a rover or at the server."""
+        if link.name in self.down:
+            return
+        for observer in self._meant(link.name, data):
+            observer.arrived(self.now, data)
+        if link.name.startswith("server:"):
+            self._unread.append((link.name, source, data))
+        MemoryNet.arrive(self, link, source, data)
+
+    def deliver(self) -> None:
+        """Deliver, and show what the server now knows."""
+        MemoryNet.deliver(self)
+        for link, source, data in self._unread:
+            if link == CLIENT_LINK:
+                for observer in self._all_observers():
+                    observer.asked(self.now, data, peer=source)
+            for observer in self.observers_at.get(source, ()):
+                observer.heard(self.now, data)
+        self._unread.clear()
+
+    def _all_observers(self) -> list[Observer]:
+        return list({id(o): o for at in self.observers_at.values() for o in at}.values())
+
+    def _meant(self, endpoint: str, data: bytes) -> list[Observer]:
+        """Give the observers of the rovers that a packet to an endpoint is for."""
+        there = self.observers_at.get(endpoint, ())
+        if len(there) < 2:
+            return list(there)
+        message = self._decoder.decode(bytearray(data))
+        target = getattr(message, "target_system", 0)
+        return [observer for observer in there if target in (0, observer.system_id)]
+
+
+class FleetServer(InMemoryServer):
+    """The server with as many vehicle links as a test wants; they may go down."""
+
+    def up(self, link: MemoryLink, *, now: float) -> None:
+        """Let a vehicle link come up."""
+        self._links[link.name] = link
+        self.pump.handle(link_changed(link, LinkSide.VEHICLES), now=now)
+        self.pump.turn(now=now)
+
+    def down(self, link: MemoryLink, *, now: float) -> None:
+        """Let a vehicle link go down, as a link's owner says it to the engine."""
+        self.pump.handle(LinkChanged(link.name, LinkSide.VEHICLES, up=False), now=now)
+        self.pump.turn(now=now)
+
+
+class Radio:
+    """One endpoint, and the rovers behind it, each of which hears everything."""
+
+    def __init__(self, link: MemoryLink, vehicles: list[Vehicle]) -> None:
+        self.link = link
+        self.vehicles = vehicles
+
+    def next_deadline(self) -> float | None:
+        """Give when a rover's next control step is due."""
+        return min((v.next_deadline() for v in self.vehicles), default=None)
+
+    def turn(self, *, now: float) -> None:
+        """Let the rovers hear, live and speak."""
+        for peer, data in self.link.receive(len(self.link.arrived)):
+            for vehicle in self.vehicles:
+                vehicle.receive(data, peer, now=now)
+        for vehicle in self.vehicles:
+            vehicle.handle_deadline(now=now)
+            for to, packet in vehicle.take_packets():
+                self.link.send(to, packet)
+
+
+class Fleet(World):
+    """One server, rovers 1, 2, 3 ... on several vehicle links, and two clients."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        *,
+        seed: int = 0,
+        conditions: Conditions | None = None,
+        settings: Settings | None = None,
+        dials_in: tuple[str, ...] = (),
+    ) -> None:
+        self.seed = seed
+        self.watched: FleetNet = FleetNet(seed=seed, conditions=conditions or Conditions())
+        VirtualWorld.__init__(self, self.watched)  # World's own has no radios
+        numbers = sorted(n for at in layout.values() for there in at.values() for n in there)
+        assert numbers == list(range(1, len(numbers) + 1)), "World numbers its rovers from 1 on"
+        self.rovers = [
+            make_vehicle(kinematic_body(start_of(n)), system_id=n, now=0.0, persona=PROMPT)
+            for n in numbers
+        ]
+        self.observers = [
+            Observer(n, is_ready=partial(is_ready_to_be_driven, self.rovers[n - 1]))
+            for n in numbers
+        ]
+        self.server: FleetServer = FleetServer(self.net, vehicles=(), settings=settings)
+        self.join(self.server)
+        self.radios: dict[str, Radio] = {}
+        self.links: dict[str, MemoryLink] = {}
+        for name, endpoints in layout.items():
+            peers = () if name in dials_in else tuple(endpoints)
+            self.links[name] = self.net.link(f"server:{name}", peers=peers)
+            for endpoint, there in endpoints.items():
+                self.add_radio(name, endpoint, [self.rovers[n - 1] for n in there])
+                self.watched.observers_at[endpoint] = tuple(self.observers[n - 1] for n in there)
+                if name in dials_in:  # the rover calls by itself: it knows where the server is
+                    greeting = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+                    self.net.send(self.links[name].name, endpoint, packed(greeting, 250, 191))
+            self.server.up(self.links[name], now=0.0)
+        self.client = self.add_client("client")
+        self.other = self.add_client("other", system_id=245)
+
+    def add_radio(self, link: str, endpoint: str, vehicles: list[Vehicle]) -> Radio:
+        """Put rovers at an endpoint of a link."""
+        radio = Radio(self.net.link(endpoint), vehicles)
+        self.watched.link_of[endpoint] = self.links[link].name
+        self.radios[endpoint] = radio
+        self.join(radio)
+        return radio
+
+    def link_down(self, name: str) -> None:
+        """Let a vehicle link of the server go down: it carries nothing any more."""
+        self.watched.down.add(self.links[name].name)
+        self.server.down(self.links[name], now=self.now)
+
+    def link_up(self, name: str) -> None:
+        """Let it come up again."""
+        self.watched.down.remove(self.links[name].name)
+        self.server.up(self.links[name], now=self.now)
+
+    def moves_house(self, number: int, *, source: str, target: str) -> None:
+        """Let a rover be at another endpoint from now on."""
+        vehicle = self.rovers[number - 1]
+        self.radios[source].vehicles.remove(vehicle)
+        self.radios[target].vehicles.append(vehicle)
+        watched = self.watched.observers_at
+        watched[target] = (*watched[target], self.observers[number - 1])
+
+    def break_rover(self, number: int, faults: Faults) -> None:
+        """Break something in one rover; ``Faults()`` mends it."""
+        self.rovers[number - 1].autopilot.set_faults(faults)
+
+    def pose_of(self, number: int) -> tuple[float, float, float]:
+        """Give a rover's true north and east in metres, and heading in degrees."""
+        truth = self.rovers[number - 1].truth
+        return truth.north, truth.east, degrees(truth.yaw)
+
+    def queue_paused(self, number: int) -> R:
+        """Give why a rover's queue stands."""
+        return self.seen(number).paused
+
+    def is_heard(self, number: int) -> bool:
+        """Whether the server hears a rover."""
+        return self.seen(number).heard
+
+    def seen(self, number: int) -> VehicleSnapshot:
+        """Give what the server knows of a rover."""
+        found = self.server.engine.snapshot(now=self.now).vehicles
+        return next(vehicle for vehicle in found if vehicle.system_id == number)
+
+    def sent_to(self, number: int, since: float) -> list[str]:
+        """Give in words what the server has sent to a rover."""
+        return self.observers[number - 1].sent_since(since)
+
+    def journal_of(self, number: int) -> list[object]:
+        """Give all that the journal has of one rover."""
+        return [event for event in self.events(object) if _vehicle_of(event) == number]
+
+    def when(self, task_id: int, state: S) -> float:
+        """Give when a task came into a state first."""
+        changes = self.events(TaskChanged)
+        return next(e.at for e in changes if (e.task_id, e.new) == (task_id, state))
+
+    def work_at(self, endpoint: str, since: float) -> list[float]:
+        """Give when setpoints and commands left the server for an endpoint."""
+        sent = self.watched.towards.get(endpoint, [])
+        return [at for at, data in sent if at >= since and data[7] in WORK]
+
+    def tasks_of(self, number: int) -> list[Task]:
+        """Give one rover's tasks, oldest first."""
+        return [task for task in self.tasks() if task.vehicle == number]
+
+
+def _vehicle_of(event: object) -> int | None:
+    if isinstance(event, TaskSubmitted):
+        return event.task.vehicle
+    vehicle: int | None = getattr(event, "vehicle", None)
+    return vehicle
+
+
+def packed(message: Any, system_id: int, component_id: int) -> bytes:
+    """Give a message as a packet of this address."""
+    raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))
+    return raw
+
+
+def start_of(number: int) -> Pose:
+    """Give where a rover begins: three metres from the next one, facing north."""
+    return Pose(east=3.0 * (number - 1))

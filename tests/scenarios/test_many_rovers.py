@@ -1,0 +1,899 @@
+"""Many rovers on many links: each has its own tasks, what befalls one is no other's business."""
+
+import struct
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from itertools import pairwise
+from math import cos, degrees, radians, sin
+from typing import Any, NamedTuple, Protocol
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.links.memory import Conditions
+from mav_tasks.mavlink.address import Address
+from mav_tasks.settings import Settings, Watch
+from mav_tasks.tasks.events import TaskChanged, VehicleNoted, VehicleSeen
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.task import Move, Rotate, Task
+from rover_sim.autopilot import Autopilot
+from rover_sim.body import Pose
+from rover_sim.faults import Faults
+from rover_sim.geo import DEFAULT_ORIGIN
+from rover_sim.personas import Mode
+from rover_sim.vehicle import Vehicle
+from tests.kit.client import (
+    ACCEPTED,
+    ACK,
+    ARM,
+    DENIED,
+    FAILED,
+    GUIDED,
+    MOVE,
+    REPEATS,
+    REQUEST,
+    ROTATE,
+    SET_INTERVAL,
+    TASK_QUEUE_STATUS,
+    TASK_STATUS,
+    TEMPORARILY_REJECTED,
+    FakeClient,
+    Sent,
+    TaskStatus,
+    setpoint,
+)
+from tests.kit.fleet import Fleet, Layout, Radio, packed, start_of
+from tests.kit.world import (
+    PROMPT,
+    kinematic_body,
+    near_pose,
+)
+
+CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
+PRIORITY = 1
+HEARTBEAT = 0
+OFF = Faults(silent=True, deaf=True)
+GOOD = Conditions()
+BRAKING = 3.5  # s, from the speeds driven here to a stand
+SERVER = (250, 191)  # on the vehicle links
+
+
+class MakeFleet(Protocol):
+    """Makes a fleet (see Fleet) whose observers are asked at the end of the test."""
+
+    def __call__(self, layout: Layout, **kw: Any) -> Fleet: ...
+
+
+@pytest.fixture
+def make_fleet() -> Iterator[MakeFleet]:
+    """Give a factory of fleets that are ready to be used."""
+    fleets: list[Fleet] = []
+
+    def make(layout: Layout, **kw: Any) -> Fleet:
+        fleet = Fleet(layout, **kw)
+        fleets.append(fleet)
+        fleet.ready()
+        return fleet
+
+    yield make
+    for fleet in fleets:
+        fleet.check()
+
+
+TEN: Layout = {
+    "own": {"a": (1,)},
+    "shared": {"b": (2,), "c": (3,), "d": (4,)},
+    "radio": {"e": (5, 6, 7)},
+    "mixed": {"f": (8, 9), "g": (10,), "h": (11,)},
+}
+FIVE: Layout = {"own": {"a": (1,)}, "shared": {"b": (2,), "c": (3,)}, "radio": {"d": (4, 5)}}
+THREE: Layout = {"one": {"a": (1,)}, "two": {"b": (2,)}, "three": {"c": (3,)}}
+TWO: Layout = {"one": {"a": (1,)}, "two": {"b": (2,)}}
+
+
+class Diary(NamedTuple):
+    """All that was done with one rover, and when: two of them can be compared."""
+
+    journal: list[object]
+    driven: list[tuple[float, str, dict[str, Any]]]
+
+
+def diary_of(fleet: Fleet, number: int) -> Diary:
+    """Give what the journal has of a rover, and every setpoint and command that left for it."""
+    driven = [(at, m.get_type(), m.to_dict()) for at, m in fleet.observers[number - 1].driven]
+    return Diary(fleet.journal_of(number), driven)
+
+
+# each rover its own tasks
+
+
+def end_of(start: Pose, goals: list[Move | Rotate]) -> tuple[float, float, float]:
+    """Give north, east and heading in degrees after goals that end exactly where they say."""
+    north, east, yaw = start.north, start.east, start.yaw
+    for goal in goals:
+        if isinstance(goal, Move):
+            north += goal.distance * cos(yaw)
+            east += goal.distance * sin(yaw)
+        else:
+            yaw += goal.angle
+    return north, east, degrees(yaw)
+
+
+def acks_from(client: FakeClient, number: int) -> list[tuple[int, int, int]]:
+    """Give (command, result, result_param2) of the acks from a rover's task server."""
+    return [
+        (int(ack.command), int(ack.result), int(ack.result_param2))
+        for ack in client.acks
+        if (ack.get_srcSystem(), ack.get_srcComponent()) == (number, 191)
+    ]
+
+
+def test_ten_rovers_on_four_links_each_do_their_own_tasks_and_no_others(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(TEN)  # the eleventh has no task
+    clients = fleet.client, fleet.other
+    goals: dict[int, list[Move | Rotate]] = {
+        number: [  # no two rovers' are the same: those of another would end somewhere else
+            Move(0.3 + 0.04 * number, 1.0),
+            Rotate(radians(10.0 * number - 55), None),
+            Move(0.25 + 0.04 * (11 - number), 1.0),
+        ]
+        for number in range(1, 11)
+    }
+    for step in range(3):
+        for number in goals:
+            goal, client = goals[number][step], clients[(number + step) % 2]
+            if isinstance(goal, Move):
+                client.move(goal.distance, speed=1.0, target=(number, 191))
+            else:
+                client.rotate(degrees(goal.angle), target=(number, 191))
+        fleet.run(0.02)
+    fleet.until_idle(tasks=30, within=40)
+
+    assert sorted(task.id for task in fleet.tasks()) == list(range(1, 31))
+    assert {task.state for task in fleet.tasks()} == {S.COMPLETED}
+    for number, wanted in goals.items():
+        tasks = fleet.tasks_of(number)
+        assert near_pose(fleet.pose_of(number), end_of(start_of(number), wanted), metres=0.03)
+        assert [type(task.goal) for task in tasks] == [Move, Rotate, Move]
+        assert moved_only_between(fleet, number, tasks)
+        first, second, third = (task.id for task in tasks)
+        one, two = clients[number % 2], clients[1 - number % 2]
+        assert acks_from(one, number) == [(MOVE, ACCEPTED, first), (MOVE, ACCEPTED, third)]
+        assert acks_from(two, number) == [(ROTATE, ACCEPTED, second)]
+    by_id = {task.id: task.vehicle for task in fleet.tasks()}
+    assert all(change.vehicle == by_id[change.task_id] for change in fleet.events(TaskChanged))
+    assert [len(client.acks) for client in clients] == [15, 15]
+    for client in clients:  # each is told of its own tasks, from inside the right rover
+        told = {(p.source, TaskStatus.of(p.payload).task_id) for p in client.of_id(TASK_STATUS)}
+        assert told == {
+            ((task.vehicle, 191), task.id)
+            for task in fleet.tasks()
+            if task.submitter.endpoint == client.name
+        }
+    assert near_pose(fleet.pose_of(11), end_of(start_of(11), []), metres=0.0, angle=0.0)
+    assert {word for word in fleet.sent_to(11, 0.0) if not word.isdigit()} == set()
+
+
+def moved_only_between(fleet: Fleet, number: int, tasks: list[Task]) -> bool:
+    """Whether every moving setpoint for a rover left while one of these tasks was executed."""
+    spans = [(fleet.when(t.id, S.EXECUTING), fleet.when(t.id, S.COMPLETED)) for t in tasks]
+    return all(
+        any(begin <= at <= end for begin, end in spans)
+        for at, m in fleet.observers[number - 1].driven
+        if m.get_type().startswith("SET_POSITION") and (m.vx or m.yaw_rate)
+    )
+
+
+def test_commands_that_two_clients_have_for_two_rovers_at_once_are_answered_by_the_right_one(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(FIVE)
+    fleet.break_rover(4, OFF)  # behind the same radio as 5
+    for number in (4, 5):
+        fleet.client.arm(target=(number, 1))
+    fleet.other.arm(target=(2, 1))
+    fleet.run(0.05)
+    answers = [(a.get_srcSystem(), a.result) for a in fleet.client.acks]
+    assert answers == [(5, ACCEPTED)]  # it does not wait for the other one's answer
+    fleet.run(0.5)
+    answers = [(a.get_srcSystem(), a.result) for a in fleet.client.acks]
+    assert answers == [(5, ACCEPTED), (4, TEMPORARILY_REJECTED)]
+    assert [(a.get_srcSystem(), a.result) for a in fleet.other.acks] == [(2, ACCEPTED)]
+    assert [v.autopilot.armed for v in fleet.rovers] == [False, True, False, False, True]
+
+
+# With other rovers' commands between a command and its repeat: a swarm script sends to all at once.
+def test_a_client_that_repeats_itself_to_several_rovers_drives_each_of_them_once(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(THREE)
+    heard_again_at = fleet.now + 1.2
+
+    def loses(source: str, _target: str, data: bytes) -> bool:
+        return source == CLIENT_LINK and data[7] == ACK and fleet.now < heard_again_at
+
+    fleet.watched.loses = loses
+    for number in (1, 2, 3):
+        fleet.client.move(0.3, target=(number, 191), repeats=REPEATS)
+    fleet.run(2)
+    assert [task.vehicle for task in fleet.tasks()] == [1, 2, 3]
+
+
+# one rover in trouble changes nothing for another
+
+
+class Flood:
+    """One rover says very much: telemetry, texts, what nobody knows, and noise."""
+
+    def __init__(self, radio: Radio, *, target: str, rate: float, now: float) -> None:
+        mav = common.MAVLink(None, 1, 1)
+        self._radio = radio
+        self._target = target
+        self._period = 1.0 / rate
+        self._next_at = now
+        self._packets = [
+            common.MAVLink_scaled_imu_message(0, 1, 2, 3, 4, 5, 6, 7, 8, 9).pack(mav),
+            common.MAVLink_statustext_message(2, b"prearm: bad").pack(mav),
+            common.MAVLink_command_ack_message(ARM, 0, 0, 0, *SERVER).pack(mav),
+            bytes((0xFD, 3, 0, 0, 7, 1, 1, 0x11, 0x27, 0)) + b"abc" + b"\x12\x34",
+            b"\xfd garbage",
+        ]
+
+    def next_deadline(self) -> float:
+        """Give when the next burst is due."""
+        return self._next_at
+
+    def turn(self, *, now: float) -> None:
+        """Send what is due."""
+        while self._next_at <= now:
+            self._next_at += self._period
+            for packet in self._packets:
+                self._radio.link.send(self._target, packet)
+
+
+def flood(fleet: Fleet) -> None:
+    """Let what comes from the first rover be five hundred packets a second."""
+    radio = next(radio for radio in fleet.radios.values() if fleet.rover in radio.vehicles)
+    target = fleet.watched.link_of[radio.link.name]
+    fleet.join(Flood(radio, target=target, rate=100, now=fleet.now))
+
+
+def take_link_down(fleet: Fleet) -> None:
+    fleet.observer.expects_gaps = True
+    fleet.link_down("one")
+
+
+#: what befalls the first rover, and how many seconds after the first command
+TROUBLES: dict[str, tuple[float, Callable[[Fleet], None]]] = {
+    "falls silent": (2.0, lambda fleet: fleet.break_rover(1, OFF)),
+    "refuses modes": (0.0, lambda fleet: fleet.break_rover(1, Faults(refuse_mode=True))),
+    "refuses to arm": (0.0, lambda fleet: fleet.break_rover(1, Faults(refuse_arm=True))),
+    "answers late": (0.0, lambda fleet: fleet.watched.late.update({1: 1.5})),
+    "becomes late": (2.0, lambda fleet: fleet.watched.late.update({1: 1.5})),
+    "floods": (1.0, flood),
+    "loses its link": (2.0, take_link_down),
+}
+PLACES: dict[str, Layout] = {
+    "another link": TWO,
+    "the same link": {"one": {"a": (1,), "b": (2,)}},
+    "the same radio": {"one": {"r": (1, 2)}},
+}
+BAD = Conditions(delay=0.004, jitter=0.03, loss=0.03, duplication=0.03)
+
+
+class Lived(NamedTuple):
+    """What became of two rovers, the first of them in trouble or not."""
+
+    first: Diary
+    second: Diary
+    #: (result, result_param2) and its time, of each command for the second
+    answers: list[tuple[tuple[int, int] | None, float]]
+    pose: tuple[float, float, float]
+
+
+def live(where: str, trouble: str | None, conditions: Conditions = GOOD, seed: int = 0) -> Lived:
+    """Let two rovers live ten seconds; all that a client asks is asked at fixed times."""
+    fleet = Fleet(PLACES[where], seed=seed, conditions=conditions)
+    fleet.ready()
+    a, b = fleet.client, fleet.other
+    script: list[tuple[float, Callable[[], Sent | None]]] = [
+        (0.0, lambda: a.move(2.0, target=(1, 191))),
+        (0.1, lambda: b.move(1.5, speed=0.8, target=(2, 191))),
+        (2.5, lambda: a.rotate(90, target=(1, 191))),
+        (2.6, lambda: b.rotate(-120, target=(2, 191))),
+        (3.0, lambda: b.pause(target=(2, 191))),
+        (4.5, lambda: b.proceed(target=(2, 191))),
+        (4.7, lambda: b.move(3, target=(2, 191))),
+        (8.0, lambda: b.command(CANCEL, 0, target=(2, 191))),
+    ]
+    if trouble is not None:
+        at, begin = TROUBLES[trouble]
+        script.insert(0, (at, partial(begin, fleet)))
+    began = fleet.now
+    answers = []
+    for at, act in sorted(script, key=lambda step: step[0]):
+        fleet.run(began + at - fleet.now)
+        sent = act()
+        if sent is not None and sent.message.target_system == 2:
+            answers.append(sent)
+    fleet.run(began + 10.0 - fleet.now)
+    fleet.check()
+    return Lived(
+        diary_of(fleet, 1),
+        diary_of(fleet, 2),
+        [(sent.answer, sent.acked_at) for sent in answers],
+        fleet.pose_of(2),
+    )
+
+
+@cache
+def in_peace(where: str, conditions: Conditions = GOOD, seed: int = 0) -> Lived:
+    """Live without any trouble."""
+    lived = live(where, None, conditions, seed)
+    changes = [e for e in lived.second.journal if isinstance(e, TaskChanged)]
+    assert {S.PAUSED, S.COMPLETED, S.CANCELLED} <= {change.new for change in changes}
+    assert len(lived.second.driven) > 150
+    return lived
+
+
+TROUBLED = [
+    *(("another link", trouble) for trouble in TROUBLES),
+    ("the same link", "becomes late"),
+    ("the same link", "floods"),
+    ("the same radio", "falls silent"),
+    ("the same radio", "floods"),
+]
+
+
+@pytest.mark.parametrize(("where", "trouble"), TROUBLED)
+def test_what_befalls_one_rover_changes_nothing_for_another(where: str, trouble: str) -> None:
+    """To the last bit and the same moment: each vehicle ticks in a rhythm of its own.
+
+    Task ids are the same as well, because both clients' submissions are accepted in every case.
+    """
+    peace, lived = in_peace(where), live(where, trouble)
+    assert lived.second.journal == peace.second.journal
+    assert lived.second.driven == peace.second.driven
+    assert lived.answers == peace.answers
+    assert lived.pose == peace.pose
+    if trouble != "floods":  # which is none for the rover itself
+        assert lived.first.journal != peace.first.journal
+
+
+@pytest.mark.parametrize("trouble", ["falls silent", "becomes late"])
+def test_nor_does_it_over_a_bad_net(trouble: str) -> None:
+    """The other rover's packets are lost and late exactly as they were in peace."""
+    peace, lived = (
+        in_peace("another link", BAD, 5),
+        live("another link", trouble, BAD, 5),
+    )
+    assert lived.second == peace.second
+    assert lived.pose == peace.pose
+
+
+def test_a_second_controller_on_one_link_takes_only_the_rovers_of_that_link(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(FIVE)
+    drive_all(fleet)
+    fleet.watched.observers_at["stranger"] = tuple(fleet.observers[1:3])
+    heartbeat = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+    fleet.net.send("stranger", "server:shared", packed(heartbeat, *SERVER))
+    fleet.run(1)
+    states = [fleet.tasks_of(number)[0].state for number in range(1, 6)]
+    assert states == [S.EXECUTING, S.PAUSED, S.PAUSED, S.EXECUTING, S.EXECUTING]
+    assert [fleet.queue_paused(n) for n in (2, 3)] == [R.TAKEOVER, R.TAKEOVER]
+
+
+# What is for system 0 is heard by all behind an endpoint, so that all of them must be allowed it.
+@pytest.mark.parametrize("other", ["drives", "is stopped", "is not armed"])
+def test_a_setpoint_for_all_does_not_reach_who_may_not_have_it_behind_the_same_radio(
+    other: str,
+) -> None:
+    fleet = Fleet({"radio": {"r": (1, 2)}})  # checked here, where the mark sees it
+    fleet.ready()
+    fleet.rover.autopilot.operator_mode(Mode.HOLD, now=fleet.now)
+    fleet.rover.autopilot.operator_arm(True, now=fleet.now)
+    fleet.run(0.5)
+    fleet.client.mode(GUIDED, target=(1, 1))
+    fleet.run(0.5)
+    if other == "drives":
+        fleet.other.move(5, target=(2, 191))
+        fleet.run(1)
+    elif other == "is stopped":
+        fleet.other.stop(target=(2, 191))
+        fleet.run(1)
+    fleet.client.stream(setpoint(0.5, 0.3, system=0), rate=10)
+    fleet.run(1)
+    fleet.client.end_streams()
+    fleet.client.stream(setpoint(0.5, 0.3, system=1), rate=10)
+    fleet.run(1)
+    assert not fleet.stands(1)  # what is for it alone passes all the same
+    fleet.check()
+
+
+def test_what_is_for_all_goes_once_to_an_endpoint(make_fleet: MakeFleet) -> None:
+    fleet = make_fleet({"radio": {"r": (1, 2)}, "own": {"o": (3,)}})
+    since = fleet.now
+    fleet.run(5)
+    beats = {
+        endpoint: sum(t > since and d[7] == HEARTBEAT and d[5] == 255 for t, d in sent)
+        for endpoint, sent in fleet.watched.towards.items()
+    }
+    assert beats == {"r": 5, "o": 5}
+
+
+# STOP
+
+
+def drive_all(fleet: Fleet) -> None:
+    """Have every rover drive a task of its own."""
+    for number in range(1, len(fleet.rovers) + 1):
+        fleet.client.move(20, speed=1.0, target=(number, 191))
+    fleet.run(2.5)
+    assert not any(fleet.stands(number) for number in range(1, len(fleet.rovers) + 1))
+
+
+def stands_in_hold(fleet: Fleet, number: int) -> bool:
+    rover, control = fleet.rovers[number - 1], fleet.seen(number).control
+    return fleet.stands(number) and rover.autopilot.mode is Mode.HOLD and control == "IDLE"
+
+
+def test_stop_for_all_reaches_every_link_in_one_step_and_is_latched_for_each(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(FIVE)
+    drive_all(fleet)
+    at = fleet.now
+    stop = fleet.other.stop(target=(0, 0))
+    fleet.run(0.0015)  # the way to the server, and not a tick more
+    holds = [[t for t, _ in o.driven if t > at] for o in fleet.observers]
+    assert [fleet.sent_to(n, holds[n - 1][0]) for n in range(1, 6)] == [["HOLD", "zero"]] * 5
+    assert len({t for times in holds for t in times}) == 1
+    fleet.until(lambda: all(stands_in_hold(fleet, n) for n in range(1, 6)), within=BRAKING)
+    assert stop.answer == (ACCEPTED, 1)
+    assert len(fleet.other.acks) == 1
+    assert {t.state for t in fleet.tasks()} == {S.KILLED}
+
+    for number in range(1, 6):
+        fleet.client.rotate(30, target=(number, 191))
+    fleet.run(2)
+    assert {fleet.queue_paused(n) for n in range(1, 6)} == {R.STOPPED}
+    fleet.client.proceed(target=(4, 191))
+    fleet.run(4)
+    states = [fleet.tasks_of(n)[1].state for n in range(1, 6)]
+    assert states == [S.QUEUED, S.QUEUED, S.QUEUED, S.COMPLETED, S.QUEUED]
+
+
+@pytest.mark.parametrize(("number", "how"), [(1, "link"), (4, "silent")])
+def test_stop_for_all_stops_the_others_and_a_silent_one_as_soon_as_it_is_heard(
+    make_fleet: MakeFleet, number: int, how: str
+) -> None:
+    fleet = make_fleet(FIVE)
+    drive_all(fleet)
+    lost, others = fleet.observers[number - 1], [n for n in range(1, 6) if n != number]
+    if how == "link":
+        lost.expects_gaps = True
+        fleet.link_down("own")
+    else:
+        fleet.break_rover(number, OFF)
+    fleet.run(4.1)
+    assert not fleet.is_heard(number)
+    stop = fleet.other.stop(target=(0, 0))
+    fleet.until(lambda: all(stands_in_hold(fleet, n) for n in others), within=BRAKING)
+    assert stop.answer == (FAILED, R.VEHICLE_SILENT)
+    assert {t.state for t in fleet.tasks()} == {S.KILLED}
+    assert {fleet.queue_paused(n) for n in range(1, 6)} == {R.STOPPED}
+
+    fleet.rovers[number - 1].autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
+    fleet.run(1)
+    back = fleet.now
+    if how == "link":
+        fleet.link_up("own")
+    else:
+        fleet.break_rover(number, Faults(deaf=True))  # it is heard, and does not hear yet
+    fleet.until(lambda: fleet.is_heard(number), within=2)
+    assert fleet.sent_to(number, back)[0] == "HOLD"
+    heard_at = [e.at for e in fleet.events(VehicleSeen) if e.text == "heard again"][-1]
+    assert fleet.sent_to(number, heard_at)[:2] == ["HOLD", "zero"]
+    fleet.break_rover(number, Faults())
+    fleet.until(lambda: stands_in_hold(fleet, number), within=BRAKING)
+    fleet.client.move(1, target=(number, 191))
+    fleet.run(2)
+    assert fleet.tasks_of(number)[-1].state is S.QUEUED
+
+
+@cache
+def driven_beside(stopped: int | None) -> tuple[Diary, ...]:
+    """Drive all five, and stop one of them or none; gives what was done with each."""
+    fleet = Fleet(FIVE)
+    fleet.ready()
+    drive_all(fleet)
+    if stopped is not None:
+        stop = fleet.other.stop(target=(stopped, 191))
+        fleet.run(3)
+        assert stop.answer == (ACCEPTED, stopped)
+        assert stands_in_hold(fleet, stopped)
+    else:
+        fleet.run(3)
+    fleet.check()
+    return tuple(diary_of(fleet, n) for n in range(1, 6))
+
+
+@pytest.mark.parametrize("stopped", [2, 4])
+def test_stop_for_one_leaves_the_others_driving_as_if_nothing_was(stopped: int) -> None:
+    """Not one setpoint of theirs is another one, or comes at another time."""
+    undisturbed, beside = driven_beside(None), driven_beside(stopped)
+    same = [a == b for a, b in zip(undisturbed, beside, strict=True)]
+    assert same == [number != stopped for number in range(1, 6)]
+
+
+# dependencies across links
+
+
+def test_tasks_run_after_each_other_across_links(make_fleet: MakeFleet) -> None:
+    fleet = make_fleet(THREE)
+    targets = [1, 2, 3, 1]
+    after = 0
+    for number in targets:
+        sent = fleet.client.command(MOVE, 0.4, 0, 0, 0, after, target=(number, 191))
+        fleet.run(0.05)
+        after = sent.task_id
+    fleet.other.rotate(40, target=(3, 191))  # one that waits for nothing
+    fleet.until_idle(tasks=5)
+    for first, second in pairwise(range(1, 5)):
+        wait = fleet.when(second, S.STARTING) - fleet.when(first, S.COMPLETED)
+        assert 0.0 <= wait < 0.05
+    assert fleet.when(5, S.COMPLETED) < fleet.when(3, S.STARTING)
+    assert near_pose(fleet.pose_of(1), (0.8, 0.0, 0.0))
+    assert {task.state for task in fleet.tasks()} == {S.COMPLETED}
+
+
+#: how a task can end other than completed, what it is then, and within how many seconds
+OTHER_ENDS: dict[str, tuple[Callable[[Fleet], object], tuple[S, R], float]] = {
+    "refused": (
+        lambda fleet: fleet.break_rover(1, Faults(refuse_mode=True)),
+        (S.FAILED, R.MODE_REFUSED),
+        2,
+    ),
+    "stuck": (
+        lambda fleet: fleet.break_rover(1, Faults(position_frozen=True)),
+        (S.FAILED, R.STUCK),
+        15,
+    ),
+    "out of reach": (take_link_down, (S.FAILED, R.LINK_TIMEOUT), 10),
+    "stopped": (lambda fleet: fleet.other.stop(target=(1, 191)), (S.KILLED, R.STOP), 1),
+    "cancelled": (
+        lambda fleet: fleet.other.command(CANCEL, 1, target=(1, 191)),
+        (S.CANCELLED, R.CANCELLED),
+        4,
+    ),
+}
+
+
+@pytest.mark.parametrize("how", OTHER_ENDS)
+def test_what_runs_after_a_task_that_did_not_complete_fails_on_every_link(
+    make_fleet: MakeFleet, how: str
+) -> None:
+    fleet = make_fleet(THREE, settings=Settings(watch=Watch(lost_timeout=6.0)))
+    act, end, within = OTHER_ENDS[how]
+    if how in ("refused", "stuck"):  # it shows before anything moves
+        act(fleet)
+    fleet.client.move(5, target=(1, 191))
+    fleet.client.command(MOVE, 0.4, 0, 0, 0, 1, target=(2, 191))
+    fleet.client.command(MOVE, 0.5, 0, 0, 0, 2, target=(3, 191))
+    fleet.client.command(MOVE, 0.6, 0, 0, 0, 1, target=(1, 191))
+    fleet.run(0.5)
+    assert [fleet.state(i)[0] for i in (2, 3, 4)] == [S.BLOCKED] * 3
+    if how not in ("refused", "stuck"):
+        act(fleet)
+    fleet.until_state(1, end[0], within=within)
+    assert fleet.state(1) == end
+    assert [fleet.state(i) for i in (2, 3, 4)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 3
+    for number in (2, 3):
+        assert set(fleet.sent_to(number, 0.0)) <= {"511", "512"}
+        fleet.other.move(0.3, target=(number, 191))  # nothing moved, so that nothing pauses
+    fleet.run(4)
+    assert [task.state for task in fleet.tasks()[4:]] == [S.COMPLETED, S.COMPLETED]
+
+
+# places
+
+
+def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
+    """Give another vehicle that has the same system id; by its unique id it is another one."""
+    body = kinematic_body(start)
+    autopilot = Autopilot(
+        system_id=99,
+        persona=PROMPT,
+        origin=DEFAULT_ORIGIN,
+        unix_offset=0.0,
+        truth=body.state,
+        now=now,
+    )
+    autopilot.address = Address(number, 1)
+    return Vehicle(body=body, autopilot=autopilot, now=now)
+
+
+TWINS: dict[str, Layout] = {
+    "another link": {"one": {"a": (1,)}, "two": {"b": (2,), "twin": ()}},
+    "the same link": {"one": {"a": (1,), "twin": ()}, "two": {"b": (2,)}},
+}
+
+
+def beside_a_twin(where: str, *, is_there: bool) -> tuple[Fleet, Vehicle]:
+    fleet = Fleet(TWINS[where])
+    fleet.ready()
+    twin = twin_of(1, start=Pose(north=50.0, east=5.0), now=fleet.now)
+    fleet.client.move(1, target=(1, 191))
+    fleet.client.move(2, target=(2, 191))
+    fleet.run(1.0)
+    if is_there:  # as bad as can be: it would follow the first setpoint that reaches it
+        fleet.radios["twin"].vehicles.append(twin)
+        twin.autopilot.operator_arm(True, now=fleet.now)
+        twin.autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
+    fleet.run(1.5)
+    fleet.client.rotate(45, target=(1, 191))
+    fleet.run(6.0)
+    fleet.check()
+    return fleet, twin
+
+
+@pytest.mark.parametrize("where", TWINS)
+def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes_on(
+    where: str,
+) -> None:
+    alone, _ = beside_a_twin(where, is_there=False)
+    fleet, twin = beside_a_twin(where, is_there=True)
+    notes = [e.text for e in fleet.events(VehicleNoted)]
+    assert notes == ["another of this id at twin: ignored"]
+    assert any("another of this id" in text for text in fleet.client.texts())
+    assert (twin.truth.north, twin.truth.east) == (50.0, 5.0)
+    assert {data[7] for _, data in fleet.watched.towards["twin"]} == {HEARTBEAT}
+    assert max(m.x for m in fleet.client.of_type("LOCAL_POSITION_NED")) < 3.0
+
+    mine, before = diary_of(fleet, 1), diary_of(alone, 1)
+    assert mine.driven == before.driven
+    assert [e for e in mine.journal if not isinstance(e, VehicleNoted)] == before.journal
+    assert diary_of(fleet, 2) == diary_of(alone, 2)
+    assert near_pose(fleet.pose_of(1), (1.0, 0.0, 45.0))
+
+
+# It must not be taken for the first one, come back at another place, and be given its tasks.
+@pytest.mark.parametrize("when", ["waiting", "driving"])
+def test_a_second_vehicle_of_one_id_is_not_driven_either_when_the_first_falls_silent(
+    make_fleet: MakeFleet, when: str
+) -> None:
+    fleet = make_fleet(TWINS["another link"])
+    twin = twin_of(1, start=Pose(north=0.5), now=fleet.now)
+    fleet.radios["twin"].vehicles.append(twin)
+    fleet.run(3)
+    if when == "waiting":
+        fleet.client.command(MOVE, 1.0, 0, 0, 0, 0, 6.0, target=(1, 191))
+        fleet.run(0.5)
+    else:  # the other one's own server has it in the same mode, and armed
+        twin.autopilot.operator_arm(True, now=fleet.now)
+        twin.autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
+        fleet.client.move(2, target=(1, 191))
+        fleet.run(1.5)
+    assert any("another of this id" in e.text for e in fleet.events(VehicleNoted))
+    fleet.break_rover(1, OFF)
+    fleet.run(12)
+    assert twin.truth.north == 0.5
+
+
+MOVABLE: Layout = {"one": {"a": (1,), "b": (2,)}, "two": {"c": (3,), "new": ()}}
+
+
+@pytest.mark.parametrize("silence", [0.0, 4.0])
+def test_a_rover_that_comes_back_on_another_link_is_driven_there_and_no_more_at_the_old_place(
+    make_fleet: MakeFleet, silence: float
+) -> None:
+    """With a short silence it is another of its id at first: one that may be both is not driven."""
+    fleet = make_fleet(MOVABLE)
+    fleet.client.move(4, target=(1, 191))
+    fleet.client.move(4, target=(2, 191))
+    fleet.run(1.5)
+    fleet.break_rover(1, OFF)
+    fleet.run(silence)
+    fleet.moves_house(1, source="a", target="new")
+    fleet.break_rover(1, Faults())
+    since = fleet.now
+    fleet.until(lambda: fleet.work_at("new", since), within=6)
+    moved_at = fleet.work_at("new", since)[0]
+    fleet.until_state(1, S.EXECUTING)
+    last_words = fleet.server.engine.last_words  # what is sent when the server itself fails
+    fleet.until_state(1, S.COMPLETED)
+
+    assert near_pose(fleet.pose_of(1), (4.0, 0.0, 0.0))
+    assert (S.PAUSED, R.POSITION_LOST) in fleet.history(1)
+    assert fleet.work_at("a", moved_at) == []
+    assert {word.peer for word in last_words} == {"new", "b"}
+    asked = fleet.other.arm(False, target=(1, 1))  # what a client has for it goes there, too
+    fleet.run(0.1)
+    assert asked.answer == (ACCEPTED, 0)
+    assert fleet.state(2)[0] is S.COMPLETED
+
+
+def test_a_rover_that_was_stopped_while_silent_hears_hold_first_at_its_new_place(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(MOVABLE)
+    fleet.client.move(20, target=(1, 191))
+    fleet.run(2)
+    fleet.break_rover(1, OFF)
+    fleet.run(4)
+    fleet.client.stop(target=(0, 0))
+    fleet.run(1)
+    fleet.moves_house(1, source="a", target="new")
+    fleet.break_rover(1, Faults())
+    since = fleet.now
+    fleet.until(lambda: fleet.work_at("new", since), within=3)
+    moved_at = fleet.work_at("new", since)[0]
+    assert fleet.sent_to(1, moved_at)[:2] == ["HOLD", "zero"]
+    fleet.until(lambda: stands_in_hold(fleet, 1), within=BRAKING)
+    fleet.client.move(1, target=(1, 191))
+    fleet.run(2)
+    assert fleet.tasks_of(1)[-1].state is S.QUEUED
+    assert fleet.work_at("a", moved_at) == []
+
+
+def test_a_rover_whose_link_was_down_goes_on_to_where_it_was_to_go(make_fleet: MakeFleet) -> None:
+    fleet = make_fleet(TWO)
+    fleet.client.move(3, target=(1, 191))
+    fleet.run(1.5)
+    take_link_down(fleet)
+    fleet.run(5)
+    assert fleet.state(1) == (S.PAUSED, R.POSITION_LOST)
+    fleet.link_up("one")
+    fleet.until_state(1, S.COMPLETED)
+    assert near_pose(fleet.pose_of(1), (3.0, 0.0, 0.0))
+
+
+def test_a_rover_that_calls_by_itself_gets_our_heartbeats_also_after_its_link_was_down(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(TWO, dials_in=("one",))
+    fleet.link_down("one")
+    fleet.run(2)
+    fleet.link_up("one")
+    since = fleet.now
+    fleet.run(5)
+    sent = fleet.watched.towards["a"]
+    beats = [t for t, d in sent if t >= since and d[7] == HEARTBEAT and (d[5], d[6]) == SERVER]
+    assert len(beats) >= 4
+
+
+def test_our_packets_are_numbered_without_gaps_also_after_a_link_was_down(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(TWO)
+    fleet.link_down("one")
+    fleet.run(1)
+    fleet.link_up("one")
+    since = fleet.now
+    fleet.run(1)
+    fleet.client.move(0.5, target=(1, 191))
+    fleet.run(3)
+    sent = fleet.watched.towards["a"]
+    numbers = [d[4] for t, d in sent if t >= since and (d[5], d[6]) == SERVER]
+    assert all((b - a) % 256 == 1 for a, b in pairwise(numbers))
+
+
+# what is shown
+
+
+class QueueStatus(NamedTuple):
+    """TASK_QUEUE_STATUS of one rover, decoded by hand."""
+
+    system_id: int
+    running_id: int
+    next_id: int
+    counts: tuple[int, ...]
+    paused_reason: int
+
+
+def queue_statuses(client: FakeClient) -> list[QueueStatus]:
+    """Give those that a client has received."""
+    found = []
+    for packet in client.of_id(TASK_QUEUE_STATUS):
+        values = struct.unpack("<5I14I2B", packet.payload.ljust(78, b"\0"))
+        found.append(QueueStatus(packet.source[0], values[2], values[3], values[5:19], values[19]))
+    return found
+
+
+@pytest.fixture
+def waiting(make_fleet: MakeFleet) -> Fleet:
+    """Two rovers behind one radio and one elsewhere, each with one task running and many waiting.
+
+    Of the first 20 wait in the queue, one for its time and one for a task of the second.
+    """
+    fleet = make_fleet({"radio": {"r": (1, 2)}, "own": {"o": (3,)}})
+    for nonce in range(1, 22):
+        fleet.client.move(9, nonce=nonce, target=(1, 191))
+        if nonce <= 6:
+            fleet.other.move(9, nonce=nonce, target=(2, 191), priority=8)
+            fleet.client.move(9, nonce=100 + nonce, target=(3, 191))
+    fleet.client.command(MOVE, 9, 0, 0, 200, 0, 50, target=(1, 191))
+    fleet.client.command(MOVE, 9, 0, 0, 201, 2, target=(1, 191))
+    fleet.run(1)
+    assert [len(fleet.tasks_of(n)) for n in (1, 2, 3)] == [23, 6, 6]
+    fleet.run(1)
+    return fleet
+
+
+def ids_of(fleet: Fleet, number: int) -> set[int]:
+    return {task.id for task in fleet.tasks_of(number)}
+
+
+def test_a_page_of_one_rovers_tasks_has_none_of_another(waiting: Fleet) -> None:
+    fleet = waiting
+    pages = [(1, 0, 16), (1, 16, 6), (2, 0, 5), (3, 0, 5), (3, 5, 0), (1, 5, 16)]
+    for number, first, count in pages:
+        for client in (fleet.client, fleet.other):
+            before = len(list(client.of_id(TASK_STATUS)))
+            client.command(REQUEST, TASK_STATUS, 0, first, target=(number, 191))
+            fleet.run(0.1)
+            page = list(client.of_id(TASK_STATUS))[before:]
+            assert {packet.source for packet in page} <= {(number, 191)}
+            shown = [TaskStatus.of(packet.payload).task_id for packet in page]
+            assert len(set(shown)) == len(shown) == count
+            assert set(shown) <= ids_of(fleet, number)
+            running = fleet.tasks_of(number)[0].id
+            assert running not in shown
+
+
+def test_the_status_of_one_rovers_queue_counts_none_of_another(waiting: Fleet) -> None:
+    fleet = waiting
+    fleet.other.pause(target=(2, 191))
+    fleet.run(0.5)
+    for number in (1, 2, 3):
+        fleet.client.command(REQUEST, TASK_QUEUE_STATUS, target=(number, 191))
+        fleet.other.command(REQUEST, TASK_QUEUE_STATUS, target=(number, 191))
+        fleet.run(0.1)
+    for client in (fleet.client, fleet.other):
+        first, second, third = queue_statuses(client)
+        assert [s.system_id for s in (first, second, third)] == [1, 2, 3]
+        for status, paused in ((first, R.NONE), (second, R.OPERATOR), (third, R.NONE)):
+            tasks = fleet.tasks_of(status.system_id)
+            counts = [sum(t.state is state for t in tasks) for state in S]
+            assert list(status.counts) == counts
+            assert status.running_id == tasks[0].id
+            assert status.next_id == tasks[1].id
+            assert status.paused_reason == paused
+        assert (first.counts[S.SCHEDULED], first.counts[S.BLOCKED]) == (1, 1)
+
+
+def test_a_task_of_another_rover_is_not_touched_and_never_shown_as_ones_own(
+    waiting: Fleet,
+) -> None:
+    fleet = waiting
+    foreign = fleet.tasks_of(2)[3]
+    before = fleet.task(foreign.id)
+    for command, *params in ((CANCEL, foreign.id), (MODIFY, foreign.id, PRIORITY, 1)):
+        sent = fleet.client.command(int(command), *params, target=(1, 191))
+        fleet.run(0.1)
+        assert sent.answer == (DENIED, R.NOT_FOUND)
+    fleet.client.request_status(foreign.id, target=(1, 191))
+    fleet.run(0.1)
+    statuses = [(p.source, TaskStatus.of(p.payload)) for p in fleet.client.of_id(TASK_STATUS)]
+    assert {source for source, s in statuses if s.task_id == foreign.id} <= {(2, 191)}
+    assert fleet.task(foreign.id) == before
+    cleared = fleet.client.command(CLEAR, 1, target=(1, 191))
+    fleet.run(2)
+    assert cleared.result == ACCEPTED
+    assert {t.state for t in fleet.tasks_of(1)} == {S.CANCELLED}
+    assert [t.state for t in fleet.tasks_of(2)] == [S.EXECUTING] + [S.QUEUED] * 5
+
+
+def test_a_stream_of_statuses_asked_of_one_rover_has_no_task_of_another(waiting: Fleet) -> None:
+    fleet = waiting
+    watcher = fleet.add_client("watcher", system_id=77)
+    fleet.run(1.5)
+    watcher.command(SET_INTERVAL, TASK_STATUS, 100_000, target=(1, 191))
+    fleet.run(1)
+    assert {packet.source for packet in watcher.of_id(TASK_STATUS)} == {(1, 191)}
