@@ -50,9 +50,8 @@ class Rig:
     def client_sends(self, message: m.Message) -> list[bytes]:
         """What of it goes to the radio."""
         self.handle("c", CLIENT, message, GCS)
-        return [
-            o for o in self.engine.take_packets() if o.peer == RADIO and o.data[7] == message.id
-        ]
+        left = [o.data for o in self.engine.take_packets() if o.peer == RADIO]
+        return [data for data in left if data[5] == GCS.system_id and data[7] == message.id]
 
 
 def setpoint(system_id: int) -> m.Message:
