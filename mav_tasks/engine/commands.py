@@ -4,7 +4,7 @@ Every command is answered exactly once, from the component that was addressed, t
 asked. What is not ours is forwarded to the vehicle, whose answer comes back through ``deliver``.
 """
 
-from math import isnan
+from math import isfinite
 from typing import NamedTuple
 
 from mav_tasks.engine.asked import Asked
@@ -128,7 +128,13 @@ class Commands:
     def _dispatch(self, asked: Asked, *, now: float) -> None:
         component = asked.command.target.component_id
         at_server = component == asked.vehicle.server_component
-        if component in (0, AUTOPILOT) or at_server:
+        # an autopilot answers for components that are not there: also about what it sends
+        is_interval = asked.command.command in (
+            MavCmd.SET_MESSAGE_INTERVAL,
+            MavCmd.GET_MESSAGE_INTERVAL,
+        )
+        at_nobody = is_interval and not asked.vehicle.is_own_component(component)
+        if component in (0, AUTOPILOT) or at_server or at_nobody:
             match asked.command.command:
                 case number if becomes_task(number) and (at_server or self._claims(number)):
                     self._take_in(asked, now=now)
@@ -197,6 +203,8 @@ class Commands:
         if ack is not None:
             # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK
             result = ack.result if ack.result <= MavResult.CANCELLED else MavResult.UNSUPPORTED
+            if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
+                result = MavResult.UNSUPPORTED  # as some say that they have no such message
             answer = Answer(command, result, ack.result_param2, asker.answering)
         elif command == MavCmd.REQUEST_MESSAGE:
             answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
@@ -253,21 +261,23 @@ class Commands:
             if target.component_id
             in (0, AUTOPILOT, MavComponent.ONBOARD_COMPUTER, vehicle.server_component)
         ]
-        if not targets:
-            return
         actor = str(client.submitter(packet.source))
         clear = command.params[0] == 1.0
+        unheard = self._vehicles.stop_unheard(target.system_id, clear=clear, actor=actor, now=now)
+        if not targets and not unheard:
+            return
         killed = [vehicle.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
         client.uses_dialect = True
-        silent = [vehicle for vehicle in targets if not vehicle.is_heard(now=now)]
-        source = (
-            targets[0].server_address
-            if target.system_id == 0
-            else Address(target.system_id, target.component_id or targets[0].server_component)
+        silent = [vehicle.system_id for vehicle in targets if not vehicle.is_heard(now=now)]
+        silent += unheard
+        component = targets[0].server_component if targets else MavComponent.ONBOARD_COMPUTER
+        source = Address(
+            target.system_id or min([*unheard, *(vehicle.system_id for vehicle in targets)]),
+            (target.component_id if target.system_id else 0) or component,
         )
         if silent:
             result, param2 = MavResult.FAILED, int(R.VEHICLE_SILENT)
-            words = ", ".join(str(vehicle.system_id) for vehicle in silent)
+            words = ", ".join(map(str, silent))
             client.tell(f"STOP kept: vehicle {words} silent", MavSeverity.ERROR, source, now=now)
         else:
             result, param2 = MavResult.ACCEPTED, next((k for k in killed if k), 0)
@@ -325,7 +335,7 @@ def _check_relay(asked: Asked, *, now: float) -> None:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
     if number in MOVING and not vehicle.may_move(asked.client.key):
         raise Rejection(R.NOT_ALLOWED, f"command {number}: not while tasks drive")
-    if number == MavCmd.DO_CHANGE_SPEED and isnan(params[1]):
+    if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
     if number in MOVING:
         vehicle.is_moved_by_client(now=now)

@@ -53,6 +53,8 @@ MAX_WAIT = 86_400.0  # s
 MAX_DELAY = 31_536_000.0  # s, a year
 CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
 MAX_FLAGS = 0xFFFFFF  # of a bit mask in a float32
+MIN_SPEED = 0.01  # m/s; slower, a drive of a metre takes minutes and is taken for being stuck
+MIN_RATE = 0.1  # deg/s, the same of turning
 HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own time-out of a setpoint
 
 _MARK = Struct("<BBHh7d")
@@ -139,19 +141,23 @@ def number(
 
 
 def whole(
-    command: Command, index: int, name: str, *, low: int = 0, high: int, default: int = 0
+    command: Command, index: int, name: str, *, low: int = 0, high: int, default: int | None = 0
 ) -> int:
-    """Give a parameter that must be a whole number, or raise a Rejection that names it."""
-    value = number(command, index, name, low=low, high=high, default=float(default))
+    """Give a parameter that must be a whole number, or raise a Rejection that names it.
+
+    ``default`` None: it must be given.
+    """
+    fallback = None if default is None else float(default)
+    value = number(command, index, name, low=low, high=high, default=fallback)
     if value != int(value):
         words = f"param{index} {name} {value:.8g} is not a whole number"
         raise Rejection(R.BAD_PARAMETER, words)
     return int(value)
 
 
-def flag(command: Command, index: int, name: str) -> bool:
+def flag(command: Command, index: int, name: str, *, default: int | None = 0) -> bool:
     """Give a parameter that is 0 or 1."""
-    return whole(command, index, name, high=1) == 1
+    return whole(command, index, name, high=1, default=default) == 1
 
 
 def place_in(command: Command) -> Place | None:
@@ -202,8 +208,22 @@ def _speed(command: Command, index: int, driving: Driving) -> float | None:
     """Give a speed in m/s, None for the default: 0, -1 or NaN."""
     if command.params[index - 1] == -1.0:
         return None
-    speed = number(command, index, "speed", low=0.0, high=driving.max_speed, default=0.0)
-    return speed or None
+    return _speed_or_default(command, index, driving)
+
+
+def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:
+    """Give a speed in m/s, None for the default: 0 or NaN."""
+    if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
+        return None
+    return number(command, index, "speed", low=MIN_SPEED, high=driving.max_speed)
+
+
+def _rate_or_default(command: Command, index: int, driving: Driving) -> float | None:
+    """Give a rate of turn in rad/s, None for the default: 0 or NaN."""
+    if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
+        return None
+    fastest = degrees(driving.max_turn_rate)
+    return radians(number(command, index, "rate", low=MIN_RATE, high=fastest))
 
 
 # goals
@@ -212,21 +232,21 @@ def _speed(command: Command, index: int, driving: Driving) -> float | None:
 def _move(command: Command, driving: Driving) -> Goal:
     longest = driving.max_distance
     distance = number(command, 1, "distance", low=-longest, high=longest)
-    speed = number(command, 2, "speed", low=0.0, high=driving.max_speed, default=0.0)
+    speed = _speed_or_default(command, 2, driving)
     _refuse_reserved(command, 3)
     if distance == 0.0:
         raise Rejection(R.BAD_PARAMETER, "param1 distance is 0: nothing to do")
-    return Move(distance, speed or None)
+    return Move(distance, speed)
 
 
 def _rotate(command: Command, driving: Driving) -> Goal:
-    turn, fastest = degrees(driving.max_turn), degrees(driving.max_turn_rate)
+    turn = degrees(driving.max_turn)
     angle = number(command, 1, "angle", low=-turn, high=turn)
-    rate = number(command, 2, "rate", low=0.0, high=fastest, default=0.0)
+    rate = _rate_or_default(command, 2, driving)
     _refuse_reserved(command, 3)
     if angle == 0.0:
         raise Rejection(R.BAD_PARAMETER, "param1 angle is 0: nothing to do")
-    return Rotate(radians(angle), radians(rate) or None)
+    return Rotate(radians(angle), rate)
 
 
 def _drive(command: Command, driving: Driving) -> Goal:
@@ -287,8 +307,7 @@ def _delay(command: Command, _driving: Driving) -> Goal:
 
 def _condition_yaw(command: Command, driving: Driving) -> Goal:
     angle = number(command, 1, "angle", low=-360.0, high=360.0)
-    fastest = degrees(driving.max_turn_rate)
-    rate = radians(number(command, 2, "rate", low=0.0, high=fastest, default=0.0)) or None
+    rate = _rate_or_default(command, 2, driving)
     direction = whole(command, 3, "direction", low=-1, high=1)
     if not flag(command, 4, "relative"):
         return Face(radians(angle), direction, rate)

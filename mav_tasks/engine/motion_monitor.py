@@ -25,7 +25,7 @@ class MotionMonitor:
 
     def receive(self, message: Attitude | LocalPositionNed, *, now: float) -> None:
         """Take a message in; one that is not finite, or older than the last, is dropped."""
-        if not _is_finite(message) or not self._is_newer(message):
+        if not is_finite(message) or not self._is_newer(message):
             return
         if isinstance(message, LocalPositionNed):
             if not self._is_frozen(message):
@@ -105,7 +105,8 @@ class MotionMonitor:
         )
 
 
-def _is_finite(message: Attitude | LocalPositionNed) -> bool:
+def is_finite(message: Attitude | LocalPositionNed) -> bool:
+    """Whether all numbers of it that are used are numbers."""
     if isinstance(message, LocalPositionNed):
         return all(map(isfinite, (message.x, message.y, message.vx, message.vy)))
     return isfinite(message.yaw) and isfinite(message.yawspeed)

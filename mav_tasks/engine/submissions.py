@@ -39,7 +39,8 @@ class Submissions:
         self._recollection = recollection
         self._settings = settings
         self._gate = CommitGate()
-        self._undecided: set[TaskId] = set()  # taken in, and not durable yet
+        #: taken in, and not durable yet: who is to be told, each client once
+        self._undecided: dict[TaskId, list[Asked]] = {}
         self._store_is_away = False
         self._is_closing = False
 
@@ -152,7 +153,7 @@ class Submissions:
 
     def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
         self._recollection.remember(task, at=now, now=now)
-        self._undecided.add(task.id)
+        self._undecided[task.id] = [asked]
         self._gate.hold(
             self._book.recorded,
             give_up_at=now + self._settings.watch.commit,
@@ -162,29 +163,35 @@ class Submissions:
 
     def _accept(self, asked: Asked, task: Task, *, now: float) -> None:
         """The submission is durable: acknowledge it with the task's id, and tell of it."""
-        self._undecided.discard(task.id)
-        asked.answer(MavResult.ACCEPTED, task.id)
-        asked.client.statuses.changed(task.id)
+        for each in self._undecided.pop(task.id):
+            each.answer(MavResult.ACCEPTED, task.id)
+            each.client.statuses.changed(task.id)
         words = f"Task {task.id} queued: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, asked.vehicle.server_address, now=now)
 
     def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:
-        self._undecided.discard(task.id)
+        askers = self._undecided.pop(task.id)
         self._recollection.forget(task)
         self._store_is_away = True
         current = self._book.get(task.id)
         if current is not None and asked.vehicle.tasks.waits(current):
             asked.vehicle.tasks.withdraw(current, now=now)
         refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
-        self._book.record(asked.refuse(refusal, now=now))
+        for each in askers:
+            self._book.record(each.refuse(refusal, now=now))
 
     def _answer_repeat(self, asked: Asked, known: Known, *, now: float) -> None:
         """The same submission again: the same answer, or none yet if it has none yet."""
         if known.task_id in self._undecided:
+            askers = self._undecided[known.task_id]
+            if asked.client.key not in {each.client.key for each in askers}:
+                askers.append(asked)
             return
         asked.answer(MavResult.ACCEPTED, known.task_id)
         asked.client.statuses.changed(known.task_id)  # it names the nonce; an ack does not
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL):
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
-            words = f"same {what} again: still task {known.task_id}"
+            task = self._book.get(known.task_id)
+            state = "" if task is None else f", {task.state.name.lower()}"
+            words = f"same {what} again: still task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)

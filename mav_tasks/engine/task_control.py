@@ -67,7 +67,7 @@ class TaskControl:
             vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: Asked, *, now: float) -> int:
-        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID)
+        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
         kill = flag(asked.command, 2, "kill")
         begun = asked.vehicle.tasks.begun
         if task_id == 0 and begun is None:
@@ -82,8 +82,8 @@ class TaskControl:
         return 0
 
     def _release(self, asked: Asked, *, now: float) -> int:
-        task = self._find(asked, whole(asked.command, 1, "task", low=1, high=MAX_TASK_ID))
-        how = whole(asked.command, 2, "how", high=SKIP)
+        task = self._find(asked, _task_id(asked.command))
+        how = whole(asked.command, 2, "how", high=SKIP, default=None)
         if task.state is not TaskState.HELD:
             raise Rejection(R.WRONG_STATE, f"task {task.id} is not held, it is {_words(task)}")
         if how == SKIP:
@@ -93,7 +93,7 @@ class TaskControl:
         return task.id
 
     def _modify(self, asked: Asked, *, now: float) -> int:
-        task = self._find(asked, whole(asked.command, 1, "task", low=1, high=MAX_TASK_ID))
+        task = self._find(asked, _task_id(asked.command))
         terms = _modified(task, asked.command, now=now)
         asked.vehicle.modify(task, terms, actor=asked.actor, now=now)
         return task.id
@@ -118,6 +118,10 @@ class TaskControl:
         return task
 
 
+def _task_id(command: Command) -> int:
+    return whole(command, 1, "task", low=1, high=MAX_TASK_ID, default=None)
+
+
 def _words(task: Task) -> str:
     return task.state.name.lower()
 
@@ -125,12 +129,14 @@ def _words(task: Task) -> str:
 def _modified(task: Task, command: Command, *, now: float) -> Terms:
     """Give a task's terms with one of them changed."""
     terms = task.terms
-    wanted = whole(command, 2, "property", low=1, high=max(P))
+    wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
     if task.state not in WAITING and wanted in _OF_WAITING:
         raise Rejection(R.WRONG_STATE, f"task {task.id} has begun: {P(wanted).name} is fixed")
     match wanted:
         case P.PRIORITY:
-            return replace(terms, priority=whole(command, 3, "priority", high=MAX_PRIORITY))
+            return replace(
+                terms, priority=whole(command, 3, "priority", high=MAX_PRIORITY, default=None)
+            )
         case P.START_DELAY:
             delay = number(command, 3, "start delay", low=0.0, high=MAX_DELAY)
             return replace(terms, start_at=now + delay if delay else None, start_utc=None)
@@ -138,11 +144,13 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
             deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY)
             return replace(terms, deadline=now + deadline if deadline else None)
         case P.RUN_AFTER:
-            return replace(terms, after=whole(command, 3, "run after", high=MAX_TASK_ID))
+            return replace(
+                terms, after=whole(command, 3, "run after", high=MAX_TASK_ID, default=None)
+            )
         case P.PREEMPTIBLE:
-            return replace(terms, is_preemptible=flag(command, 3, "pre-emptible"))
+            return replace(terms, is_preemptible=flag(command, 3, "pre-emptible", default=None))
         case P.PREEMPTIVE:
-            return replace(terms, is_preemptive=flag(command, 3, "pre-emptive"))
+            return replace(terms, is_preemptive=flag(command, 3, "pre-emptive", default=None))
         case _:
             return replace(terms, start_at=None, start_utc=_utc(command))
 
@@ -154,4 +162,4 @@ def _utc(command: Command) -> int:
     if command.frame is None:
         words = "START_UTC: a float is too coarse, send it as COMMAND_INT"
         raise Rejection(R.BAD_PARAMETER, words)
-    return whole(command, 5, "UTC", low=1, high=0x7FFFFFFF)
+    return whole(command, 5, "UTC", low=1, high=0x7FFFFFFF, default=None)

@@ -56,6 +56,7 @@ UNIT_NONE = 0  # TASK_UNIT
 UNIT_METRES = 1
 UNIT_RADIANS = 2
 UNIT_SECONDS = 3
+FLOAT32_MAX = 3.4e38
 UNKNOWN_POSITION = 65535
 UNKNOWN_PROGRESS = 255
 
@@ -86,8 +87,8 @@ def task_status(
         nonce=task.nonce,
         after_task_id=task.terms.after,
         remaining=_remaining(task, leg),
-        time_to_start=to_start,
-        time_to_finish=to_finish,
+        time_to_start=_float32(to_start),
+        time_to_finish=_float32(to_finish),
         execution_time=nan if task.progress.anchor is None else task.progress.execution_time,
         command=task.command,
         queue_position=UNKNOWN_POSITION if position is None else position,
@@ -167,6 +168,11 @@ def task_id_of(command: Command) -> int:
 def first_index_of(command: Command) -> int:
     """Give the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 for nonsense."""
     return _whole(command.params[2])
+
+
+def _float32(value: float) -> float:
+    """Give a number that a float32 can hold; NaN, unknown, for one beyond all sense."""
+    return value if abs(value) < FLOAT32_MAX else nan
 
 
 def _whole(value: float) -> int:

@@ -10,7 +10,7 @@ from math import inf
 
 from mav_tasks.engine.authority import Authority
 from mav_tasks.engine.frame_monitor import FrameMonitor, Seen
-from mav_tasks.engine.motion_monitor import MotionMonitor
+from mav_tasks.engine.motion_monitor import MotionMonitor, is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.vehicle_requests import VehicleRequests
@@ -31,6 +31,7 @@ from mav_tasks.tasks.task import Draft, GlobalPlace, GoTo, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
+RUNNING = frozenset({TaskState.STARTING, TaskState.EXECUTING, TaskState.CANCELLING})
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
@@ -143,6 +144,8 @@ class Vehicle:
         elif isinstance(message, m.Heartbeat):
             self._receive_heartbeat(message, now=now)
         elif isinstance(message, m.Attitude | m.LocalPositionNed):
+            if not is_finite(message):
+                return
             # read after a delay, it may have come at any time since
             self._motion.receive(message, now=min(now, self._clock.next_at))
             if self._motion.rebooted:
@@ -231,7 +234,10 @@ class Vehicle:
         if self.tasks.is_stopped:
             return
         self.control.lose()
-        if self.tasks.begun is not None and self.tasks.paused is not TaskReason.TAKEOVER:
+        begun = self.tasks.begun
+        if begun is None:
+            return
+        if begun.state in RUNNING or self.tasks.paused is not TaskReason.TAKEOVER:
             self._note(f"taken over: {what}", now=now)
             self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
 
@@ -250,6 +256,10 @@ class Vehicle:
             self._note(
                 f"component {before} is its own; tasks are at {self.server_component}", now=now
             )
+
+    def is_own_component(self, component_id: int) -> bool:
+        """Whether the vehicle has such a component besides its autopilot, as far as was heard."""
+        return component_id in self._own_components
 
     def _free_address(self) -> Address:
         first = self._settings.identity.component_id
@@ -270,6 +280,10 @@ class Vehicle:
             self._authority.withdraw_arming()
             self._zero_what_is_kept()
             self._take_over("disarmed by a client", now=now)
+        elif disarms:
+            self._authority.revoke()  # a client's stream would leave a velocity behind
+            if self._authority.since_other(now=now) < self._settings.watch.other_controller:
+                self.requests.send_zero()
         self.requests.relay(
             packet, message, origin, component=target, command=command, urgent=disarms, now=now
         )
@@ -338,8 +352,9 @@ class Vehicle:
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
             return None
+        self._authority.revoke()  # a stream that goes on must not drive when the mode comes back
         paused = None
-        if not self.tasks.is_idle:
+        if not self.tasks.is_empty:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.control.begin_release(now=now)
         self.requests.flush(now=now)
@@ -352,11 +367,14 @@ class Vehicle:
         is_begun = begun is not None and begun.id == task.id
         self.tasks.cancel(task, kill=kill, reason=TaskReason.CANCELLED, actor=actor, now=now)
         if is_begun:
+            self._authority.revoke()  # who wants to drive now must ask again
             self.step(now=now)
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
         """Call off what waits, or everything."""
         self.tasks.clear(begun_too=begun_too, actor=actor, now=now)
+        if begun_too:
+            self._authority.revoke()
         if begun_too and self.control.is_engaged:
             self.step(now=now)
 
@@ -373,11 +391,12 @@ class Vehicle:
     def skip(self, task: Task, *, actor: str, now: float) -> None:
         """End a held task."""
         self.tasks.cancel(task, kill=False, reason=TaskReason.SKIPPED, actor=actor, now=now)
+        self._authority.revoke()
         self.wake(now=now)
 
     def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
         """Take a task in that runs at once, before what runs and what waits."""
-        task = self.tasks.run_now(draft, actor=actor, now=now)
+        task = self.tasks.run_now(draft, self.view(now=now), actor=actor, now=now)
         self.step(now=now)
         return task
 
@@ -399,13 +418,20 @@ class Vehicle:
 
     def operator_lost(self, *, now: float) -> None:
         """No ground station is heard any more: nothing runs unseen."""
-        if self.tasks.is_empty or self.tasks.paused:
+        begun = self.tasks.begun
+        is_running = begun is not None and begun.state in RUNNING
+        if self.tasks.is_empty or (self.tasks.paused and not is_running):
             return
         self._note("no ground station is heard: paused", now=now)
         self.pause(actor=SERVER, now=now)
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
-        """Let task and queue stand; zeros leave in this very step."""
+        """Let task and queue stand; zeros leave in this very step.
+
+        A vehicle that moves without a task is stopped as by HOLD.
+        """
+        if self.tasks.begun is None and self.armed and not self.control.is_engaged:
+            return self.hold(actor=actor, now=now)
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.step(now=now)
         return paused

@@ -102,6 +102,20 @@ class VehicleSide:
         wanted = sorted(self._vehicles) if system_id == 0 else [system_id]
         return [vehicle for vehicle in map(self.get, wanted) if vehicle is not None]
 
+    def stop_unheard(self, system_id: int, *, clear: bool, actor: str, now: float) -> list[int]:
+        """Latch STOP for vehicles of an earlier run that were not heard yet; gives them.
+
+        They are stopped when they are heard. ``system_id`` 0: all of them.
+        """
+        unheard = [
+            tasks
+            for tasks in self._fleet
+            if tasks.vehicle not in self._vehicles and system_id in (0, tasks.vehicle)
+        ]
+        for tasks in unheard:
+            tasks.stop(clear=clear, actor=actor, now=now)
+        return [tasks.vehicle for tasks in unheard]
+
     def settle(self) -> list[Vehicle]:
         """Look at what became of those to which something was done; gives them."""
         return self._agenda.settle()

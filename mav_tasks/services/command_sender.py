@@ -195,6 +195,9 @@ class CommandSender:
             self._forget_idle_lanes(now)
         lane = self._lanes.setdefault(request.lane, _Lane())
         if urgent:
+            for waiting in lane.waiting:  # after it they would undo what was urgent
+                self._answer(waiting, None)
+            lane.waiting.clear()
             if lane.in_flight is not None:
                 self._answer(lane.in_flight, None)
                 lane.owed, lane.owed_until = lane.in_flight.retry.sent, now + LATE

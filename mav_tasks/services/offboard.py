@@ -305,6 +305,7 @@ class OffboardControl:
             return
         if now >= self._ask_until:
             self.refused = what
+            self.we_armed = False
         elif now >= self._ask_again_at:
             self._ask_again_at = None
             if what is Refused.MODE:

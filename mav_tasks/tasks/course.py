@@ -1,6 +1,7 @@
 """Drives one goal, leg after leg: where the vehicle is → the velocity to ask for, or the end."""
 
 from dataclasses import replace
+from math import copysign
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
@@ -64,7 +65,7 @@ class Course:
         if speed is not None and isinstance(leg, Move):
             leg = replace(leg, speed=speed)
         elif speed is not None and isinstance(leg, Head):
-            leg = replace(leg, forward=speed)
+            leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)
         if isinstance(leg, Wait):
             return ZERO
         return guidance.steer(leg, anchor, motion.pose, remaining=self.remaining, driving=driving)

@@ -12,7 +12,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.guidance import ZERO, Motion
-from mav_tasks.tasks.legs import anchor_of, begun_from
+from mav_tasks.tasks.legs import anchor_of, begun_from, distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited
 from mav_tasks.tasks.scheduler import place_of, start_blocker
@@ -123,8 +123,15 @@ class Executor:
             return
         if task.state is S.HELD:
             self._finish(S.CANCELLED, reason, actor=actor, now=now)
-        else:
-            self._change(S.CANCELLING, reason, actor=actor, now=now)
+            return
+        self._change(S.CANCELLING, reason, actor=actor, now=now)
+        if task.reason is R.TAKEOVER:
+            self.let_go(actor=actor, now=now)
+
+    def let_go(self, *, actor: str, now: float) -> None:
+        """End a task that is being cancelled: somebody else has the vehicle, and it is theirs."""
+        task = self._begun(S.CANCELLING)
+        self._finish(S.CANCELLED, task.reason, actor=actor, now=now)
 
     def kill(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
         """End the begun task at once; gives its id."""
@@ -186,10 +193,17 @@ class Executor:
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
         if not seen.still:  # the heading at the start is that of a vehicle at rest
+            if now - self._since > 2 * self._settings.watch.start_timeout:
+                self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
+                return view.HOLD
             return view.STAND
         progress = _begun(task, seen, motion)
         if progress is None:
             self.pause(R.POSITION_LOST, actor=SERVER, now=now)
+            return view.HOLD
+        longest = self._settings.driving.max_distance
+        if progress.target is not None and distance(motion.pose, progress.target) > longest:
+            self._finish(S.FAILED, R.BAD_PARAMETER, actor=SERVER, now=now)
             return view.HOLD
         self._course = Course(task.goal, progress)
         self._way_back = way_back(task.goal, progress, motion) if task.progress.anchor else None

@@ -11,6 +11,11 @@ class JumpWatch:
     def __init__(self) -> None:
         self._last: Motion | None = None
 
+    @property
+    def last(self) -> Motion | None:
+        """Where it was at the last look."""
+        return self._last
+
     def has_jumped(self, motion: Motion | None, *, max_speed: float) -> bool:
         """Look at the present position; whether nobody can have driven there, at m/s."""
         last = self._last

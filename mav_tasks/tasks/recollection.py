@@ -195,6 +195,8 @@ def _key(submitter: Submitter, nonce: int) -> tuple[int, int, int]:
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:
     if not isinstance(one.goal, GoTo) or not isinstance(other.goal, GoTo):
         return False
+    if (one.goal.yaw, one.goal.wait) != (other.goal.yaw, other.goal.wait):
+        return False  # it is to do something else there
     places = one.goal.place, other.goal.place
     if None in places:
         return places == (None, None)

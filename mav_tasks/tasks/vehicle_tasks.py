@@ -8,7 +8,7 @@ One task at a time has the vehicle. Others may have begun and be set aside: pre-
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import nan
+from math import hypot, nan
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Driving, Settings
@@ -28,12 +28,14 @@ from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.scheduler import outranks, start_blocker
-from mav_tasks.tasks.task import Draft, Rotate, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.task import Draft, Goal, Pose, Rotate, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
+from mav_tasks.tasks.way_back import is_off_line
 
 R, S = TaskReason, TaskState
 
+LED_AWAY = 2.0  # m from where somebody took the vehicle over: more than it takes to brake
 FORESEEN = 500  # tasks ahead, beyond which nobody reckons when a task starts
 
 
@@ -50,6 +52,8 @@ class VehicleTasks:
         self._jumps = JumpWatch()
         self._aside: dict[TaskId, None] = {}
         self._of_earlier_run: set[TaskId] = set()
+        self._taken_over_at: Pose | None = None
+        self._led_away: set[TaskId] = set()  # set aside while somebody else drove far
         self._uid = ""  # of the vehicle, as far as it was heard
         self._speed: float | None = None  # of what names none; None: the settings' one
         self._paused = R.NONE
@@ -172,6 +176,8 @@ class VehicleTasks:
             return R.HELD_AHEAD
         if self._paused and task.id != self._urgent:
             return R.RESTARTED if self._paused is R.RESTARTED else R.QUEUE_PAUSED
+        if self._is_halting:
+            return R.STOP_UNCONFIRMED
         if self.begun is not None or self._queue.position(task.id):
             return R.BEHIND_OTHERS
         return self._blocker if self._blocked == task.id else R.NONE
@@ -239,12 +245,16 @@ class VehicleTasks:
         """Take back a submission that did not become durable; it cannot have begun."""
         self._room.withdraw(task, now=now)
 
-    def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
-        """Take a task in that runs at once; what runs and what waits goes on when continued."""
+    def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> Task:
+        """Take a task in that runs at once; what runs and what waits goes on when continued.
+
+        Rejection when it could not: nobody expects it to begin when somebody parks the vehicle.
+        """
         if self.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
         if self._is_held_ahead:
             raise Rejection(R.HELD_AHEAD, "a held task must be released first")
+        self._check_start(seen, draft.goal, now=now)
         task = self._room.submit(draft, now=now)
         begun = self.begun
         if begun is not None and begun.id == self._urgent:
@@ -312,7 +322,7 @@ class VehicleTasks:
         if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
             words = f"task {begun.id} is {begun.state.name.lower()}"
             raise Rejection(R.WRONG_STATE, words)
-        self._check_start(seen, task, now=now)
+        self._check_start(seen, task.goal, now=now)
         if not again:
             self._check_remainder(task, seen)
         if begun is not None and begun.id != task.id:
@@ -327,6 +337,10 @@ class VehicleTasks:
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:
         """What is left must be known: measured along its line, or counted until it was held."""
         progress = task.progress
+        counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_LINE)
+        if not counts_from_here and seen.motion and is_off_line(task, seen.motion.pose):
+            words = f"off the line of task {task.id}: run it again from here, or skip it"
+            raise Rejection(R.OFF_LINE, words)
         if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
             return
         turned = isinstance(task.goal, Rotate) and abs(task.goal.angle) > 3.0
@@ -343,10 +357,23 @@ class VehicleTasks:
         return None if self.begun is None else self.begun.id
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
-        """Let the begun task and the queue stand; gives the task's id. Never undoes a STOP."""
+        """Let the begun task and the queue stand; gives the task's id. Never undoes a STOP.
+
+        What was to run at once and has not begun waits as any other. Where somebody else has the
+        vehicle, nobody waits for it to stand before a cancelled task is over.
+        """
         self._executor.pause(reason, actor=actor, now=now)
         self._pause_queue(reason, actor=actor, now=now)
+        if self._urgent is not None and self._urgent in self._queue:
+            self._urgent = None
         begun = self.begun
+        if reason is R.TAKEOVER:
+            if self._taken_over_at is None and self._jumps.last is not None:
+                self._taken_over_at = self._jumps.last.pose
+            if begun is not None and begun.state is S.CANCELLING:
+                self._executor.let_go(actor=actor, now=now)
+                self._ended(begun.id, now=now)
+                begun = None
         return None if begun is None else begun.id
 
     def proceed(self, seen: VehicleView, *, actor: str, now: float) -> TaskId | None:
@@ -363,20 +390,21 @@ class VehicleTasks:
             raise Rejection(R.WRONG_STATE, words)
         if resumes:
             assert begun is not None
-            self._check_start(seen, begun, now=now)
+            self._check_start(seen, begun.goal, now=now)
         if self._paused:
             self._paused = R.NONE
             self._book.record(QueueContinued(self.vehicle, actor, now))
+            self._note_led_away(seen)
         if resumes:
             assert begun is not None
             self._resume(begun, seen, actor=actor, now=now)
         begun = self.begun
         return None if begun is None or begun.state is S.HELD else begun.id
 
-    def _check_start(self, seen: VehicleView, task: Task, *, now: float) -> None:
-        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=task.goal)
+    def _check_start(self, seen: VehicleView, goal: Goal, *, now: float) -> None:
+        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
         if blocker:
-            raise Rejection(blocker, f"cannot continue: {words_of(blocker)}")
+            raise Rejection(blocker, f"cannot go on: {words_of(blocker)}")
 
     def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
         if self._is_of_another_frame(task, seen):
@@ -384,6 +412,21 @@ class VehicleTasks:
         else:
             self._executor.resume(seen, actor=actor, now=now)
             self._begun_at = now
+
+    def _note_led_away(self, seen: VehicleView) -> None:
+        """After a takeover: what was set aside may be far from here now, and not by our doing."""
+        at, self._taken_over_at = self._taken_over_at, None
+        if at is None or seen.motion is None:
+            return
+        here = seen.motion.pose
+        if hypot(here.north - at.north, here.east - at.east) > LED_AWAY:
+            self._led_away.update(self._aside)
+
+    def _was_led_away(self, task: Task, seen: VehicleView) -> bool:
+        """Whether somebody else has meanwhile driven the vehicle far from a task set aside."""
+        was_led_away = task.id in self._led_away
+        self._led_away.discard(task.id)
+        return was_led_away and seen.motion is not None and is_off_line(task, seen.motion.pose)
 
     def _is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:
         """Whether what is left of an earlier run was in coordinates that mean nothing any more."""
@@ -510,6 +553,9 @@ class VehicleTasks:
         if self._is_of_another_frame(task, seen):
             self._executor.adopt(task)
             self._executor.hold(R.FRAME_RESET, now=now)
+        elif self._was_led_away(task, seen):
+            self._executor.adopt(task)
+            self._executor.hold(R.OFF_LINE, now=now)
         else:
             self._executor.begin(task, actor=SERVER, now=now)
 

@@ -420,5 +420,5 @@ class Lives(RuleBasedStateMachine):
 
 TestLives = Lives.TestCase
 TestLives.settings = settings(
-    max_examples=200, stateful_step_count=80, deadline=None, derandomize=True
+    max_examples=100, stateful_step_count=70, deadline=None, derandomize=True
 )

@@ -188,7 +188,7 @@ def test_every_request_for_a_message_is_answered(world: World) -> None:
     world.run(0.5)
     assert [s.result for s in (known, unknown, ours, silent)] == [
         ACCEPTED,
-        common.MAV_RESULT_FAILED,
+        UNSUPPORTED,
         UNSUPPORTED,
         UNSUPPORTED,
     ]

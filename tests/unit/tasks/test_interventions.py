@@ -7,7 +7,7 @@ import pytest
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Frame, GoTo, LocalPlace, Move, Pose, Terms, Wait
+from mav_tasks.tasks.task import Frame, Move, Pose, Terms, Wait
 from mav_tasks.tasks.view import DemandKind, ModeKind
 from tests.unit.tasks.rig import (
     BY,
@@ -204,7 +204,7 @@ class TestHeldTasks:
         rig, rover = Rig(), Rover(frame=HERE)
         rig.submit(LONG)
         run(rig, rover, seconds=1.0)
-        rig.tasks.run_now(draft(LONG), actor=BY, now=rig.now)
+        rig.tasks.run_now(draft(LONG), in_control(rig.now), actor=BY, now=rig.now)
         rig.keep()
         run(rig, rover, seconds=1.0)
         assert rig.states() == [S.PAUSED, S.EXECUTING]
@@ -229,7 +229,7 @@ class TestRunNow:
     def test_what_runs_is_set_aside_and_goes_on_when_continued(self) -> None:
         rig = begun()
         rig.submit(LONG)
-        rig.tasks.run_now(draft(Wait(1.0)), actor=BY, now=rig.now)
+        rig.tasks.run_now(draft(Wait(1.0)), in_control(rig.now), actor=BY, now=rig.now)
         rig.keep()
         rig.steps(in_control, seconds=0.5)
         assert rig.states() == [S.PAUSED, S.QUEUED, S.EXECUTING]
@@ -242,13 +242,13 @@ class TestRunNow:
     def test_another_one_replaces_it_whether_begun_or_not(self) -> None:
         rig = begun()
         rig.keeps = False
-        rig.tasks.run_now(draft(LONG), actor=BY, now=rig.now)
-        rig.tasks.run_now(draft(LONG), actor=BY, now=rig.now)
+        rig.tasks.run_now(draft(LONG), in_control(rig.now), actor=BY, now=rig.now)
+        rig.tasks.run_now(draft(LONG), in_control(rig.now), actor=BY, now=rig.now)
         assert (rig.state(2), rig.task(2).reason) == (S.CANCELLED, R.REPLACED)
         rig.keeps = True
         rig.keep()
         rig.steps(in_control, seconds=2 * TICK)
-        rig.tasks.run_now(draft(LONG), actor=BY, now=rig.now)
+        rig.tasks.run_now(draft(LONG), in_control(rig.now), actor=BY, now=rig.now)
         rig.keep()
         rig.steps(in_control, seconds=3 * TICK)
         assert rig.states() == [S.PAUSED, S.CANCELLED, S.CANCELLED, S.EXECUTING]
@@ -257,20 +257,30 @@ class TestRunNow:
         rig = begun()
         rig.tasks.hold(R.LATE, now=rig.now)
         with pytest.raises(Rejection) as refusal:
-            rig.tasks.run_now(draft(), actor=BY, now=rig.now)
+            rig.tasks.run_now(draft(), in_control(rig.now), actor=BY, now=rig.now)
         assert refusal.value.reason == R.HELD_AHEAD
         rig.tasks.stop(clear=False, actor=BY, now=rig.now)
         with pytest.raises(Rejection) as refusal:
-            rig.tasks.run_now(draft(), actor=BY, now=rig.now)
+            rig.tasks.run_now(draft(), in_control(rig.now), actor=BY, now=rig.now)
         assert (refusal.value.reason, rig.states()) == (R.STOPPED, [S.KILLED])
 
-    def test_has_no_position_reason_to_wait_for_the_paused_queue(self) -> None:
+    def test_is_refused_where_it_could_not_run_now(self) -> None:
+        rig = begun()
+        by_hand = replace(idle(rig.now), mode=ModeKind.MANUAL, armed=True)
+        before = (rig.book.all(), rig.book.recorded)
+        with pytest.raises(Rejection) as refusal:
+            rig.tasks.run_now(draft(), by_hand, actor=BY, now=rig.now)
+        assert refusal.value.reason == R.WRONG_MODE
+        assert (rig.book.all(), rig.book.recorded) == before
+
+    def test_waits_as_any_other_once_the_queue_is_paused(self) -> None:
         rig = Rig()
-        waiting = rig.submit()
-        urgent = rig.tasks.run_now(draft(GoTo(LocalPlace(1.0, 1.0))), actor=BY, now=rig.now)
-        reasons = [rig.tasks.wait_reason(task) for task in (waiting, urgent)]
-        assert reasons[0] is R.QUEUE_PAUSED
-        assert reasons[1] is not R.QUEUE_PAUSED
+        rig.tasks.run_now(draft(), in_control(rig.now), actor=BY, now=rig.now)
+        rig.tasks.pause(R.OPERATOR, actor=BY, now=rig.now)
+        rig.keep()
+        rig.steps(in_control, seconds=2.0)
+        assert rig.states() == [S.QUEUED]
+        assert rig.tasks.wait_reason(rig.task(1)) is R.QUEUE_PAUSED
 
 
 class TestClear:
