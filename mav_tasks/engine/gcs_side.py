@@ -4,7 +4,7 @@ Any bytes may come in here; only a packet with a good CRC makes its sender a cli
 wants is given back as a value; the engine sees to it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from mav_tasks.engine.gcs_client import GcsClient
@@ -123,14 +123,17 @@ class GcsSide:
         for client in self._clients.values():
             client.tell(text, severity, source, now=now)
 
-    def forget_silent(self, *, now: float) -> None:
-        """Drop clients that have been silent for long; configured ones become unheard again."""
+    def forget_silent(self, *, awaits: Callable[[GcsClient], bool], now: float) -> None:
+        """Drop clients that have been silent for long; configured ones become unheard again.
+
+        Who awaits the end of a task is told of it, however long it takes.
+        """
         limits = self._settings.clients
         for key, client in list(self._clients.items()):
             silence = now - client.heard_at
             if client.is_configured and silence > limits.push_lost:
                 client.is_heard = False
-            elif not client.is_configured and silence > limits.forget_after:
+            elif not client.is_configured and silence > limits.forget_after and not awaits(client):
                 del self._clients[key]
 
     def _add(self, link: str, peer: Peer, *, is_configured: bool, now: float) -> GcsClient:

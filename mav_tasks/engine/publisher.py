@@ -60,6 +60,9 @@ class Publisher:
             if client.uses_dialect and client.submitted(task):
                 client.statuses.changed(task.id)
 
+    def _awaits(self, client: GcsClient) -> bool:
+        return self._book.is_awaited_at(client.outlet.link, client.endpoint)
+
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do."""
         deadline = self._gcs.heartbeat.next_deadline()
@@ -72,7 +75,7 @@ class Publisher:
     def handle_deadline(self, *, now: float) -> None:
         """Send the task servers' heartbeats and the statuses that are due."""
         if self._gcs.heartbeat.is_due(now=now):
-            self._gcs.forget_silent(now=now)
+            self._gcs.forget_silent(awaits=self._awaits, now=now)
             self._send_heartbeats(now=now)
             for client in self._gcs:
                 client.tell_what_was_left_out(now=now)

@@ -172,6 +172,10 @@ class TaskBook:
         live = self._live.get((submitter, command, vehicle))
         return self._tasks[next(reversed(live))] if live else None
 
+    def is_awaited_at(self, link: str, endpoint: str) -> bool:
+        """Whether a task from a client's endpoint is not over."""
+        return any((s.link, s.endpoint) == (link, endpoint) for s, _, _ in self._live)
+
     def record(self, event: Event) -> None:
         """Append an event to the journal."""
         self.recorded += 1

@@ -58,3 +58,15 @@ def test_a_status_says_from_which_link_a_task_came(world: World) -> None:
     (*_, status) = world.client.statuses(1)
     submitter = status.submitter_system, status.submitter_component, status.submitter_link
     assert submitter == (255, 190, 1)
+
+
+def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -> None:
+    quiet = world.add_client("quiet")
+    quiet.heartbeats = False
+    quiet.move(40, speed=0.5)
+    world.until_state(1, S.COMPLETED, within=200)
+    world.run(0.2)
+    assert world.now > 70
+    assert quiet.statuses(1)[-1].state == S.COMPLETED
+    world.run(90)
+    assert not any("quiet" in who for who in world.server.engine.snapshot(now=world.now).clients)
