@@ -164,7 +164,7 @@ class Commands:
                     words = f"command {number}: not supported in this version"
                     raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
         if at_server:
-            asked.answer(MavResult.UNSUPPORTED)
+            asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif asked.command.command == MavCmd.DO_SET_MODE:
             self._set_mode(asked, now=now)
         else:  # also to a component never heard of: an autopilot does what that is told
@@ -209,7 +209,8 @@ class Commands:
         elif command == MavCmd.REQUEST_MESSAGE:
             answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
         else:
-            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, 0, asker.answering)
+            reason = int(R.VEHICLE_SILENT)
+            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
             words = f"command {command}: no answer from vehicle {vehicle.system_id}"
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
         client.answer(answer, asker.source)
@@ -287,7 +288,11 @@ class Commands:
         vehicle = asked.vehicle
         match asked.command.params[0]:
             case 0.0:
-                return vehicle.pause(actor=asked.actor, now=now)
+                paused = vehicle.pause(actor=asked.actor, now=now)
+                if not vehicle.is_heard(now=now):  # paused all the same
+                    words = f"paused, but vehicle {vehicle.system_id} is silent"
+                    raise Rejection(R.VEHICLE_SILENT, words)
+                return paused
             case 1.0:
                 if vehicle.tasks.is_stopped and asked.receiver.older_copy(
                     asked.command, before=vehicle.stopped_at, now=now

@@ -14,6 +14,7 @@ from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
+    FAILED,
     GUIDED,
     HOLD,
     MOVE,
@@ -273,3 +274,13 @@ def test_nobody_takes_the_position_away_from_a_task(world: World) -> None:
     world.client.command(SET_INTERVAL, 32, -1, target=(1, 50))
     world.run(3)
     assert world.state(1)[0] is S.EXECUTING
+
+
+def test_a_pause_that_the_rover_cannot_hear_says_so_and_counts(world: World) -> None:
+    driving(world)
+    world.fault(Faults(silent=True, deaf=True))
+    world.run(4)
+    sent = world.client.pause()
+    world.run(1)
+    assert sent.answer == (FAILED, R.VEHICLE_SILENT)
+    assert world.paused() is R.OPERATOR

@@ -225,7 +225,7 @@ def test_no_answer_in_0_4_s_is_a_rejection_and_the_late_ack_is_dropped(world: Wo
     at = world.now
     sent = world.client.command(31000, target=(1, 1))
     world.run(0.6)
-    assert sent.answer == (TEMPORARILY_REJECTED, 0)
+    assert sent.answer == (TEMPORARILY_REJECTED, R.VEHICLE_SILENT)
     assert 0.4 <= sent.acked_at - at <= 0.5
     world.net.send("rover1", VEHICLE_LINK, lost[0])
     world.run(1)
