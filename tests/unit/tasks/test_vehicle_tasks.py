@@ -1,6 +1,5 @@
 """The tasks of one vehicle, driven by hand-made views of it: no MAVLink, no world."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import pi
 
@@ -8,88 +7,14 @@ import pytest
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import QueueContinued, QueuePaused, TaskChanged
-from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.events import QueueContinued, QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Goal, Move, Pose, Rotate, Task, TaskId
-from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
-from tests.unit.tasks.samples import FORWARD_2, draft, idle_vehicle, ours
+from mav_tasks.tasks.task import Move, Pose, Rotate, TaskId
+from mav_tasks.tasks.view import DemandKind, ModeKind
+from tests.unit.tasks.rig import SETTINGS, TICK, Rig, View, at, idle, in_control
+from tests.unit.tasks.samples import idle_vehicle, ours
 
 S, R, K = TaskState, TaskReason, DemandKind
-SETTINGS = Settings()
-TICK = SETTINGS.watch.setpoint_period
-
-View = Callable[[float], VehicleView]
-
-
-def idle(now: float) -> VehicleView:
-    return idle_vehicle(at=now)
-
-
-def in_control(now: float) -> VehicleView:
-    """Ours, at rest at the origin."""
-    return ours(at=now, still=True)
-
-
-def at(north: float, *, still: bool = False, yaw: float = 0.0) -> View:
-    return lambda now: ours(at=now, pose=Pose(north, 0.0, yaw), still=still)
-
-
-class Rig:
-    """One vehicle's tasks in virtual time, with a store that keeps everything at once."""
-
-    def __init__(self, *, settings: Settings = SETTINGS) -> None:
-        self.now = 10.0
-        self.book = TaskBook()
-        self.fleet = Fleet(self.book, settings)
-        self.tasks = self.fleet.of(1)
-        self.keeps = True
-
-    def submit(self, goal: Goal = FORWARD_2, *, priority: int = 5) -> Task:
-        task = self.tasks.submit(draft(goal, priority=priority), now=self.now)
-        self.keep()
-        return task
-
-    def keep(self) -> None:
-        if self.keeps:
-            self.book.durable = self.book.recorded
-
-    def step(self, view: View) -> Demand:
-        """A tick later, look and step."""
-        self.now = round(self.now + TICK, 6)
-        demand = self.tasks.step(view(self.now), now=self.now)
-        self.keep()
-        return demand
-
-    def steps(self, view: View, *, seconds: float) -> Demand:
-        demand = self.step(view)
-        for _ in range(round(seconds / TICK) - 1):
-            demand = self.step(view)
-        return demand
-
-    def executing(self, goal: Goal = FORWARD_2) -> "Rig":
-        """Go as far as EXECUTING, and begin the story there."""
-        self.submit(goal)
-        self.step(idle)
-        self.step(in_control)
-        assert self.state(1) is S.EXECUTING
-        self.story()
-        return self
-
-    def drive(self, length: float) -> None:
-        """Let the vehicle be seen further and further along."""
-        steps = 40
-        for step in range(1, steps + 1):
-            self.step(at(length * step / steps))
-
-    def state(self, task_id: int) -> TaskState:
-        return self.book[TaskId(task_id)].state
-
-    def story(self) -> list[tuple[int, TaskState, TaskReason]]:
-        """The changes of tasks since the last call."""
-        events = self.book.take_events()
-        return [(e.task_id, e.new, e.reason) for e in events if isinstance(e, TaskChanged)]
 
 
 class TestFromQueueToEnd:
