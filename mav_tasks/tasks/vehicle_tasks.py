@@ -8,7 +8,7 @@ One task at a time has the vehicle. Others may have begun and be set aside: pre-
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import hypot, nan
+from math import nan
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Driving, Settings
@@ -25,17 +25,17 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.jump import JumpWatch
+from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.scheduler import outranks, start_blocker
-from mav_tasks.tasks.task import Draft, Goal, Pose, Rotate, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.task import Draft, Goal, Rotate, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
 from mav_tasks.tasks.way_back import is_off_line
 
 R, S = TaskReason, TaskState
 
-LED_AWAY = 2.0  # m from where somebody took the vehicle over: more than it takes to brake
 FORESEEN = 500  # tasks ahead, beyond which nobody reckons when a task starts
 
 
@@ -52,8 +52,7 @@ class VehicleTasks:
         self._jumps = JumpWatch()
         self._aside: dict[TaskId, None] = {}
         self._of_earlier_run: set[TaskId] = set()
-        self._taken_over_at: Pose | None = None
-        self._led_away: set[TaskId] = set()  # set aside while somebody else drove far
+        self._led_away = LedAway()
         self._uid = ""  # of the vehicle, as far as it was heard
         self._speed: float | None = None  # of what names none; None: the settings' one
         self._paused = R.NONE
@@ -368,8 +367,8 @@ class VehicleTasks:
             self._urgent = None
         begun = self.begun
         if reason is R.TAKEOVER:
-            if self._taken_over_at is None and self._jumps.last is not None:
-                self._taken_over_at = self._jumps.last.pose
+            last = self._jumps.last
+            self._led_away.taken_over(None if last is None else last.pose)
             if begun is not None and begun.state is S.CANCELLING:
                 self._executor.let_go(actor=actor, now=now)
                 self._ended(begun.id, now=now)
@@ -394,7 +393,7 @@ class VehicleTasks:
         if self._paused:
             self._paused = R.NONE
             self._book.record(QueueContinued(self.vehicle, actor, now))
-            self._note_led_away(seen)
+            self._led_away.given_back(seen, self._aside)
         if resumes:
             assert begun is not None
             self._resume(begun, seen, actor=actor, now=now)
@@ -412,21 +411,6 @@ class VehicleTasks:
         else:
             self._executor.resume(seen, actor=actor, now=now)
             self._begun_at = now
-
-    def _note_led_away(self, seen: VehicleView) -> None:
-        """After a takeover: what was set aside may be far from here now, and not by our doing."""
-        at, self._taken_over_at = self._taken_over_at, None
-        if at is None or seen.motion is None:
-            return
-        here = seen.motion.pose
-        if hypot(here.north - at.north, here.east - at.east) > LED_AWAY:
-            self._led_away.update(self._aside)
-
-    def _was_led_away(self, task: Task, seen: VehicleView) -> bool:
-        """Whether somebody else has meanwhile driven the vehicle far from a task set aside."""
-        was_led_away = task.id in self._led_away
-        self._led_away.discard(task.id)
-        return was_led_away and seen.motion is not None and is_off_line(task, seen.motion.pose)
 
     def _is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:
         """Whether what is left of an earlier run was in coordinates that mean nothing any more."""
@@ -553,7 +537,7 @@ class VehicleTasks:
         if self._is_of_another_frame(task, seen):
             self._executor.adopt(task)
             self._executor.hold(R.FRAME_RESET, now=now)
-        elif self._was_led_away(task, seen):
+        elif self._led_away.from_line_of(task, seen):
             self._executor.adopt(task)
             self._executor.hold(R.OFF_LINE, now=now)
         else:

@@ -41,6 +41,18 @@ def taken_by_hand(world: World) -> None:
     world.rover.autopilot.operator_sticks(0.5, 0.2)
 
 
+def led_away(world: World) -> None:
+    """Somebody drives it metres aside by hand, and parks it."""
+    world.operator_mode(Mode.MANUAL)
+    world.rover.autopilot.operator_sticks(0.0, 1.2)
+    world.run(1.3)
+    world.rover.autopilot.operator_sticks(1.5, 0.0)
+    world.run(8)
+    world.rover.autopilot.operator_sticks(0.0, 0.0)
+    world.operator_mode(Mode.HOLD)
+    world.run(3)
+
+
 @pytest.mark.parametrize("how", ["cancel", "clear", "cancel before"])
 def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, how: str) -> None:
     driving(world)
@@ -253,14 +265,7 @@ def test_a_remainder_far_away_is_not_driven_to(world: World) -> None:
     world.suspend_server(1.0)
     world.run(4)
     assert world.state(1) == (S.HELD, R.LATE)
-    world.operator_mode(Mode.MANUAL)
-    world.rover.autopilot.operator_sticks(0.0, 1.2)
-    world.run(1.3)
-    world.rover.autopilot.operator_sticks(1.5, 0.0)
-    world.run(8)
-    world.rover.autopilot.operator_sticks(0.0, 0.0)
-    world.operator_mode(Mode.HOLD)
-    world.run(3)
+    led_away(world)
     remainder = world.client.command(RELEASE, 1, 1)
     world.run(0.2)
     assert remainder.answer == (DENIED, R.OFF_LINE)
@@ -284,3 +289,17 @@ def test_a_pause_that_the_rover_cannot_hear_says_so_and_counts(world: World) -> 
     world.run(1)
     assert sent.answer == (FAILED, R.VEHICLE_SILENT)
     assert world.paused() is R.OPERATOR
+
+
+def test_what_was_set_aside_is_held_when_somebody_led_the_rover_away(world: World) -> None:
+    world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
+    driving(world, 10.0)
+    world.client.mode(RTL)
+    world.until_state(2, S.EXECUTING)
+    world.run(0.5)
+    led_away(world)
+    world.client.command(CANCEL, 2)
+    world.run(2)
+    world.client.proceed()
+    world.run(3)
+    assert (world.state(1), world.stands()) == ((S.HELD, R.OFF_LINE), True)
