@@ -36,7 +36,7 @@ def to_global(place: LocalPlace, origin: GlobalPlace) -> GlobalPlace:
     latitude = origin.latitude_degE7 + place.north / METRES_PER_DEGE7
     scale = _east_scale(latitude, origin.latitude_degE7)
     longitude = origin.longitude_degE7 + place.east / (METRES_PER_DEGE7 * scale)
-    return GlobalPlace(round(latitude), round(_wrapped(longitude)))
+    return GlobalPlace(round(latitude), _wrapped(round(longitude)))
 
 
 def origin_of(place: GlobalPlace, local: LocalPlace) -> GlobalPlace:
@@ -44,13 +44,13 @@ def origin_of(place: GlobalPlace, local: LocalPlace) -> GlobalPlace:
     latitude = place.latitude_degE7 - local.north / METRES_PER_DEGE7
     scale = _east_scale(place.latitude_degE7, latitude)
     longitude = place.longitude_degE7 - local.east / (METRES_PER_DEGE7 * scale)
-    return GlobalPlace(round(latitude), round(_wrapped(longitude)))
+    return GlobalPlace(round(latitude), _wrapped(round(longitude)))
 
 
 def _east_scale(one_degE7: float, other_degE7: float) -> float:
     return max(0.01, cos(radians((one_degE7 + other_degE7) / 2e7)))
 
 
-def _wrapped(longitude_degE7: float) -> float:
+def _wrapped(longitude_degE7: int) -> int:
     """The short way round the earth."""
     return (longitude_degE7 + HALF_TURN) % (2 * HALF_TURN) - HALF_TURN

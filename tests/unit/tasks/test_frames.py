@@ -60,3 +60,8 @@ def test_across_the_date_line_it_is_not_far() -> None:
     west, east = GlobalPlace(0, -1_799_999_000), GlobalPlace(0, 1_799_999_000)
     assert to_local(west, east).east == pytest.approx(2_000 * 0.011131884502, abs=1e-3)
     assert to_local(east, west).east == pytest.approx(-2_000 * 0.011131884502, abs=1e-3)
+
+
+def test_what_rounds_to_the_date_line_has_one_name() -> None:
+    origin = GlobalPlace(0, 1_799_999_999)
+    assert to_global(LocalPlace(0.0, 0.0078125), origin) == GlobalPlace(0, -1_800_000_000)
