@@ -3,7 +3,6 @@
 Each reading has a connection of its own, and so sees one state of the file whatever is written.
 """
 
-import gc
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -33,7 +32,7 @@ _OF_TASK = {
 
 def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
     """Give the state that a store file holds, its times moved by ``offset``. StoreError."""
-    with _opened(path) as (connection, rows), _no_collection():
+    with _opened(path) as (connection, rows):
         (next_id,) = connection.execute("SELECT next_id FROM meta").fetchone()
         found = connection.execute("SELECT submitted, changed, modified FROM tasks ORDER BY id")
         tasks: list[Task] = []
@@ -115,15 +114,3 @@ def _opened(path: Path) -> Iterator[tuple[sqlite3.Connection, _Rows]]:
         raise StoreError(f"store {path}: it is damaged ({error})") from error
     except sqlite3.Error as error:
         raise StoreError(f"store {path}: {words_for(error)}") from error
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Among values that all stay, the collector would look for rubbish again and again."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()

@@ -42,16 +42,22 @@ class Entry(NamedTuple):
     is_preemptive: bool = False
 
 
-class _Place(NamedTuple):
-    """Where a task is in the sorted lists."""
+#: where a task is in the order of all
+_InOrder = tuple[Rank, TaskId]
+#: where it is among those that may interrupt
+_ByPriority = tuple[int, Rank, TaskId]
 
-    in_order: tuple[Rank, int]
-    by_priority: tuple[int, tuple[Rank, int]]
+
+def _in_order(entry: Entry) -> _InOrder:
+    return entry.rank, entry.task_id
 
 
-def _place_of(entry: Entry) -> _Place:
-    in_order = entry.rank, entry.task_id
-    return _Place(in_order, (-entry.priority, in_order))
+def _by_priority(entry: Entry) -> _ByPriority:
+    return -entry.priority, entry.rank, entry.task_id
+
+
+def _falling_priority(entry: Entry) -> int:
+    return -entry.priority
 
 
 class TaskQueue:
@@ -61,42 +67,42 @@ class TaskQueue:
         self._order = SortedList()
         self._by_priority = SortedList()
         self._preemptive = SortedList()
-        self._places: dict[TaskId, _Place] = {}
+        self._entries: dict[TaskId, Entry] = {}
 
     def __repr__(self) -> str:
         return f"TaskQueue({len(self)}, next={self.first()})"
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._entries)
 
     def __contains__(self, task_id: TaskId) -> bool:
-        return task_id in self._places
+        return task_id in self._entries
 
     def put(self, entry: Entry) -> None:
         """Put a task in its place, or in its new place."""
         self.discard(entry.task_id)
-        place = _place_of(entry)
-        self._places[entry.task_id] = place
-        self._order.add(place.in_order)
-        self._by_priority.add(place.by_priority)
+        self._entries[entry.task_id] = entry
+        self._order.add(_in_order(entry))
+        self._by_priority.add(_by_priority(entry))
         if entry.is_preemptive:
-            self._preemptive.add(place.by_priority)
+            self._preemptive.add(_by_priority(entry))
 
     def put_all(self, entries: Iterable[Entry]) -> None:
         """Put many tasks in, of which none is here yet."""
-        places = {entry: _place_of(entry) for entry in entries}
-        self._places.update((entry.task_id, place) for entry, place in places.items())
-        self._order.update(place.in_order for place in places.values())
-        self._by_priority.update(place.by_priority for place in places.values())
-        self._preemptive.update(p.by_priority for e, p in places.items() if e.is_preemptive)
+        in_order = sorted(entries, key=_in_order)
+        by_priority = sorted(in_order, key=_falling_priority)  # stable: in order within each
+        self._entries.update((entry.task_id, entry) for entry in in_order)
+        self._order.update(map(_in_order, in_order))  # sorted already, which is soon seen
+        self._by_priority.update(map(_by_priority, by_priority))
+        self._preemptive.update(_by_priority(e) for e in by_priority if e.is_preemptive)
 
     def discard(self, task_id: TaskId) -> None:
         """Take a task out, if it is here."""
-        place = self._places.pop(task_id, None)
-        if place is not None:
-            self._order.remove(place.in_order)
-            self._by_priority.remove(place.by_priority)
-            self._preemptive.discard(place.by_priority)
+        entry = self._entries.pop(task_id, None)
+        if entry is not None:
+            self._order.remove(_in_order(entry))
+            self._by_priority.remove(_by_priority(entry))
+            self._preemptive.discard(_by_priority(entry))
 
     def first(self) -> TaskId | None:
         """Give the task that runs next."""
@@ -109,16 +115,16 @@ class TaskQueue:
         others makes a task interrupt.
         """
         firsts = (self._preemptive[:1], self._by_priority[:1])
-        return [TaskId(first[0][1][1]) for first in firsts if first]
+        return [TaskId(first[0][2]) for first in firsts if first]
 
     def rank(self, task_id: TaskId) -> Rank:
         """Give the rank by which a task waits here."""
-        return self._places[task_id].in_order[0]
+        return self._entries[task_id].rank
 
     def position(self, task_id: TaskId) -> int | None:
         """Give how many tasks here run before this one, or None if it is not here."""
-        place = self._places.get(task_id)
-        return None if place is None else int(self._order.index(place.in_order))
+        entry = self._entries.get(task_id)
+        return None if entry is None else int(self._order.index(_in_order(entry)))
 
     def page(self, first: int, count: int) -> list[TaskId]:
         """Give up to ``count`` tasks from the position ``first`` on."""

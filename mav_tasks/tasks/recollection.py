@@ -81,10 +81,12 @@ class Recollection:
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Remember the tasks of an earlier run, oldest first: all nonces, and what came lately."""
         for task in tasks:
-            if now - task.submitted_at <= LONGEST:
+            nonce = task.marks.nonce
+            if nonce:
+                self._nonces[_key(task.submitter, nonce)] = task.id
+            of_late = now - task.submitted_at <= LONGEST
+            if of_late and not (nonce and not isinstance(task.goal, GoTo)):
                 self.remember(task, at=task.submitted_at, now=now)
-            elif task.marks.nonce:
-                self._nonces[_key(task.submitter, task.marks.nonce)] = task.id
 
     def known(
         self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float

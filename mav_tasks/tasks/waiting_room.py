@@ -119,12 +119,15 @@ class WaitingRoom:
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
             self._enter(task, now=came_at)
         ready: dict[int, list[Entry]] = {}
+        others: list[Task] = []
         for task in waiting:
             if task.state is S.QUEUED and self._state_by(task.terms, now=now) is S.QUEUED:
                 ready.setdefault(task.vehicle, []).append(self._entry(task))
+            else:
+                others.append(task)
         for vehicle, entries in ready.items():
             self.queue(vehicle).put_all(entries)
-        for task in waiting:
+        for task in others:
             if task.id not in self._waiters or task.id in self.queue(task.vehicle):
                 continue
             if self._has_failed_dependency(task):  # the end of it was kept, what follows was not
