@@ -8,6 +8,7 @@ from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
     QueuePaused,
+    TaskAdvanced,
     TaskChanged,
     TaskModified,
     TaskSubmitted,
@@ -40,6 +41,7 @@ class Batch:
         self.journal: list[tuple[Any, ...]] = []  # number, utc, kind, task_id, vehicle, body
         self.changed: dict[int, tuple[Any, ...]] = {}  # state, changed_at, changed, id
         self.modified: dict[int, tuple[Any, ...]] = {}  # modified, id
+        self.advanced: dict[int, tuple[Any, ...]] = {}  # advanced, id
         self.withdrawn: list[tuple[int]] = []
         self.vehicles: dict[tuple[str, int], Any] = {}  # column and vehicle -> value
         for number, event in enumerate(events, first):
@@ -67,6 +69,8 @@ class Batch:
                 self.changed[event.task_id] = (event.new, utc, body, event.task_id)
             case TaskModified():
                 self.modified[event.task_id] = (body, event.task_id)
+            case TaskAdvanced():
+                self.advanced[event.task_id] = (body, event.task_id)
             case TaskWithdrawn():
                 self.withdrawn.append((event.task_id,))
             case QueuePaused():

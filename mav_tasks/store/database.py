@@ -90,6 +90,10 @@ class Database:
                 connection.executemany(
                     "UPDATE tasks SET modified = ? WHERE id = ?", batch.modified.values()
                 )
+            if batch.advanced:
+                connection.executemany(
+                    "UPDATE tasks SET advanced = ? WHERE id = ?", batch.advanced.values()
+                )
             if batch.withdrawn:
                 self._withdraw(batch.withdrawn)
             for (column, vehicle), value in batch.vehicles.items():

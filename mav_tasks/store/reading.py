@@ -4,7 +4,7 @@ Each reading has a connection of its own, and so sees one state of the file what
 """
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import fields, replace
 from itertools import groupby
@@ -16,17 +16,18 @@ from mav_tasks.errors import StoreError
 from mav_tasks.store.codec import Decoder, Unreadable, loads
 from mav_tasks.store.failures import words_for
 from mav_tasks.tasks import events
-from mav_tasks.tasks.events import Event, TaskChanged, TaskModified, TaskSubmitted
+from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
 
 CHUNK = 1_000  # rows whose JSON is read in one go
 
-#: what an event says of its task besides its new state: the fields that both have
+#: what an event says of its task besides its new state: the fields that both have. In the order
+#: of the columns that keep the last one of each kind
 _OF_TASK = {
     kind: tuple({f.name for f in fields(kind)} & {f.name for f in fields(Task)})
-    for kind in (TaskChanged, TaskModified)
+    for kind in (TaskChanged, TaskModified, TaskAdvanced)
 }
 
 
@@ -34,15 +35,15 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
     """Give the state that a store file holds, its times moved by ``offset``. StoreError."""
     with _opened(path) as (connection, rows):
         (next_id,) = connection.execute("SELECT next_id FROM meta").fetchone()
-        found = connection.execute("SELECT submitted, changed, modified FROM tasks ORDER BY id")
+        found = connection.execute(
+            "SELECT submitted, changed, modified, advanced FROM tasks ORDER BY id"
+        )
         tasks: list[Task] = []
         while chunk := found.fetchmany(CHUNK):
             submitted = rows.values(TaskSubmitted, [row[0] for row in chunk], offset)
-            for event, (_, changed, modified) in zip(submitted, chunk, strict=True):
+            for event, (_, *later) in zip(submitted, chunk, strict=True):
                 task = event.task
-                if changed is not None or modified is not None:
-                    task = _changed(task, rows, changed, modified, offset)
-                tasks.append(task)
+                tasks.append(_changed(task, rows, later, offset) if any(later) else task)
         vehicles = connection.execute("SELECT vehicle, paused, uid, speed FROM vehicles").fetchall()
         return Restored(
             tasks=tuple(tasks),
@@ -86,14 +87,11 @@ class _Rows:
         return values
 
 
-def _changed(
-    task: Task, rows: _Rows, changed: str | None, modified: str | None, offset: float
-) -> Task:
-    latest: list[TaskChanged | TaskModified] = []
-    if changed is not None:
-        latest += rows.values(TaskChanged, [changed], offset)
-    if modified is not None:
-        latest += rows.values(TaskModified, [modified], offset)
+def _changed(task: Task, rows: _Rows, texts: Sequence[str | None], offset: float) -> Task:
+    latest: list[TaskChanged | TaskModified | TaskAdvanced] = []
+    for kind, text in zip(_OF_TASK, texts, strict=True):
+        if text is not None:
+            latest += rows.values(kind, [text], offset)
     for event in sorted(latest, key=lambda event: event.version):
         new: dict[str, Any] = {name: getattr(event, name) for name in _OF_TASK[type(event)]}
         if isinstance(event, TaskChanged):

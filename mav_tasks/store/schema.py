@@ -37,6 +37,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "CREATE INDEX of_task ON journal (task_id) WHERE task_id IS NOT NULL",
         "CREATE TABLE vehicles (vehicle INTEGER PRIMARY KEY, paused INTEGER, uid TEXT, speed REAL)",
     ),
+    ("ALTER TABLE tasks ADD COLUMN advanced TEXT",),  # the last leg that was begun
 )
 
 

@@ -92,6 +92,35 @@ def test_new_terms_and_a_new_state_both_count(path: Path) -> None:
         assert (found.terms, found.version, found.state) == (terms, 2, S.QUEUED)
 
 
+def test_the_leg_that_was_begun_last_is_kept_with_its_version(path: Path) -> None:
+    book = TaskBook()
+    task = book.submit(draft(), now=1.0)
+    for state in (S.STARTING, S.EXECUTING):
+        book.change(task.id, state, reason=R.NONE, actor="server", now=2.0)
+    book.advance(task.id, Progress(anchor=Pose(1.0, 2.0, 0.5), done=0.25, leg=1), now=3.0)
+    events = book.take_events()
+    with opened(path) as store:
+        store.append(events)
+        wait_for(store, len(events))
+        assert store.load().tasks == book.all()
+    book.change(task.id, S.PAUSED, reason=R.OPERATOR, actor="client", now=4.0)
+    with opened(path) as store:
+        store.append(book.take_events())
+    with opened(path) as store:
+        assert store.load().tasks == book.all()
+
+
+def test_a_file_of_the_first_schema_is_read(path: Path) -> None:
+    path.parent.mkdir(parents=True)
+    connection = sqlite3.connect(path, isolation_level=None)
+    migrate(connection, migrations=MIGRATIONS[:1])
+    connection.close()
+    with opened(path) as store:
+        store.append([submitted(1)])
+    with opened(path) as store:
+        assert [task.id for task in store.load().tasks] == [1]
+
+
 def test_what_is_known_of_vehicles_comes_back(path: Path) -> None:
     events: list[Event] = [
         QueuePaused(1, R.STOPPED, "client", 1.0),
