@@ -3,7 +3,8 @@
 MAVLink guide, "Command Protocol". There is a lane for each (component, command id). An ack names
 neither the request nor the asker, so a second command of the same lane waits until the first is
 answered or given up, and for a while after it was given up a late ack is taken for the first one's
-and dropped. Urgent commands (disarm, HOLD) never wait. DEVIATION: our own repeats keep
+and dropped. Urgent commands (disarm, HOLD) never wait; the answer to one is for all clients that
+ask for it. DEVIATION: our own repeats keep
 ``confirmation`` 0, because a vehicle carries each copy out whatever it says.
 """
 
@@ -44,6 +45,8 @@ class _Request:
     message: Message
     packet: Packet | None  # a client's, forwarded as it came; None: ours, to be encoded
     retry: Retry
+    is_urgent: bool = False
+    joined: list["_Request"] = field(default_factory=list)  # of other clients, the same wish
 
 
 @dataclass(slots=True)
@@ -95,7 +98,7 @@ class CommandSender:
     ) -> None:
         """Forward a client's command once; its answer, or its lack of one, comes from ``take``."""
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
-        request = _Request(origin, (component, command), message, packet, retry)
+        request = _Request(origin, (component, command), message, packet, retry, urgent)
         self._enqueue(request, now=now, urgent=urgent)
 
     def withdraw(self, component: int, command: int) -> None:
@@ -150,6 +153,11 @@ class CommandSender:
         """Repeat what is due and give up what is too old."""
         for lane in self._lanes.values():
             flying = lane.in_flight
+            for request in [] if flying is None else flying.joined:
+                if request.retry.is_over(now):
+                    self._answer(request, None)
+            if flying is not None:
+                flying.joined = [r for r in flying.joined if not r.retry.is_over(now)]
             if flying is not None and flying.retry.is_over(now):
                 lane.in_flight = None
                 lane.quiet_until = now + LATE
@@ -173,6 +181,7 @@ class CommandSender:
         for lane in self._lanes.values():
             if lane.in_flight is not None:
                 deadlines.append(lane.in_flight.retry.next_deadline())
+                deadlines += [request.retry.give_up_at for request in lane.in_flight.joined]
             if lane.waiting:
                 deadlines.append(min(request.retry.give_up_at for request in lane.waiting))
                 if lane.in_flight is None:
@@ -198,9 +207,13 @@ class CommandSender:
             for waiting in lane.waiting:  # after it they would undo what was urgent
                 self._answer(waiting, None)
             lane.waiting.clear()
-            if lane.in_flight is not None:
-                self._answer(lane.in_flight, None)
-                lane.owed, lane.owed_until = lane.in_flight.retry.sent, now + LATE
+            flying = lane.in_flight
+            if flying is not None and _is_same_wish(flying, request):
+                request.joined = [*flying.joined, flying]  # any answer is one for all of them
+                flying.joined = []
+            elif flying is not None:
+                self._answer(flying, None)
+                lane.owed, lane.owed_until = flying.retry.sent, now + LATE
             lane.in_flight = request
             self._send(request, now=now)
             return
@@ -222,4 +235,17 @@ class CommandSender:
         self._outgoing.append(request.message if request.packet is None else request.packet)
 
     def _answer(self, request: _Request, ack: CommandAck | None) -> None:
-        self._answers.append(Answered(request.origin, *request.lane, ack, request.message))
+        for each in (*request.joined, request):
+            self._answers.append(Answered(each.origin, *each.lane, ack, each.message))
+
+
+def _is_same_wish(one: _Request, other: _Request) -> bool:
+    """Whether two commands of clients ask for the same urgent thing."""
+    return (
+        one.is_urgent
+        and None not in (one.packet, other.packet)
+        and all(
+            getattr(one.message, name) == getattr(other.message, name)
+            for name in ("param1", "param2", "param3", "param4")
+        )
+    )

@@ -54,11 +54,18 @@ class Rig:
         self.take(now)
 
     def relay(
-        self, number: int, origin: str, now: float, *, what: int = ARM, urgent: bool = False
+        self,
+        number: int,
+        origin: str,
+        now: float,
+        *,
+        what: int = ARM,
+        param1: float = 1.0,
+        urgent: bool = False,
     ) -> None:
         self.sender.relay(
             packet(number),
-            command(what),
+            command(what, param1),
             origin,
             component=AUTOPILOT,
             command=what,
@@ -189,6 +196,38 @@ def test_an_urgent_command_does_not_wait_and_gets_its_own_answer() -> None:
     assert rig.results[1:] == []
     rig.receive(ack(), 0.3)
     assert rig.results[1:] == [(0.3, "bob", MavResult.ACCEPTED)]
+
+
+def test_two_clients_that_ask_for_the_same_urgent_thing_share_its_answer() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0, urgent=True)
+    rig.relay(2, "bob", 0.1, urgent=True)
+    assert (rig.times, rig.results) == ([0.0, 0.1], [])
+    rig.receive(ack(), 0.2)
+    assert rig.results == [
+        (0.2, "alice", MavResult.ACCEPTED),
+        (0.2, "bob", MavResult.ACCEPTED),
+    ]
+
+
+def test_what_is_urgent_and_another_wish_has_an_answer_of_its_own() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0, urgent=True)
+    rig.relay(2, "bob", 0.1, param1=21196.0, urgent=True)
+    rig.receive(ack(result=MavResult.FAILED), 0.2)
+    rig.receive(ack(), 0.3)
+    assert rig.results == [(0.1, "alice", None), (0.3, "bob", MavResult.ACCEPTED)]
+
+
+def test_each_of_them_is_given_up_in_its_own_time() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0, urgent=True)
+    rig.relay(2, "bob", 0.1, urgent=True)
+    rig.relay(3, "carol", 0.2, urgent=True)
+    rig.run(0.45)
+    assert rig.results == [(0.4, "alice", None)]
+    rig.receive(ack(), 0.46)
+    assert [origin for _, origin, _ in rig.results] == ["alice", "bob", "carol"]
 
 
 def test_an_answer_owed_for_long_is_not_waited_for() -> None:
