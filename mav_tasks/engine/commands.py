@@ -11,7 +11,7 @@ from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import becomes_task, marks_of, place_in
+from mav_tasks.engine.goals import CHANGE_MODE, becomes_task, marks_of, place_in, reposition_flags
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
@@ -143,7 +143,9 @@ class Commands:
                     asked.client.uses_dialect = asked.client.uses_dialect or number in OUR_COMMANDS
                     asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
                     return
-                case MavCmd.NAV_TAKEOFF:  # in examples for every kind of vehicle: nothing to do
+                case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
+                    number
+                ):  # in examples for every kind of vehicle: nothing to do
                     asked.answer(MavResult.ACCEPTED)
                     return
                 case MavCmd.DO_PAUSE_CONTINUE:
@@ -225,6 +227,7 @@ class Commands:
         actor = str(client.submitter(packet.source))
         mode = int(message.custom_mode)
         if mode == vehicle.persona.hold_mode:
+            self._submissions.held(vehicle, client.submitter(packet.source))
             vehicle.hold(actor=actor, now=now)
         elif vehicle.tasks.is_stopped:
             words = "STOP is latched: continue first"
@@ -250,18 +253,13 @@ class Commands:
     # STOP, pause, modes
 
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
-        """Stop one vehicle or all; acts on every copy, and answers it.
+        """Stop one vehicle or all, whatever component is named; acts on every copy, and answers it.
 
         DEVIATION: for target_system 0 there is one ack, not one from each system: the worst
         result, from the task server of the lowest system id.
         """
         target = command.target
-        targets = [
-            vehicle
-            for vehicle in self._vehicles.addressed_by(target.system_id)
-            if target.component_id
-            in (0, AUTOPILOT, MavComponent.ONBOARD_COMPUTER, vehicle.server_component)
-        ]
+        targets = self._vehicles.addressed_by(target.system_id)
         actor = str(client.submitter(packet.source))
         clear = command.params[0] == 1.0
         unheard = self._vehicles.stop_unheard(target.system_id, clear=clear, actor=actor, now=now)
@@ -288,6 +286,7 @@ class Commands:
         vehicle = asked.vehicle
         match asked.command.params[0]:
             case 0.0:
+                self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
                 paused = vehicle.pause(actor=asked.actor, now=now)
                 if not vehicle.is_heard(now=now):  # paused all the same
                     words = f"paused, but vehicle {vehicle.system_id} is silent"
@@ -309,6 +308,7 @@ class Commands:
             raise Rejection(R.BAD_PARAMETER, f"param2 mode {value:g} is no mode number")
         mode = int(value)
         if mode == vehicle.persona.hold_mode:
+            self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
             paused = vehicle.hold(actor=asked.actor, now=now)
             if not vehicle.is_heard(now=now):
                 raise Rejection(R.VEHICLE_SILENT, f"vehicle {vehicle.system_id} is silent")
@@ -338,8 +338,11 @@ def _check_relay(asked: Asked, *, now: float) -> None:
     disarms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] == 0.0
     if vehicle.tasks.is_stopped and not disarms and number not in ASKING:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
-    if number in MOVING and not vehicle.may_move(asked.client.key):
-        raise Rejection(R.NOT_ALLOWED, f"command {number}: not while tasks drive")
+    if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
+        vehicle.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
+    why_not = vehicle.why_not_moved(asked.client.key) if number in MOVING else ""
+    if why_not:
+        raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
     if number in MOVING:

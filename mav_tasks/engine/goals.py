@@ -5,7 +5,7 @@ Our own commands, and the standard ones that a stock client sends without knowin
 
 from collections.abc import Callable
 from hashlib import blake2b
-from math import degrees, inf, isnan, nan, radians, tau
+from math import degrees, inf, isinf, isnan, nan, radians, tau
 from struct import Struct
 from typing import NamedTuple
 
@@ -84,6 +84,7 @@ def wish_of(
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
     goal = _GOALS[command.command](command, driving)
     if command.command not in OURS:
+        _refuse_infinite(command)
         return Wish(goal, Terms(priority=priority), marks_of(command, packet))
     marks = marks_of(command, packet, nonce=whole(command, 4, "nonce", high=MAX_TASK_ID))
     after = whole(command, 5, "run after", high=MAX_TASK_ID)
@@ -259,6 +260,13 @@ def _drive(command: Command, driving: Driving) -> Goal:
     if forward == rate == 0.0:
         raise Rejection(R.BAD_PARAMETER, "param1 speed and param2 rate are 0: nothing to do")
     return Drive(forward, radians(rate), duration)
+
+
+def _refuse_infinite(command: Command) -> None:
+    """Also in what is not used: it cannot be meant."""
+    for index, value in enumerate(command.params, 1):
+        if isinf(value):
+            raise Rejection(R.BAD_PARAMETER, f"param{index} is infinite")
 
 
 def _refuse_reserved(command: Command, index: int) -> None:

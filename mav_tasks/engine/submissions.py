@@ -118,6 +118,10 @@ class Submissions:
             task = vehicle.run_now(draft, actor=actor, now=now)
             self._recollection.remember(task, at=now, now=now)
 
+    def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
+        """A client wants a vehicle to stand: what it asks for next is another wish."""
+        self._recollection.held(submitter, vehicle.system_id)
+
     def _priority_of(self, submitter: Submitter) -> int:
         priorities = self._settings.clients.priorities
         if not priorities:
@@ -173,10 +177,14 @@ class Submissions:
         askers = self._undecided.pop(task.id)
         self._recollection.forget(task)
         self._store_is_away = True
+        was_for_now = asked.vehicle.tasks.urgent == task.id
         current = self._book.get(task.id)
         if current is not None and asked.vehicle.tasks.waits(current):
             asked.vehicle.tasks.withdraw(current, now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
+        words = "not stored in time: not accepted"
+        if was_for_now:
+            words += "; tasks are paused"
+        refusal = Rejection(R.STORE_UNAVAILABLE, words)
         for each in askers:
             self._book.record(each.refuse(refusal, now=now))
 

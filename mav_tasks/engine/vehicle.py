@@ -303,13 +303,19 @@ class Vehicle:
 
     def may_move(self, client: Hashable) -> bool:
         """Whether a client's motion message may pass."""
-        return (
-            self.armed
-            and not self.tasks.is_driving
-            and not self.tasks.is_stopped
-            and not self.control.is_engaged
-            and self._authority.has_granted(client)
-        )
+        return not self.why_not_moved(client)
+
+    def why_not_moved(self, client: Hashable) -> str:
+        """Give in words what keeps a client's motion message from passing, "" if nothing does."""
+        if self.tasks.is_stopped:
+            return "STOP is latched"
+        if self.tasks.is_driving or self.control.is_engaged:
+            return "not while tasks drive"
+        if not self.armed:
+            return "the rover is not armed"
+        if not self._authority.has_granted(client):
+            return f"ask for {self.persona.mode_name(self.persona.control_mode)} first"
+        return ""
 
     def is_moved_by_client(self, *, now: float) -> None:
         """A client's motion message goes to it: tasks wait."""

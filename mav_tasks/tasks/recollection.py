@@ -149,6 +149,16 @@ class Recollection:
             if len(client.packets) > PACKETS:
                 del client.packets[next(iter(client.packets))]
 
+    def held(self, submitter: Submitter, vehicle: int) -> None:
+        """A client wanted its vehicle to stand: the next return is meant anew (rule 4).
+
+        A "go to" is not: further forms of the one before may still be on their way.
+        """
+        client = self._clients.get(submitter)
+        goal = None if client is None else client.goals.get(vehicle)
+        if client is not None and goal is not None and goal.draft.goal == GoTo(None):
+            del client.goals[vehicle]
+
     def forget(self, task: Task) -> None:
         """Forget a submission that was refused in the end: it may be tried again."""
         if task.marks.nonce:

@@ -98,6 +98,11 @@ class VehicleTasks:
         return self._room.of(self.vehicle)
 
     @property
+    def urgent(self) -> TaskId | None:
+        """The task that runs although the queue is paused."""
+        return self._urgent
+
+    @property
     def next_waiting(self) -> TaskId | None:
         """The task that is next in the queue."""
         return self._queue.first()

@@ -194,7 +194,7 @@ class Observer:
 
     def _see_command_of_client(self, now: float, message: Any) -> None:
         param1 = message.param1
-        if message.command == STOP and message.target_component in (0, 1, 191):
+        if message.command == STOP:
             self.stopped, self.taken_over = True, False
             self._stop_due = (now, {"zero", "HOLD"})
         elif message.command == PAUSE_CONTINUE and param1 == 1.0:

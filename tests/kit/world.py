@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import degrees, hypot, remainder
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
@@ -16,6 +16,7 @@ from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task, TaskId
 from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
+from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, Mode, Persona
 from rover_sim.vehicle import Vehicle, make_vehicle
@@ -328,6 +329,17 @@ class ObservedNet(MemoryNet):
                 elif source == name or source not in self.observers:
                     observer.heard(self.now, data)
         self._unread.clear()
+
+
+def at(north: float, east: float) -> dict[str, Any]:
+    """Give x and y of a COMMAND_INT for a place in metres from the origin."""
+    x, y = DEFAULT_ORIGIN.to_global(north, east)
+    return {"x": x, "y": y}
+
+
+def is_at(world: World, north: float, east: float) -> bool:
+    """Whether the first rover really is at a place."""
+    return hypot(world.truth.north - north, world.truth.east - east) < 0.03
 
 
 def near_pose(

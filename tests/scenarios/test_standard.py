@@ -1,7 +1,7 @@
 """The commands that stock clients send without knowing of tasks become tasks all the same."""
 
 from dataclasses import replace
-from math import hypot, nan
+from math import nan
 from typing import Any
 
 import pytest
@@ -10,24 +10,14 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, AUTO, DENIED, RTL, set_mode
-from tests.kit.world import World, near_pose
+from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
 YAW, SPEED, REPOSITION, YAW_SPEED = 115, 178, 192, 213
 GLOBAL, LOCAL, GLOBAL_RELATIVE_INT = 0, 1, 6
-
-
-def at(north: float, east: float) -> dict[str, Any]:
-    x, y = DEFAULT_ORIGIN.to_global(north, east)
-    return {"x": x, "y": y}
-
-
-def is_at(world: World, north: float, east: float) -> bool:
-    return hypot(world.truth.north - north, world.truth.east - east) < 0.03
 
 
 @pytest.mark.parametrize("target", [(1, 1), (1, 191), (1, 0)])

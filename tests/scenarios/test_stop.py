@@ -61,7 +61,7 @@ def stands_in_hold(world: World) -> bool:
     return world.stands() and world.rover.autopilot.mode is Mode.HOLD and world.control() == "IDLE"
 
 
-@pytest.mark.parametrize("component", [0, 1, 191])
+@pytest.mark.parametrize("component", [0, 1, 191, 154])
 def test_a_driving_rover_is_stopped_and_its_task_killed(world: World, component: int) -> None:
     drive(world)
     stop = world.client.stop(target=(1, component))

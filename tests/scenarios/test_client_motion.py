@@ -1,0 +1,220 @@
+"""What clients may do to a rover besides giving it tasks: commands that move, modes, arming."""
+
+from math import nan
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Settings, Watch
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, DENIED, GUIDED, HOLD, RTL, heartbeat, setpoint
+from tests.kit.world import World, at, is_at
+from tests.scenarios.conftest import MakeWorld
+
+GLOBAL = 0  # MAV_FRAME
+REPOSITION, MOTOR_TEST, ORBIT, FOLLOW, TAKEOFF = 192, 209, 34, 32, 22
+
+
+def takes_control(world: World) -> None:
+    """The client asks for GUIDED and arms."""
+    world.client.mode(GUIDED)
+    world.run(0.5)
+    world.client.arm(True)
+    world.run(0.5)
+
+
+def go_there(current: int) -> common.MAVLink_message:
+    """ArduPilot's "go to" in the form of a plan's item."""
+    return common.MAVLink_mission_item_message(
+        1, 1, 0, 3, 16, current, 1, 0, 0, 0, nan, 47.39775, 8.545594, 0
+    )
+
+
+@pytest.mark.parametrize("command", [MOTOR_TEST, ORBIT, FOLLOW])
+def test_what_would_move_it_is_refused_while_a_task_drives(world: World, command: int) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    sent = world.client.command(command, 1, 0, 1, target=(1, 1))
+    world.run(0.3)
+    assert sent.answer == (DENIED, R.NOT_ALLOWED)
+    assert str(command) not in world.observer.sent_since(0.0)
+
+
+def test_what_would_move_it_passes_for_who_has_control(world: World) -> None:
+    takes_control(world)
+    world.client.command(ORBIT, 1, 0, 1, target=(1, 1))
+    world.run(0.3)
+    assert str(ORBIT) in world.observer.sent_since(0.0)
+
+
+@pytest.mark.parametrize("current", [2, 3])
+def test_a_go_to_in_the_form_of_an_item_needs_control_too(world: World, current: int) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    world.client.send(go_there(current))
+    world.run(0.3)
+    assert common.MAVLINK_MSG_ID_MISSION_ITEM not in [kind for _, kind in world.observer.reached]
+    assert world.state(1)[0] is S.EXECUTING
+
+
+@pytest.mark.parametrize("allowed", [True, False])
+def test_after_somebody_disarmed_a_rover_that_was_ours_it_is_not_armed_again(
+    world: World, allowed: bool
+) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    world.client.arm(False)
+    world.run(3)
+    world.client.command(54010, 1)
+    world.client.move(1, nonce=2)
+    if allowed:
+        world.client.proceed()
+    at = world.now
+    world.run(3)
+    assert ("arm" in world.observer.sent_since(at)) is allowed
+
+
+def test_a_stop_ends_what_clients_were_granted(world: World) -> None:
+    takes_control(world)
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(1)
+    assert not world.stands()
+    world.client.stop()
+    world.run(3)
+    world.client.proceed()
+    world.run(0.5)
+    other = world.add_client("other")
+    other.mode(GUIDED)
+    world.run(0.5)
+    other.arm(True)
+    world.run(2)
+    assert (world.rover.autopilot.armed, world.stands()) == (True, True)
+
+
+def test_a_rover_that_restarts_under_a_task_is_not_armed_by_us(world: World) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    world.rover.autopilot.reboot(now=world.now)
+    at = world.now
+    world.run(8)
+    world.client.command(54010, 1)
+    world.client.move(1, nonce=2)
+    world.run(5)
+    assert "arm" not in world.observer.sent_since(at)
+
+
+def test_an_operators_heartbeats_reach_the_rover(world: World) -> None:
+    at = world.now
+    world.client.send(heartbeat())
+    world.run(0.1)
+    own = [t for t, kind in world.observer.reached if kind == 0 and t >= at]
+    assert own, "its own failsafe must see the operator"
+
+
+@pytest.mark.parametrize(("flags", "target"), [(1, 191), (0, 1)])
+def test_a_go_to_is_now_only_at_the_autopilot_with_a_change_of_mode(
+    make_world: MakeWorld, flags: int, target: int
+) -> None:
+    world = make_world(settings=Settings(guided="now"))
+    world.client.move(3)
+    world.run(3)
+    world.client.command_int(
+        REPOSITION, -1, flags, 0, nan, **at(1, 0), frame=GLOBAL, target=(1, target)
+    )
+    world.run(1)
+    assert [world.state(i)[0] for i in (1, 2)] == [S.EXECUTING, S.QUEUED]
+
+
+@pytest.mark.parametrize("seconds", [1.0, 4.0])
+def test_tasks_wait_as_long_as_is_set_after_a_clients_setpoints(
+    make_world: MakeWorld, seconds: float
+) -> None:
+    world = make_world(settings=Settings(watch=Watch(other_controller=seconds)))
+    takes_control(world)
+    world.client.stream(setpoint(0.3), rate=20)
+    world.run(1)
+    world.client.end_streams()
+    end = world.now
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    assert seconds <= world.now - end < seconds + 1.0
+
+
+def test_a_rover_that_cannot_be_seen_to_stand_gets_hold_all_the_same(world: World) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    world.fault(Faults(withheld=frozenset({30, 32})))
+    at = world.now
+    world.client.pause()
+    world.run(2.5)
+    assert "HOLD" not in world.observer.sent_since(at)
+    world.run(1.5)
+    assert "HOLD" in world.observer.sent_since(at)
+
+
+class TestUnclaimed:
+    """The setting ``claim`` is off: what goes to the autopilot is the client's own business."""
+
+    @pytest.fixture
+    def world(self, make_world: MakeWorld) -> World:
+        return make_world(settings=Settings(claim=False))
+
+    def go_to(self, world: World, flags: int = 1) -> tuple[int, int] | None:
+        sent = world.client.command_int(
+            REPOSITION, -1, flags, 0, nan, **at(1, 0), frame=GLOBAL, target=(1, 1)
+        )
+        world.run(0.5)
+        return sent.answer
+
+    def test_a_go_to_is_the_rovers_own_once_it_is_armed(self, world: World) -> None:
+        assert self.go_to(world) == (DENIED, R.NOT_ALLOWED)
+        assert any("the rover is not armed" in text for text in world.client.texts())
+        takes_control(world)
+        assert self.go_to(world) == (ACCEPTED, 0)
+        assert world.tasks() == ()
+
+    def test_without_a_change_of_mode_the_mode_is_asked_for_first(self, world: World) -> None:
+        world.operator_arm(True)
+        world.run(1.2)
+        assert self.go_to(world, flags=0) == (DENIED, R.NOT_ALLOWED)
+        assert any("ask for GUIDED first" in text for text in world.client.texts())
+
+    def test_takeoff_is_the_rovers_to_refuse(self, world: World) -> None:
+        takes_control(world)
+        world.client.command(TAKEOFF, target=(1, 1))
+        world.run(0.5)
+        assert str(TAKEOFF) in world.observer.sent_since(0.0)
+
+    def test_at_the_server_everything_is_a_task(self, world: World) -> None:
+        world.client.command_int(
+            REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=GLOBAL, target=(1, 191)
+        )
+        world.run(0.2)
+        world.until_idle(tasks=1)
+        assert is_at(world, 1.0, 0.0)
+
+    def test_the_mode_rtl_is_the_rovers_own(self, world: World) -> None:
+        world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
+        takes_control(world)
+        world.client.mode(RTL)
+        world.run(2)
+        assert (world.tasks(), world.rover.autopilot.mode) == ((), Mode.RTL)
+
+
+def test_return_hold_return_goes_home(world: World) -> None:
+    world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
+    world.client.move(4)
+    world.until_idle(tasks=1)
+    for mode in (RTL, HOLD):
+        world.client.mode(mode)
+        world.run(1.4)
+    sent = world.client.mode(RTL)
+    world.run(0.3)
+    assert sent.answer == (ACCEPTED, 3)
+    world.until_state(3, S.COMPLETED)
+    assert is_at(world, 0.0, 0.0)
