@@ -78,7 +78,10 @@ def task_status(
     """Give the TASK_STATUS of a task of this vehicle, for the client at ``reader``."""
     reason = tasks.wait_reason(task)
     position = tasks.position(task) if with_position else None
-    to_start, to_finish = tasks.estimate(task, now=now) if with_position else (nan, nan)
+    is_costly = task.state is TaskState.QUEUED  # it depends on all that are ahead
+    to_start, to_finish = nan, nan
+    if with_position or not is_costly:
+        to_start, to_finish = tasks.estimate(task, now=now)
     leg = _leg(task)
     return m.TaskStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,

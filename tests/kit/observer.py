@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import common
 
@@ -49,6 +49,14 @@ ACK, ACCEPTED = 77, 0
 WATCHED = {0, 11, 30, 32, 69, 70, 75, 76, 82, 84, 86, 139, 144}
 
 
+class Reached(NamedTuple):
+    """One packet at the rover."""
+
+    at: float
+    kind: int  # message id
+    source: tuple[int, int]
+
+
 @dataclass
 class Observer:
     """Sees what passes by one rover; ``check`` raises what was wrong."""
@@ -66,8 +74,8 @@ class Observer:
     violations: list[str] = field(default_factory=list)
     #: setpoints and commands that left the server, whoever they are from
     driven: list[tuple[float, Any]] = field(default_factory=list)
-    #: everything that reached the rover, by message id
-    reached: list[tuple[float, int]] = field(default_factory=list)
+    #: everything that reached the rover
+    reached: list[Reached] = field(default_factory=list)
     _zeros_left: int = 0
     _newest: tuple[int, float] = (0, -1e9)  # of its heartbeats: number, and when it came
     _before_continue: tuple[bool, bool] | None = None
@@ -160,10 +168,12 @@ class Observer:
 
     def arrived(self, now: float, data: bytes) -> None:
         """A datagram reaches the rover."""
+        if len(data) >= 12 and data[0] == 0xFD:
+            kind = int.from_bytes(data[7:10], "little")
+            self.reached.append(Reached(now, kind, (data[5], data[6])))
         message = self._decode(data)
         if message is None:
             return
-        self.reached.append((now, message.get_msgId()))
         if message.get_type() in SETPOINTS and _moves(message):
             source = (message.get_srcSystem(), message.get_srcComponent())
             if source == SERVER and not self.is_ready() and self._is_known_unready(now):

@@ -152,7 +152,7 @@ def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
 def test_a_request_for_data_streams_does_not_reach_the_rover(world: World) -> None:
     world.client.send(common.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))
     world.run(3)
-    assert DATA_STREAM not in [kind for _, kind in world.observer.reached]
+    assert DATA_STREAM not in [packet.kind for packet in world.observer.reached]
     assert rate(world.client, POSITION, world.now - 2, world.now) > 8
 
 
@@ -406,7 +406,7 @@ def test_a_clients_setpoints_do_not_reach_a_rover_that_is_not_armed(world: World
     world.client.stream(setpoint(0.5), rate=10)
     world.run(2)
     world.client.end_streams()
-    assert SETPOINT not in [kind for _, kind in world.observer.reached]
+    assert SETPOINT not in [packet.kind for packet in world.observer.reached]
     world.operator_arm(True)
     world.run(2)
     assert world.stands()
@@ -477,7 +477,7 @@ def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, fie
     setattr(bad, field, float("nan"))
     world.client.send(bad)
     world.run(0.1)
-    assert 84 not in [kind for _, kind in world.observer.reached]
+    assert 84 not in [packet.kind for packet in world.observer.reached]
     slow = world.client.command(178, 1, float("nan"), target=(1, 1))
     world.run(0.1)
     assert slow.answer == (DENIED, R.BAD_PARAMETER)

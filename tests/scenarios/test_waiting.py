@@ -166,3 +166,11 @@ def test_estimates_are_given_on_request(world: World) -> None:
     assert world.now - at == pytest.approx(begin, rel=0.35)
     world.until_state(waiting, S.COMPLETED)
     assert world.now - at == pytest.approx(end, rel=0.35)
+
+
+def test_when_a_scheduled_task_begins_is_told_unasked(world: World) -> None:
+    world.client.command(MOVE, 1, 0, 0, 0, 0, 60, 5)
+    world.run(0.2)
+    status = world.client.statuses(1)[-1]
+    assert status.time_to_start == pytest.approx(60, abs=0.5)
+    assert status.time_to_finish > status.time_to_start
