@@ -107,6 +107,7 @@ class Displays:
         status = translate.task_status(
             task,
             vehicle.tasks,
+            self._book,
             reader=reader,
             link_number=self._gcs.link_number(task.submitter.link),
             with_position=with_position,

@@ -9,6 +9,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.services.command_receiver import Command
+from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
@@ -21,6 +22,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.guidance import Leg
 from mav_tasks.tasks.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.outlook import estimate, position, wait_reason
 from mav_tasks.tasks.task import Move, Rotate, Task, describe
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
@@ -69,6 +71,7 @@ def result_of(reason: int) -> MavResult:
 def task_status(
     task: Task,
     tasks: VehicleTasks,
+    book: TaskBook,
     *,
     reader: Address,
     link_number: int,
@@ -76,12 +79,12 @@ def task_status(
     now: float,
 ) -> m.TaskStatus:
     """Give the TASK_STATUS of a task of this vehicle, for the client at ``reader``."""
-    reason = tasks.wait_reason(task)
-    position = tasks.position(task) if with_position else None
+    reason = wait_reason(tasks, task)
+    ahead = position(tasks, task) if with_position else None
     is_costly = task.state is TaskState.QUEUED  # it depends on all that are ahead
     to_start, to_finish = nan, nan
     if with_position or not is_costly:
-        to_start, to_finish = tasks.estimate(task, now=now)
+        to_start, to_finish = estimate(tasks, task, book, now=now)
     leg = _leg(task)
     return m.TaskStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
@@ -94,7 +97,7 @@ def task_status(
         time_to_finish=_float32(to_finish),
         execution_time=nan if task.progress.anchor is None else task.progress.execution_time,
         command=task.command,
-        queue_position=UNKNOWN_POSITION if position is None else position,
+        queue_position=UNKNOWN_POSITION if ahead is None else ahead,
         step=task.progress.leg,
         step_count=leg_count(task.goal),
         target_system=reader.system_id,

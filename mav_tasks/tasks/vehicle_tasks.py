@@ -8,13 +8,11 @@ One task at a time has the vehicle. Others may have begun and be set aside: pre-
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import nan
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.estimate import duration_of, time_left
 from mav_tasks.tasks.events import (
     SERVER,
     QueueContinued,
@@ -27,7 +25,7 @@ from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
-from mav_tasks.tasks.queue import Rank
+from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
 from mav_tasks.tasks.task import Draft, Goal, Rotate, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
@@ -35,8 +33,6 @@ from mav_tasks.tasks.waiting_room import WaitingRoom
 from mav_tasks.tasks.way_back import is_off_line
 
 R, S = TaskReason, TaskState
-
-FORESEEN = 500  # tasks ahead, beyond which nobody reckons when a task starts
 
 
 class VehicleTasks:
@@ -103,6 +99,16 @@ class VehicleTasks:
         return self._urgent
 
     @property
+    def queue(self) -> TaskQueue:
+        """The tasks that are ready, to be looked at only."""
+        return self._queue
+
+    @property
+    def is_halting(self) -> bool:
+        """Whether nothing begins before the vehicle stands, because a task was killed."""
+        return self._is_halting
+
+    @property
     def next_waiting(self) -> TaskId | None:
         """The task that is next in the queue."""
         return self._queue.first()
@@ -128,66 +134,23 @@ class VehicleTasks:
         first = None if self.begun is not None else self._next()
         return first is not None and not self._book.is_durable(first)
 
-    def position(self, task: Task) -> int | None:
-        """Give how many tasks run before this one, or None if it is not ready to run."""
-        ahead = self._queue.position(task.id)
-        if ahead is None:
-            return None
-        return ahead + (self.begun is not None) + len(self._aside)
-
     def page(self, first: int, count: int) -> list[TaskId]:
         """Give up to ``count`` waiting tasks from a position on."""
         if first + count <= len(self._queue):
             return self._queue.page(first, count)
         return self.waiting[first : first + count]
 
-    def estimate(self, task: Task, *, now: float) -> tuple[float, float]:
-        """Give the estimated seconds until a task starts, and until it ends; NaN: not known."""
-        match task.state:
-            case S.STARTING | S.EXECUTING:
-                return 0.0, time_left(task.goal, task.progress, self._driving)
-            case S.SCHEDULED:
-                to_start = self._room.due_at(task) - now
-            case S.QUEUED:
-                to_start = self._time_ahead(task)
-            case _:
-                return nan, nan
-        return to_start, to_start + duration_of(task.goal, self._driving)
+    def start_time(self, task: Task) -> float:
+        """Give the monotonic time before which a task does not begin; -inf without one."""
+        return self._room.due_at(task)
 
-    def _time_ahead(self, task: Task) -> float:
-        """Give the seconds until those before it are done; NaN while nothing goes on."""
-        position = self._queue.position(task.id)
-        if self._paused or self._is_held_ahead or position is None or position > FORESEEN:
-            return nan
-        ahead = [self._book[task_id] for task_id in self._queue.page(0, position)]
-        begun = [task for task in (self.begun, *self.aside) if task is not None]
-        return sum(time_left(t.goal, t.progress, self._driving) for t in (*begun, *ahead))
-
-    def wait_reason(self, task: Task) -> TaskReason:
-        """Give why a task is not being executed; its own reason once it has begun."""
-        match task.state:
-            case S.SCHEDULED:
-                return R.START_TIME
-            case S.BLOCKED:
-                return R.DEPENDENCY
-            case S.QUEUED:
-                return self._why_queued(task)
-            case _:
-                return task.reason
-
-    def _why_queued(self, task: Task) -> TaskReason:
-        if self._is_held_ahead:
-            return R.HELD_AHEAD
-        if self._paused and task.id != self._urgent:
-            return R.RESTARTED if self._paused is R.RESTARTED else R.QUEUE_PAUSED
-        if self._is_halting:
-            return R.STOP_UNCONFIRMED
-        if self.begun is not None or self._queue.position(task.id):
-            return R.BEHIND_OTHERS
-        return self._blocker if self._blocked == task.id else R.NONE
+    def blocker_of(self, task_id: TaskId) -> TaskReason:
+        """Give what keeps the next task from beginning; NONE for others."""
+        return self._blocker if self._blocked == task_id else R.NONE
 
     @property
-    def _is_held_ahead(self) -> bool:
+    def is_held_ahead(self) -> bool:
+        """Whether a held task keeps all others from beginning."""
         begun = self.begun
         if begun is not None and begun.state is S.HELD:
             return True
@@ -201,10 +164,10 @@ class VehicleTasks:
         self._apply_driving()
 
     def _apply_driving(self) -> None:
-        self._executor.apply(replace(self._settings, driving=self._driving))
+        self._executor.apply(replace(self._settings, driving=self.driving))
 
     @property
-    def _driving(self) -> Driving:
+    def driving(self) -> Driving:
         """The settings for driving, with the speed that a client has set."""
         driving = self._settings.driving
         return driving if self._speed is None else replace(driving, speed=self._speed)
@@ -256,7 +219,7 @@ class VehicleTasks:
         """
         if self.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
-        if self._is_held_ahead:
+        if self.is_held_ahead:
             raise Rejection(R.HELD_AHEAD, "a held task must be released first")
         self._check_start(seen, draft.goal, now=now)
         task = self._room.submit(draft, now=now)
@@ -474,7 +437,7 @@ class VehicleTasks:
     def _is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Set the running task aside if a waiting one may interrupt it, and could begin."""
         running = self.begun
-        if running is None or self._paused or not self._queue or self._is_held_ahead:
+        if running is None or self._paused or not self._queue or self.is_held_ahead:
             return False
         if now - self._begun_at < self._settings.queueing.preemption_rest:
             return False
@@ -499,7 +462,7 @@ class VehicleTasks:
 
     def _next(self) -> TaskId | None:
         """The task that has the next turn: the urgent one, a pre-empted one, or a waiting one."""
-        if self._is_held_ahead:
+        if self.is_held_ahead:
             return None
         if self._urgent is not None and self._urgent in self._queue:
             return self._urgent

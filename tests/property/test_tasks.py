@@ -20,6 +20,7 @@ from mav_tasks.tasks.lifecycle import (
     TaskReason,
     TaskState,
 )
+from mav_tasks.tasks.outlook import position
 from mav_tasks.tasks.task import Move, Pose, TaskId
 from mav_tasks.tasks.view import DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.samples import draft, idle_vehicle, ours
@@ -195,7 +196,7 @@ class TasksOfAVehicle(RuleBasedStateMachine):
         for task in self.book.all():
             assert (task.version > 1) == (task.state is not TaskState.QUEUED)
             if task.state in TERMINAL:
-                assert self.tasks.position(task) is None
+                assert position(self.tasks, task) is None
 
 
 TestTasksOfAVehicle = TasksOfAVehicle.TestCase

@@ -7,6 +7,7 @@ import pytest
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.outlook import wait_reason
 from mav_tasks.tasks.task import Frame, Move, Pose, Terms, Wait
 from mav_tasks.tasks.view import DemandKind, ModeKind
 from tests.unit.tasks.rig import (
@@ -280,7 +281,7 @@ class TestRunNow:
         rig.keep()
         rig.steps(in_control, seconds=2.0)
         assert rig.states() == [S.QUEUED]
-        assert rig.tasks.wait_reason(rig.task(1)) is R.QUEUE_PAUSED
+        assert wait_reason(rig.tasks, rig.task(1)) is R.QUEUE_PAUSED
 
 
 class TestClear:

@@ -20,6 +20,7 @@ from mav_tasks.tasks.legs import (
     length_of,
 )
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.outlook import estimate
 from mav_tasks.tasks.task import (
     Drive,
     Face,
@@ -283,11 +284,13 @@ class TestEstimate:
         second, third = rig.submit(Wait(10.0)), rig.submit(Wait(20.0))
         first_left = 100.0 + SETTLING
         for task, start, length in ((second, first_left, 10), (third, first_left + 11.5, 20)):
-            assert rig.tasks.estimate(task, now=rig.now) == pytest.approx(
+            assert estimate(rig.tasks, task, rig.book, now=rig.now) == pytest.approx(
                 (start, start + SETTLING + length)
             )
         late = rig.submit(Wait(10.0))
         late = rig.modify(late.id, start_at=rig.now + 50.0)
-        assert rig.tasks.estimate(late, now=rig.now) == pytest.approx((50.0, 61.5))
+        assert estimate(rig.tasks, late, rig.book, now=rig.now) == pytest.approx((50.0, 61.5))
         rig.tasks.pause(TaskReason.OPERATOR, actor=BY, now=rig.now)
-        assert rig.tasks.estimate(second, now=rig.now) == pytest.approx((nan, nan), nan_ok=True)
+        assert estimate(rig.tasks, second, rig.book, now=rig.now) == pytest.approx(
+            (nan, nan), nan_ok=True
+        )

@@ -8,6 +8,7 @@ import pytest
 from mav_tasks.settings import Queueing
 from mav_tasks.tasks.guidance import wrap
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.outlook import wait_reason
 from mav_tasks.tasks.task import Drive, Goal, Move, Pose, Rotate, Terms, Wait
 from mav_tasks.tasks.view import ModeKind
 from tests.unit.tasks.rig import (
@@ -186,7 +187,7 @@ class TestAfterwards:
         rig.cancel(2)
         rig.steps(in_control, seconds=3.0)
         assert rig.states() == [S.HELD, S.CANCELLED, S.QUEUED]
-        assert rig.tasks.wait_reason(third) is R.HELD_AHEAD
+        assert wait_reason(rig.tasks, third) is R.HELD_AHEAD
 
     def test_a_held_task_aside_blocks_who_is_marked_too(self) -> None:
         rig = running(Terms())

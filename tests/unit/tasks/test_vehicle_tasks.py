@@ -9,6 +9,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import QueueContinued, QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.outlook import position, wait_reason
 from mav_tasks.tasks.task import Move, Pose, Rotate, TaskId
 from mav_tasks.tasks.view import DemandKind, ModeKind
 from tests.unit.tasks.rig import SETTINGS, TICK, Rig, View, at, idle, in_control
@@ -118,15 +119,15 @@ class TestWaiting:
         rig = Rig()
         first, second = rig.submit(), rig.submit()
         rig.step(lambda now: replace(idle(now), mode=ModeKind.OTHER))
-        assert [rig.tasks.wait_reason(t) for t in (first, second)] == [
+        assert [wait_reason(rig.tasks, t) for t in (first, second)] == [
             R.WRONG_MODE,
             R.BEHIND_OTHERS,
         ]
         rig.step(idle)
-        assert rig.tasks.wait_reason(second) is R.BEHIND_OTHERS
-        assert [rig.tasks.position(t) for t in (first, second)] == [None, 1]
+        assert wait_reason(rig.tasks, second) is R.BEHIND_OTHERS
+        assert [position(rig.tasks, t) for t in (first, second)] == [None, 1]
         rig.tasks.pause(R.OPERATOR, actor="somebody", now=rig.now)
-        assert rig.tasks.wait_reason(second) is R.QUEUE_PAUSED
+        assert wait_reason(rig.tasks, second) is R.QUEUE_PAUSED
 
     def test_a_withdrawn_submission_leaves_nothing(self) -> None:
         rig = Rig()
@@ -257,7 +258,7 @@ class TestInterruptions:
         rig.tasks.hold(R.LATE, now=rig.now)
         rig.steps(in_control, seconds=5.0)
         assert (rig.state(1), rig.state(2)) == (S.HELD, S.QUEUED)
-        assert rig.tasks.wait_reason(second) is R.HELD_AHEAD
+        assert wait_reason(rig.tasks, second) is R.HELD_AHEAD
 
     def test_without_progress_it_fails_and_the_queue_pauses(self) -> None:
         rig = Rig().executing()
