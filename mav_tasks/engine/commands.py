@@ -26,8 +26,9 @@ from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.services.command_sender import Answered
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import GoTo
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, GoTo, Marks, Submitter
+from mav_tasks.tasks.task import Draft, Marks, Submitter
 
 R = TaskReason
 

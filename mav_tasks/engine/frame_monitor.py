@@ -9,7 +9,8 @@ from math import hypot
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.tasks.frames import origin_of, to_local
-from mav_tasks.tasks.task import Frame, GlobalPlace, LocalPlace
+from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
+from mav_tasks.tasks.task import Frame
 
 MOVED_SAID = 0.05  # m between two origins that a vehicle says, that are not the same
 MOVED_WORKED_OUT = 1.0  # m, the same where positions were rounded and filtered in between

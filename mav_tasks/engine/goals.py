@@ -13,11 +13,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import (
-    DEFAULT_PRIORITY,
-    MAX_PRIORITY,
-    MAX_TASK_ID,
+from mav_tasks.tasks.goal import (
     Drive,
     Face,
     GlobalPlace,
@@ -25,13 +21,13 @@ from mav_tasks.tasks.task import (
     GoTo,
     Head,
     LocalPlace,
-    Marks,
     Move,
     Place,
     Rotate,
-    Terms,
     Wait,
 )
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Marks, Terms
 
 R = TaskReason
 

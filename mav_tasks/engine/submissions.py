@@ -12,18 +12,10 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import Goal, GoTo, describe
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.recollection import Known, Recollection, Rule
-from mav_tasks.tasks.task import (
-    DEFAULT_PRIORITY,
-    Draft,
-    Goal,
-    GoTo,
-    Submitter,
-    Task,
-    TaskId,
-    describe,
-)
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
 R = TaskReason
 

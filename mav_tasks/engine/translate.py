@@ -19,11 +19,12 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
+from mav_tasks.tasks.goal import Move, Rotate, describe
 from mav_tasks.tasks.guidance import Leg
 from mav_tasks.tasks.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
-from mav_tasks.tasks.task import Move, Rotate, Task, describe
+from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason

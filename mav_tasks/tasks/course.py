@@ -5,9 +5,10 @@ from math import copysign
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
+from mav_tasks.tasks.goal import Goal, GoTo, Head, Move, Wait
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
 from mav_tasks.tasks.legs import WAY, anchor_of, leg_count, leg_of, length_of
-from mav_tasks.tasks.task import Goal, GoTo, Head, Move, Progress, Wait
+from mav_tasks.tasks.task import Progress
 
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
 

@@ -3,9 +3,10 @@
 from math import nan, sqrt
 
 from mav_tasks.settings import Driving
+from mav_tasks.tasks.goal import Goal, Move, Rotate
 from mav_tasks.tasks.guidance import Leg
 from mav_tasks.tasks.legs import first_leg, leg_of, length_of
-from mav_tasks.tasks.task import Goal, Move, Progress, Rotate
+from mav_tasks.tasks.task import Progress
 
 SETTLING = 1.5  # s from one task's end to motion, and from near its end to a measured standstill
 

@@ -6,8 +6,9 @@ where events are stored or logged. ``actor`` is a client, or "server".
 
 from dataclasses import dataclass
 
+from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-from mav_tasks.tasks.task import Progress, Task, TaskId, Terms, describe
+from mav_tasks.tasks.task import Progress, Task, TaskId, Terms
 
 SERVER = "server"
 

@@ -11,13 +11,14 @@ from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
+from mav_tasks.tasks.goal import Face, GoTo, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion
 from mav_tasks.tasks.legs import anchor_of, begun_from, distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited
 from mav_tasks.tasks.scheduler import place_of, start_blocker
 from mav_tasks.tasks.stuck import StuckWatch
-from mav_tasks.tasks.task import Face, GoTo, Progress, Task, TaskId, Wait
+from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
 from mav_tasks.tasks.way_back import is_off_line, resumed, way_back
 

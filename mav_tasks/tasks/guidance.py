@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.task import Drive, Head, Move, Pose, Rotate, Wait
+from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
+from mav_tasks.tasks.task import Pose
 
 #: what can be steered; every goal comes down to these (``legs``)
 Leg = Move | Rotate | Drive | Head | Wait

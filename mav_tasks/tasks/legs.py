@@ -8,20 +8,9 @@ that a resumed task drives the very same ones.
 from dataclasses import replace
 from math import atan2, copysign, cos, hypot, pi, sin, tau
 
+from mav_tasks.tasks.goal import Drive, Face, Goal, GoTo, Head, LocalPlace, Move, Rotate, Wait
 from mav_tasks.tasks.guidance import Leg, wrap
-from mav_tasks.tasks.task import (
-    Drive,
-    Face,
-    Goal,
-    GoTo,
-    Head,
-    LocalPlace,
-    Move,
-    Pose,
-    Progress,
-    Rotate,
-    Wait,
-)
+from mav_tasks.tasks.task import Pose, Progress
 
 #: the legs of a GoTo: face the place, drive there, then what else was asked for
 FACE, WAY = range(2)

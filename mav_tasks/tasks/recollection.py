@@ -13,17 +13,9 @@ from typing import NamedTuple
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.frames import to_local
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import (
-    Draft,
-    GlobalPlace,
-    GoTo,
-    LocalPlace,
-    Place,
-    Submitter,
-    Task,
-    TaskId,
-)
+from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
 SAME_PACKET = 5.0  # s, the very same packet again (rule 1)
 CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters (rule 3)

@@ -2,8 +2,9 @@
 
 from mav_tasks.settings import Queueing, Watch
 from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Goal, GoTo, LocalPlace, Task
+from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 

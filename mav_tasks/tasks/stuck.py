@@ -7,8 +7,8 @@ nearer to, standing still while a velocity is asked for.
 from math import inf
 
 from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.guidance import Velocity
-from mav_tasks.tasks.task import Move, Rotate
 from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress

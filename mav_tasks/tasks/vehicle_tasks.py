@@ -22,12 +22,13 @@ from mav_tasks.tasks.events import (
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
+from mav_tasks.tasks.goal import Goal, Rotate
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
-from mav_tasks.tasks.task import Draft, Goal, Rotate, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.task import Draft, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
 from mav_tasks.tasks.way_back import is_off_line

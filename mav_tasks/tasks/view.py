@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from mav_tasks.tasks.goal import GlobalPlace
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Frame, GlobalPlace
+from mav_tasks.tasks.task import Frame
 
 
 class ModeKind(Enum):

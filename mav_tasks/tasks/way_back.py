@@ -8,18 +8,10 @@ from dataclasses import replace
 from math import copysign, cos, hypot, radians, sin
 
 from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Move, Rotate
 from mav_tasks.tasks.guidance import Motion, cross_track, done_so_far, wrap
 from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_of, length_of
-from mav_tasks.tasks.task import (
-    Goal,
-    GoTo,
-    LocalPlace,
-    Move,
-    Pose,
-    Progress,
-    Rotate,
-    Task,
-)
+from mav_tasks.tasks.task import Pose, Progress, Task
 
 ON_SPOT = 0.02  # m from where it was: as good as there
 OFF_LINE = 1.0  # m, lifecycle: further off its line than this is no resumption after a takeover

@@ -20,8 +20,9 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.goal import Goal, Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskState
-from mav_tasks.tasks.task import Goal, Move, Rotate, Task
+from mav_tasks.tasks.task import Task
 from tests.kit.client import (
     ACCEPTED,
     ACK,

@@ -23,9 +23,10 @@ from mav_tasks.tasks.events import (
     TaskWithdrawn,
 )
 from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.goal import Wait
 from mav_tasks.tasks.lifecycle import TERMINAL, TRANSITIONS, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Draft, Frame, Task, TaskId, Terms, Wait
+from mav_tasks.tasks.task import Draft, Frame, Task, TaskId, Terms
 from mav_tasks.tasks.view import DemandKind, VehicleView
 from tests.unit.tasks.samples import draft, idle_vehicle, ours
 

@@ -12,6 +12,7 @@ from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import (
     ACTIVE,
     TERMINAL,
@@ -21,7 +22,7 @@ from mav_tasks.tasks.lifecycle import (
     TaskState,
 )
 from mav_tasks.tasks.outlook import position
-from mav_tasks.tasks.task import Move, Pose, TaskId
+from mav_tasks.tasks.task import Pose, TaskId
 from mav_tasks.tasks.view import DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.samples import draft, idle_vehicle, ours
 

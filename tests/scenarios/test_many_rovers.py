@@ -15,9 +15,10 @@ from mav_tasks.links.memory import Conditions
 from mav_tasks.mavlink.address import Address
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.events import TaskChanged, VehicleNoted, VehicleSeen
+from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.task import Move, Rotate, Task
+from mav_tasks.tasks.task import Task
 from rover_sim.autopilot import Autopilot
 from rover_sim.body import Pose
 from rover_sim.faults import Faults

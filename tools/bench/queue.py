@@ -12,7 +12,8 @@ from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.task import Draft, Marks, Move, Submitter, Terms
+from mav_tasks.tasks.goal import Move
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
 from mav_tasks.tasks.waiting_room import WaitingRoom
 
 from .table import Row

@@ -5,7 +5,7 @@ import pytest
 from mav_tasks.engine.frame_monitor import FrameMonitor, Seen
 from mav_tasks.mavlink import messages as m
 from mav_tasks.tasks.frames import to_global
-from mav_tasks.tasks.task import GlobalPlace, LocalPlace
+from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 
 ORIGIN = GlobalPlace(-353_632_620, 1_491_652_370)
 ELSEWHERE = GlobalPlace(-353_632_620, 1_491_653_370)

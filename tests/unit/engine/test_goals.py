@@ -10,8 +10,7 @@ from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.messages import CommandInt, CommandLong
 from mav_tasks.services.command_receiver import Command, command_of
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import (
+from mav_tasks.tasks.goal import (
     Drive,
     Face,
     GlobalPlace,
@@ -21,9 +20,10 @@ from mav_tasks.tasks.task import (
     LocalPlace,
     Move,
     Rotate,
-    Terms,
     Wait,
 )
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Terms
 
 R, C = TaskReason, MavCmd
 DRIVING = Driving()

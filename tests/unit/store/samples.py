@@ -11,8 +11,9 @@ from mav_tasks.store import Kept, NotKept, Outcome
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskSubmitted
+from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Marks, Move, Task, TaskId, Terms
+from mav_tasks.tasks.task import Marks, Task, TaskId, Terms
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE
 
 OFFSET = 1_800_000_000.0  # s, UTC minus monotonic; a whole number loses nothing of the samples

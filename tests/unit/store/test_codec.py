@@ -16,7 +16,8 @@ from mav_tasks.store.codec import (
     loads,
 )
 from mav_tasks.tasks.events import Event, TaskSubmitted
-from mav_tasks.tasks.task import Draft, Frame, Goal, GoTo, LocalPlace, Move, Task
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Move
+from mav_tasks.tasks.task import Draft, Frame, Task
 from tests.unit.store.samples import OFFSET, submitted
 
 #: UTC in their own right: never moved

@@ -21,9 +21,10 @@ from mav_tasks.tasks.events import (
     VehicleSeen,
     VehicleSpeedSet,
 )
+from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Move, Pose, Progress, TaskId, Terms
+from mav_tasks.tasks.task import Pose, Progress, TaskId, Terms
 from tests.unit.store.samples import (
     OFFSET,
     finish,

@@ -8,10 +8,11 @@ from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskChanged
 from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.goal import GlobalPlace, Goal
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity, wrap
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Draft, Frame, GlobalPlace, Goal, Pose, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Frame, Pose, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 from tests.unit.tasks.samples import FORWARD_2, ORIGIN, draft, idle_vehicle, ours

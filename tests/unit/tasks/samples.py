@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+from mav_tasks.tasks.goal import Goal, Move
 from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Goal, Marks, Move, Pose, Submitter, Terms
+from mav_tasks.tasks.task import Draft, Marks, Pose, Submitter, Terms
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 SOMEBODY = Submitter("udpin:127.0.0.1:14560", "127.0.0.1:50000", 255, 190)

@@ -9,9 +9,10 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.fleet import LONG_IDLE, Fleet
+from mav_tasks.tasks.goal import Move, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Frame, Move, Pose, Task, TaskId, Terms, Wait
+from mav_tasks.tasks.task import Frame, Pose, Task, TaskId, Terms
 from mav_tasks.tasks.view import DemandKind
 from tests.unit.tasks.rig import BY, Rig, Rover, idle, in_control, run, run_until
 from tests.unit.tasks.samples import draft

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.tasks.frames import origin_of, to_global, to_local
-from mav_tasks.tasks.task import GlobalPlace, LocalPlace
+from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 
 RESOLUTION = 0.0112  # m, of the integers
 

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.settings import Driving
+from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.guidance import (
     ZERO,
     Motion,
@@ -17,7 +18,7 @@ from mav_tasks.tasks.guidance import (
     steer,
     wrap,
 )
-from mav_tasks.tasks.task import Move, Pose, Rotate
+from mav_tasks.tasks.task import Pose
 
 DRIVING = Driving()
 NORTHWARDS = Pose(0.0, 0.0, 0.0)

@@ -6,9 +6,10 @@ import pytest
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing
+from mav_tasks.tasks.goal import Move, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import wait_reason
-from mav_tasks.tasks.task import Frame, Move, Pose, Terms, Wait
+from mav_tasks.tasks.task import Frame, Pose, Terms
 from mav_tasks.tasks.view import DemandKind, ModeKind
 from tests.unit.tasks.rig import (
     BY,

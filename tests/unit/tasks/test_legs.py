@@ -7,6 +7,18 @@ import pytest
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.estimate import SETTLING, duration_of, time_left
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    GlobalPlace,
+    Goal,
+    GoTo,
+    Head,
+    LocalPlace,
+    Move,
+    Rotate,
+    Wait,
+)
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity, wrap
 from mav_tasks.tasks.legs import (
     FACE,
@@ -21,21 +33,7 @@ from mav_tasks.tasks.legs import (
 )
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import estimate
-from mav_tasks.tasks.task import (
-    Drive,
-    Face,
-    Frame,
-    GlobalPlace,
-    Goal,
-    GoTo,
-    Head,
-    LocalPlace,
-    Move,
-    Pose,
-    Progress,
-    Rotate,
-    Wait,
-)
+from mav_tasks.tasks.task import Frame, Pose, Progress
 from tests.unit.tasks.rig import BY, Rig, Rover, run_until
 from tests.unit.tasks.samples import ORIGIN, motion
 

@@ -6,10 +6,11 @@ from math import cos, hypot, pi, radians, sin
 import pytest
 
 from mav_tasks.settings import Queueing
+from mav_tasks.tasks.goal import Drive, Goal, Move, Rotate, Wait
 from mav_tasks.tasks.guidance import wrap
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import wait_reason
-from mav_tasks.tasks.task import Drive, Goal, Move, Pose, Rotate, Terms, Wait
+from mav_tasks.tasks.task import Pose, Terms
 from mav_tasks.tasks.view import ModeKind
 from tests.unit.tasks.rig import (
     BY,

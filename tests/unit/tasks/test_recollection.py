@@ -6,6 +6,7 @@ import pytest
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import GlobalPlace, Goal, GoTo, LocalPlace, Move
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.recollection import (
     CONFIRMED,
@@ -17,17 +18,7 @@ from mav_tasks.tasks.recollection import (
     Recollection,
     Rule,
 )
-from mav_tasks.tasks.task import (
-    Draft,
-    GlobalPlace,
-    Goal,
-    GoTo,
-    LocalPlace,
-    Marks,
-    Move,
-    Submitter,
-    Task,
-)
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Task
 from tests.unit.tasks.samples import SOMEBODY
 
 EPSILON = 1e-6

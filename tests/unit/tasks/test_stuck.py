@@ -5,9 +5,10 @@ from math import pi
 import pytest
 
 from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.goal import Drive, Goal, GoTo, LocalPlace, Move, Rotate, Wait
 from mav_tasks.tasks.guidance import Velocity
 from mav_tasks.tasks.stuck import BLIND, StuckWatch
-from mav_tasks.tasks.task import Drive, Goal, GoTo, LocalPlace, Move, Pose, Progress, Rotate, Wait
+from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN, motion, ours
 
 LIMIT = 10.0

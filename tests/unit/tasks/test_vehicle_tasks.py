@@ -8,9 +8,10 @@ import pytest
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import QueueContinued, QueuePaused
+from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import position, wait_reason
-from mav_tasks.tasks.task import Move, Pose, Rotate, TaskId
+from mav_tasks.tasks.task import Pose, TaskId
 from mav_tasks.tasks.view import DemandKind, ModeKind
 from tests.unit.tasks.rig import SETTINGS, TICK, Rig, View, at, idle, in_control
 from tests.unit.tasks.samples import idle_vehicle, ours

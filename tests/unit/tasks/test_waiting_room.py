@@ -7,8 +7,9 @@ import pytest
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Draft, Move, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.waiting_room import WaitingRoom
 from tests.unit.tasks.samples import SOMEBODY
 

@@ -7,19 +7,9 @@ import pytest
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.goal import Drive, Goal, GoTo, LocalPlace, Move, Rotate, Wait
 from mav_tasks.tasks.guidance import Motion, cross_track, wrap
-from mav_tasks.tasks.task import (
-    Drive,
-    Goal,
-    GoTo,
-    LocalPlace,
-    Move,
-    Pose,
-    Progress,
-    Rotate,
-    Task,
-    Wait,
-)
+from mav_tasks.tasks.task import Pose, Progress, Task
 from mav_tasks.tasks.way_back import OFF_LINE, ON_SPOT, PAST_END, is_off_line, resumed, way_back
 from tests.unit.tasks.samples import draft, motion
 
