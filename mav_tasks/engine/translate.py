@@ -19,8 +19,9 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
-from mav_tasks.tasks.goal import Move, Rotate, describe
+from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
 from mav_tasks.tasks.guidance import Leg
+from mav_tasks.tasks.itinerary import goal_of
 from mav_tasks.tasks.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
@@ -99,8 +100,8 @@ def task_status(
         execution_time=nan if task.progress.anchor is None else task.progress.execution_time,
         command=task.command,
         queue_position=UNKNOWN_POSITION if ahead is None else ahead,
-        step=task.progress.leg,
-        step_count=leg_count(task.goal),
+        step=_step(task),
+        step_count=_step_count(task.goal),
         target_system=reader.system_id,
         target_component=reader.component_id,
         state=task.state,
@@ -188,9 +189,8 @@ def _whole(value: float) -> int:
 
 def _leg(task: Task) -> Leg | None:
     """The leg that is being driven; before the start the first one, if it can be known by then."""
-    return (
-        first_leg(task.goal) if task.progress.anchor is None else leg_of(task.goal, task.progress)
-    )
+    goal = goal_of(task)
+    return first_leg(goal) if task.progress.anchor is None else leg_of(goal, task.progress)
 
 
 def _remaining(task: Task, leg: Leg | None) -> float:
@@ -216,7 +216,16 @@ def _progress(task: Task, leg: Leg | None) -> int:
         return 0
     length = length_of(leg)
     share = min(1.0, max(0.0, task.progress.done / length)) if length else 0.0
-    return round(100 * (task.progress.leg + share) / leg_count(task.goal))
+    return round(100 * (_step(task) + share) / max(_step_count(task.goal), 1))
+
+
+def _step(task: Task) -> int:
+    """Give the item of a plan that is being driven, of other tasks the leg."""
+    return max(task.progress.step, 0) if isinstance(task.goal, Plan) else task.progress.leg
+
+
+def _step_count(goal: Goal) -> int:
+    return len(goal.steps) if isinstance(goal, Plan) else leg_count(goal)
 
 
 def _words(task: Task, reason: TaskReason) -> str:

@@ -119,6 +119,8 @@ class Decoder:
         """Give the values of rows. Unreadable if one cannot be understood."""
         if not rows:
             return []
+        if not fields(kind):
+            return [kind() for _ in rows]
         decode = self._decoders.get(kind)
         if decode is None:
             decode = self._decoders[kind] = self._decoder_of(kind)

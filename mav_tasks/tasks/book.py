@@ -11,6 +11,7 @@ from dataclasses import replace
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.events import (
     Event,
+    StepReached,
     TaskAdvanced,
     TaskChanged,
     TaskModified,
@@ -154,6 +155,10 @@ class TaskBook:
         task = replace(old, progress=progress, version=old.version + 1)
         self._tasks[task_id] = task
         self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now))
+
+    def reached(self, task_id: TaskId, step: int, *, performs: bool, now: float) -> None:
+        """Tell of a step of a plan that is done; ``performs``: it is sent to the vehicle."""
+        self.record(StepReached(task_id, self._tasks[task_id].vehicle, step, performs, now))
 
     def note_progress(self, task_id: TaskId, progress: Progress) -> None:
         """Keep live progress, for status only: no event, no new version."""

@@ -5,9 +5,9 @@ from math import copysign
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
-from mav_tasks.tasks.goal import Goal, GoTo, Head, Move, Wait
+from mav_tasks.tasks.goal import GoTo, Head, Move, SingleGoal, Wait
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
-from mav_tasks.tasks.legs import WAY, anchor_of, leg_count, leg_of, length_of
+from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_count, leg_of, length_of
 from mav_tasks.tasks.task import Progress
 
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
@@ -16,9 +16,11 @@ MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end 
 class Course:
     """One goal on its way; ``progress`` is all that there is to resume it."""
 
-    def __init__(self, goal: Goal, progress: Progress) -> None:
+    def __init__(self, goal: SingleGoal, progress: Progress, *, passing: float = 0.0) -> None:
         self.goal = goal
         self.progress = progress
+        #: m/s, of a way that goes on at its end to another place
+        self.passing = passing
 
     def __repr__(self) -> str:
         return f"Course({self.goal}, {self.progress})"
@@ -33,6 +35,24 @@ class Course:
         """What is left of the present leg; negative beyond its end."""
         return length_of(self.leg) - self.progress.done
 
+    @property
+    def is_passing(self) -> bool:
+        """Whether the present leg ends without standing."""
+        return self.passing > 0.0 and self.progress.leg == WAY
+
+    def has_passed(self, motion: Motion) -> bool:
+        """Whether the place is near enough to go on to the next."""
+        target = self.progress.target
+        return (
+            self.is_passing
+            and target is not None
+            and (distance(motion.pose, target) <= self._radius)
+        )
+
+    @property
+    def _radius(self) -> float:
+        return (isinstance(self.goal, GoTo) and self.goal.radius) or 0.0
+
     def look(self, motion: Motion, *, elapsed: float) -> None:
         """Take in where the vehicle is, ``elapsed`` seconds after the last look."""
         anchor = self.progress.anchor
@@ -45,8 +65,10 @@ class Course:
         """Whether to stand here: near the end while moving; anywhere within tolerance at rest."""
         within = 1.0 if stands else MOVING_TOLERANCE
         remaining = self.remaining
-        if isinstance(self.goal, GoTo) and self.goal.radius and self.progress.leg == WAY:
-            return abs(remaining) <= self.goal.radius
+        if self.is_passing:
+            return False
+        if self._radius and self.progress.leg == WAY:
+            return abs(remaining) <= self._radius
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
@@ -69,4 +91,14 @@ class Course:
             leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)
         if isinstance(leg, Wait):
             return ZERO
-        return guidance.steer(leg, anchor, motion.pose, remaining=self.remaining, driving=driving)
+        remaining = self.remaining
+        if self.is_passing and remaining > 0:
+            remaining = max(remaining - self._radius, 0.0)
+        return guidance.steer(
+            leg,
+            anchor,
+            motion.pose,
+            remaining=remaining,
+            driving=driving,
+            passing=self.passing if self.is_passing else 0.0,
+        )

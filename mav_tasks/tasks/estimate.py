@@ -3,7 +3,7 @@
 from math import nan, sqrt
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.goal import Goal, Move, Rotate
+from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate
 from mav_tasks.tasks.guidance import Leg
 from mav_tasks.tasks.legs import first_leg, leg_of, length_of
 from mav_tasks.tasks.task import Progress
@@ -13,13 +13,13 @@ SETTLING = 1.5  # s from one task's end to motion, and from near its end to a me
 
 def duration_of(goal: Goal, driving: Driving) -> float:
     """Give the seconds that a task takes from its start; NaN where its way is not known yet."""
-    leg = first_leg(goal)
+    leg = None if isinstance(goal, Plan) else first_leg(goal)
     return nan if leg is None else SETTLING + _seconds(leg, length_of(leg), driving)
 
 
 def time_left(goal: Goal, progress: Progress, driving: Driving) -> float:
     """Give the seconds that a begun task still takes."""
-    if progress.anchor is None:
+    if progress.anchor is None or isinstance(goal, Plan):
         return duration_of(goal, driving)
     leg = leg_of(goal, progress)
     left = max(0.0, length_of(leg) - progress.done)

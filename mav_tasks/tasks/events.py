@@ -59,7 +59,22 @@ class TaskAdvanced:
     at: float
 
     def __str__(self) -> str:
-        return f"task {self.task_id}: leg {self.progress.leg + 1} begun"
+        step = f"item {self.progress.step}, " if self.progress.step >= 0 else ""
+        return f"task {self.task_id}: {step}leg {self.progress.leg + 1} begun"
+
+
+@dataclass(frozen=True, slots=True)
+class StepReached:
+    """A step of a plan is done; ``performs``: it is a command that the vehicle gets now."""
+
+    task_id: TaskId
+    vehicle: int
+    step: int
+    performs: bool
+    at: float
+
+    def __str__(self) -> str:
+        return f"task {self.task_id}: item {self.step} {'sent' if self.performs else 'reached'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +230,7 @@ Event = (
     TaskSubmitted
     | TaskChanged
     | TaskAdvanced
+    | StepReached
     | TaskModified
     | TaskWaits
     | TaskWithdrawn

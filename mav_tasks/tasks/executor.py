@@ -11,16 +11,18 @@ from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.goal import Face, GoTo, Wait
+from mav_tasks.tasks.goal import GoTo, Plan, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion
-from mav_tasks.tasks.legs import anchor_of, begun_from, distance
+from mav_tasks.tasks.itinerary import following, is_over, present_goal, skipped_to
+from mav_tasks.tasks.legs import WAY, distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited
-from mav_tasks.tasks.scheduler import place_of, start_blocker
+from mav_tasks.tasks.scheduler import start_blocker
+from mav_tasks.tasks.stage import course_of, look_on_the_way, set_out
 from mav_tasks.tasks.stuck import StuckWatch
 from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
-from mav_tasks.tasks.way_back import is_off_line, resumed, way_back
+from mav_tasks.tasks.way_back import is_off_line, way_back
 
 S, R = TaskState, TaskReason
 
@@ -198,19 +200,30 @@ class Executor:
                 self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
                 return view.HOLD
             return view.STAND
-        progress = _begun(task, seen, motion)
+        progress = self._set_out(task, task.progress, seen, motion, now=now)
         if progress is None:
-            self.pause(R.POSITION_LOST, actor=SERVER, now=now)
             return view.HOLD
-        longest = self._settings.driving.max_distance
-        if progress.target is not None and distance(motion.pose, progress.target) > longest:
-            self._finish(S.FAILED, R.BAD_PARAMETER, actor=SERVER, now=now)
-            return view.HOLD
-        self._course = Course(task.goal, progress)
-        self._way_back = way_back(task.goal, progress, motion) if task.progress.anchor else None
-        self._stuck.begin(now=now)
+        back = task.progress.anchor is not None
+        goal = present_goal(task.goal, progress)
+        self._way_back = way_back(goal, progress, motion) if back else None
         self._change(S.EXECUTING, R.NONE, actor=SERVER, now=now, progress=progress)
         return view.STAND
+
+    def _set_out(
+        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
+    ) -> Progress | None:
+        """Set the course of a stage that begins here; None: it cannot, the task is interrupted."""
+        here = set_out(task.goal, progress, seen, motion)
+        if here is None:
+            self.pause(R.POSITION_LOST, actor=SERVER, now=now)
+            return None
+        longest = self._settings.driving.max_distance
+        if here.target is not None and distance(motion.pose, here.target) > longest:
+            self._finish(S.FAILED, R.BAD_PARAMETER, actor=SERVER, now=now)
+            return None
+        self._course = course_of(task.goal, here, seen, driving=self._settings.driving)
+        self._stuck.begin(now=now)
+        return here
 
     def _execute(self, task: Task, seen: VehicleView, now: float, elapsed: float) -> Demand:
         if self._pause_if_lost(seen, now):
@@ -220,15 +233,25 @@ class Executor:
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
+        if self._course is None and not self._go_on(task, task.progress, seen, motion, now=now):
+            return view.HOLD
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"
         is_held_back = not self._book.is_durable(task.id)
-        course.look(motion, elapsed=0.0 if is_held_back else elapsed)
+        elapsed = 0.0 if is_held_back else elapsed
+        course.look(motion, elapsed=elapsed)
+        if isinstance(task.goal, Plan) and course is self._course:
+            self._look_on_the_way(task, task.goal, course, elapsed=elapsed, now=now)
+            if course.has_passed(motion):
+                after = self._leave_step(task, task.goal, now=now)
+                if after is None or not self._go_on(task, after, seen, motion, now=now):
+                    return view.HOLD
+                course = self._course
         self._note_progress(task, now)
         stands = seen.still and self._has_asked_to_stand(now)
         if course.has_arrived(stands=stands, driving=self._settings.driving):
             if stands or isinstance(course.leg, Wait):
-                self._arrive(course, motion, now)
+                self._arrive(task, course, seen, motion, now)
             return view.STAND
         if is_held_back:
             self._stuck.begin(now=now)
@@ -236,21 +259,72 @@ class Executor:
         if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
             self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
             return view.HOLD
-        speed = None if course is self._way_back else self.speed
+        speed = None if course is self._way_back else self.speed or course.progress.speed
         velocity = course.steer(motion, driving=self._settings.driving, speed=speed)
         return Demand(DemandKind.DRIVE, velocity)
 
-    def _arrive(self, course: Course, motion: Motion, now: float) -> None:
-        """The end of a leg: the next one, back to the task itself, or all done."""
-        assert self._task_id is not None
+    def _arrive(
+        self, task: Task, course: Course, seen: VehicleView, motion: Motion, now: float
+    ) -> None:
+        """The end of a leg: the next one, the next step, back to the task itself, or all done."""
         self._stuck.begin(now=now)
         if course.advance(motion):
             if course is self._course:
-                self._book.advance(self._task_id, course.progress, now=now)
+                self._book.advance(task.id, course.progress, now=now)
         elif course is self._way_back:
             self._way_back = None
-        else:
+        elif not isinstance(task.goal, Plan):
             self._finish(S.COMPLETED, R.NONE, actor=SERVER, now=now)
+        elif not (is_over(task.goal, course.progress) and course.progress.pending):
+            after = self._leave_step(task, task.goal, now=now)
+            if after is not None:
+                self._go_on(task, after, seen, motion, now=now)
+
+    # plans
+
+    def skip_to(self, step: int, *, now: float) -> None:
+        """Go on with another step of the begun plan; at once, if it is being driven."""
+        task = self.task
+        assert task is not None, "nothing has begun here"
+        assert isinstance(task.goal, Plan), "only plans have steps"
+        progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
+        self._course = self._way_back = None
+        self._book.advance(task.id, progress, now=now)
+
+    def _look_on_the_way(
+        self, task: Task, plan: Plan, course: Course, *, elapsed: float, now: float
+    ) -> None:
+        if not course.progress.pending:
+            return
+        is_way = isinstance(course.goal, GoTo) and course.progress.leg <= WAY
+        to_place = course.remaining if is_way else None
+        looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
+        course.progress = looked.progress
+        for step in looked.done:
+            self._book.reached(task.id, step, performs=step in looked.performed, now=now)
+        if looked.done:
+            self._book.advance(task.id, course.progress, now=now)
+
+    def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | None:
+        """A step is done; gives the progress of the next one, None: the plan is over."""
+        assert self._course is not None, "a step is driven on its course"
+        progress = self._course.progress
+        if not is_over(plan, progress):
+            self._book.reached(task.id, progress.step, performs=False, now=now)
+        after = following(plan, progress)
+        if after is None:
+            self._finish(S.COMPLETED, R.NONE, actor=SERVER, now=now)
+        return after
+
+    def _go_on(
+        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
+    ) -> bool:
+        """Begin the next step where the vehicle is, moving or not."""
+        here = self._set_out(task, progress, seen, motion, now=now)
+        if here is None:
+            return False
+        self._book.advance(task.id, here, now=now)
+        return True
 
     def _has_asked_to_stand(self, now: float) -> bool:
         """Whether zeros have been asked for long enough to call slowness a standstill."""
@@ -316,16 +390,3 @@ class Executor:
     def _finish(self, state: TaskState, reason: TaskReason, *, actor: str, now: float) -> None:
         self._change(state, reason, actor=actor, now=now)
         self.give_up()
-
-
-def _begun(task: Task, seen: VehicleView, motion: Motion) -> Progress | None:
-    """Give the progress with which a task goes on, or begins, here; None: its place is unknown."""
-    goal, progress = task.goal, task.progress
-    if progress.anchor is not None:
-        return resumed(goal, progress, motion)
-    target = place_of(goal, seen) if isinstance(goal, GoTo) else None
-    if isinstance(goal, GoTo) and target is None:
-        return None
-    done = 0.0 if isinstance(goal, GoTo | Face) else progress.done  # these mean a place, or a way
-    anchor = begun_from(goal, anchor_of(goal, 0, motion.pose, target), done)
-    return replace(progress, anchor=anchor, target=target, frame=seen.frame, leg=0, done=done)

@@ -60,7 +60,8 @@ class GoTo:
 
     ``place`` None is the vehicle's home. ``speed`` in m/s, None = default. ``radius`` in metres is
     near enough, None = as near as a move ends. ``yaw`` in radians is turned to in the end, None =
-    as it comes. ``wait`` in seconds is spent there, standing.
+    as it comes. ``wait`` in seconds is spent there, standing. ``passes``: within a plan it does not
+    stop there, if the way goes on to another place.
     """
 
     place: Place | None
@@ -68,6 +69,7 @@ class GoTo:
     radius: float | None = None
     yaw: float | None = None
     wait: float = 0.0
+    passes: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +105,88 @@ class Wait:
     duration: float
 
 
-Goal = Move | Rotate | Drive | GoTo | Face | Head | Wait
+#: what is driven by itself: a task's goal, or a step of a plan
+SingleGoal = Move | Rotate | Drive | GoTo | Face | Head | Wait
+
+
+@dataclass(frozen=True, slots=True)
+class Nothing:
+    """A step that is passed over: home, a take-off, what is about the plan as a whole."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetSpeed:
+    """From here on drive at ``speed`` m/s; None: as without a plan."""
+
+    speed: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """Go on with the step ``to``, ``times`` times (-1: for ever), then pass over."""
+
+    to: int
+    times: int
+
+
+@dataclass(frozen=True, slots=True)
+class Perform:
+    """A command to the vehicle itself; which one only the plan's source says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """What follows, up to the next place, waits ``seconds``; the vehicle drives on."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """What follows, up to the next place, waits until that is ``distance`` metres away."""
+
+    distance: float
+
+
+Step = (
+    Move
+    | Rotate
+    | Drive
+    | GoTo
+    | Face
+    | Head
+    | Wait
+    | Nothing
+    | SetSpeed
+    | Jump
+    | Perform
+    | Delay
+    | Near
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A mission: steps, one for each of its items, in their order.
+
+    ``source`` is the items as they came, for who sends and shows them; nothing is read out of it
+    here. ``first`` is the step with which it begins.
+    """
+
+    steps: tuple[Step, ...]
+    source: str = ""
+    first: int = 0
+
+
+Goal = SingleGoal | Plan
 
 
 def describe(goal: Goal) -> str:
     """Give a goal in words, and in the units of its command."""
     if isinstance(goal, GoTo):
         return _describe_way(goal.place)
+    if isinstance(goal, Plan):
+        return f"plan of {len(goal.steps)} items"
     match goal:
         case Move(distance=distance):
             return f"move {distance:g} m"

@@ -5,7 +5,7 @@ pre-emption leaves no error behind. ``limits`` has the last word on what comes o
 """
 
 from dataclasses import dataclass
-from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt
+from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
@@ -106,10 +106,19 @@ def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) 
             return remaining <= 0.0
 
 
-def steer(leg: Leg, anchor: Pose, pose: Pose, *, remaining: float, driving: Driving) -> Velocity:
+def steer(
+    leg: Leg,
+    anchor: Pose,
+    pose: Pose,
+    *,
+    remaining: float,
+    driving: Driving,
+    passing: float = 0.0,
+) -> Velocity:
     """Give the velocity that brings the vehicle nearer to the leg's end.
 
     ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
+    ``passing`` is the speed that a move has at its end, m/s, when another follows.
     """
     match leg:
         case Move(distance=distance, speed=speed):
@@ -119,6 +128,7 @@ def steer(leg: Leg, anchor: Pose, pose: Pose, *, remaining: float, driving: Driv
                 braking=driving.acceleration,
                 gain=APPROACH_GAIN,
                 creep=CREEP_SPEED,
+                at_end=passing,
             )
             forward = copysign(towards_end, distance * remaining)
             return _towards(_heading_error(anchor, pose, forward=forward), forward)
@@ -145,10 +155,30 @@ def _towards(heading_error: float, forward: float) -> Velocity:
     return Velocity(0.0 if abs(heading_error) > PIVOT_ERROR else forward, rate)
 
 
-def _approach(remaining: float, *, top: float, braking: float, gain: float, creep: float) -> float:
+def corner_speed(turn: float, *, lead: float) -> float:
+    """Give the speed in m/s at which a way may bend by ``turn`` rad, begun ``lead`` m before.
+
+    0 where it has to stop first and turn on the spot.
+    """
+    bend = abs(turn)
+    if bend > PIVOT_ERROR:
+        return 0.0
+    return MAX_STEER_RATE * lead / max(tan(bend / 2), 1e-3)
+
+
+def _approach(
+    remaining: float,
+    *,
+    top: float,
+    braking: float,
+    gain: float,
+    creep: float,
+    at_end: float = 0.0,
+) -> float:
     """Give the speed at a distance: as fast as one may and can still brake, then gently."""
     left = abs(remaining)
-    return max(creep, min(top, gain * left, sqrt(2 * 0.5 * braking * left)))
+    braked = sqrt(at_end * at_end + 2 * 0.5 * braking * left)
+    return max(creep, min(top, max(gain * left, at_end), braked))
 
 
 def _heading_error(anchor: Pose, pose: Pose, *, forward: float) -> float:

@@ -8,7 +8,7 @@ that a resumed task drives the very same ones.
 from dataclasses import replace
 from math import atan2, copysign, cos, hypot, pi, sin, tau
 
-from mav_tasks.tasks.goal import Drive, Face, Goal, GoTo, Head, LocalPlace, Move, Rotate, Wait
+from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.guidance import Leg, wrap
 from mav_tasks.tasks.task import Pose, Progress
 
@@ -16,14 +16,14 @@ from mav_tasks.tasks.task import Pose, Progress
 FACE, WAY = range(2)
 
 
-def leg_count(goal: Goal) -> int:
+def leg_count(goal: SingleGoal) -> int:
     """Give the number of a goal's legs."""
     if isinstance(goal, GoTo):
         return 2 + (goal.yaw is not None) + (goal.wait > 0)
     return 1
 
 
-def anchor_of(goal: Goal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
+def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
     """Give the pose from which a leg that begins at ``pose`` counts."""
     if isinstance(goal, GoTo) and leg == WAY:
         assert target is not None, "the place was found before the task began"
@@ -31,7 +31,7 @@ def anchor_of(goal: Goal, leg: int, pose: Pose, target: LocalPlace | None) -> Po
     return pose
 
 
-def leg_of(goal: Goal, progress: Progress) -> Leg:
+def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
     """Give the leg that is being driven."""
     anchor = progress.anchor
     assert anchor is not None, "a leg is driven from its anchor"
@@ -50,7 +50,7 @@ def leg_of(goal: Goal, progress: Progress) -> Leg:
             return _leg_of_way(goal, progress, anchor)
 
 
-def first_leg(goal: Goal) -> Leg | None:
+def first_leg(goal: SingleGoal) -> Leg | None:
     """Give the first leg of a task that has not begun, if its size can be known by then."""
     return goal if isinstance(goal, Move | Rotate | Drive | Wait | Head) else None
 
@@ -66,7 +66,7 @@ def length_of(leg: Leg) -> float:
             return duration
 
 
-def begun_from(goal: Goal, pose: Pose, done: float) -> Pose:
+def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
     """Give the anchor of a goal of which ``done`` is behind a vehicle that stands at ``pose``.
 
     For what is continued from here, because where it began can no longer be said.

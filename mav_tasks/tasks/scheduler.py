@@ -2,14 +2,14 @@
 
 from mav_tasks.settings import Queueing, Watch
 from mav_tasks.tasks.frames import local_place
-from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace
+from mav_tasks.tasks.goal import GoTo, LocalPlace, SingleGoal
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.view import ModeKind, VehicleView
 
 
 def start_blocker(
-    view: VehicleView, *, watch: Watch, now: float, goal: Goal | None = None
+    view: VehicleView, *, watch: Watch, now: float, goal: SingleGoal | None = None
 ) -> TaskReason:
     """Give why no task, or not one of this goal, can take control of the vehicle now, or NONE.
 

@@ -122,6 +122,11 @@ class Progress:
     (None: not begun), ``done`` the metres along the line, the radians turned or the seconds spent
     since then, ``target`` the place that a GoTo means; ``frame`` is the local frame that both are
     in. ``execution_time`` is the seconds spent EXECUTING, all legs together.
+
+    Of a plan, ``step`` is the one that is being driven (-1: not begun) and legs are its legs;
+    ``jumps`` are pairs of a jump's step and how often it was made, ``pending`` the steps on the way
+    that are still to be done, the first of them waiting for ``pending_for`` seconds; ``speed`` is
+    what the plan has set, m/s.
     """
 
     anchor: Pose | None = None
@@ -130,6 +135,11 @@ class Progress:
     leg: int = 0
     target: LocalPlace | None = None
     frame: Frame | None = None
+    step: int = -1
+    jumps: tuple[int, ...] = ()
+    pending: tuple[int, ...] = ()
+    pending_for: float = 0.0
+    speed: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

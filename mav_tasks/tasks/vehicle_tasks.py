@@ -22,13 +22,14 @@ from mav_tasks.tasks.events import (
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
-from mav_tasks.tasks.goal import Goal, Rotate
+from mav_tasks.tasks.goal import Rotate, SingleGoal
+from mav_tasks.tasks.itinerary import goal_of, present_goal
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
-from mav_tasks.tasks.task import Draft, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
 from mav_tasks.tasks.way_back import is_off_line
@@ -222,7 +223,7 @@ class VehicleTasks:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
         if self.is_held_ahead:
             raise Rejection(R.HELD_AHEAD, "a held task must be released first")
-        self._check_start(seen, draft.goal, now=now)
+        self._check_start(seen, present_goal(draft.goal, Progress()), now=now)
         task = self._room.submit(draft, now=now)
         begun = self.begun
         if begun is not None and begun.id == self._urgent:
@@ -290,7 +291,7 @@ class VehicleTasks:
         if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
             words = f"task {begun.id} is {begun.state.name.lower()}"
             raise Rejection(R.WRONG_STATE, words)
-        self._check_start(seen, task.goal, now=now)
+        self._check_start(seen, goal_of(task), now=now)
         if not again:
             self._check_remainder(task, seen)
         if begun is not None and begun.id != task.id:
@@ -311,7 +312,8 @@ class VehicleTasks:
             raise Rejection(R.OFF_LINE, words)
         if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
             return
-        turned = isinstance(task.goal, Rotate) and abs(task.goal.angle) > 3.0
+        goal = goal_of(task)
+        turned = isinstance(goal, Rotate) and abs(goal.angle) > 3.0
         if turned or not same_frame(progress.frame, seen.frame):
             words = f"what task {task.id} had done is not known: run it again, or skip it"
             raise Rejection(R.WRONG_STATE, words)
@@ -358,7 +360,7 @@ class VehicleTasks:
             raise Rejection(R.WRONG_STATE, words)
         if resumes:
             assert begun is not None
-            self._check_start(seen, begun.goal, now=now)
+            self._check_start(seen, goal_of(begun), now=now)
         if self._paused:
             self._paused = R.NONE
             self._book.record(QueueContinued(self.vehicle, actor, now))
@@ -369,7 +371,7 @@ class VehicleTasks:
         begun = self.begun
         return None if begun is None or begun.state is S.HELD else begun.id
 
-    def _check_start(self, seen: VehicleView, goal: Goal, *, now: float) -> None:
+    def _check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
         if blocker:
             raise Rejection(blocker, f"cannot go on: {words_of(blocker)}")
@@ -449,7 +451,10 @@ class VehicleTasks:
             if self._room.is_too_late(waiting, now=now):
                 continue
             if outranks(waiting, running, queueing=self._settings.queueing) and not start_blocker(
-                seen, watch=self._settings.watch, now=now, goal=waiting.goal
+                seen,
+                watch=self._settings.watch,
+                now=now,
+                goal=goal_of(waiting),
             ):
                 self._executor.pause(R.PREEMPTED, actor=SERVER, now=now)
                 self._set_aside(running.id)
@@ -492,7 +497,7 @@ class VehicleTasks:
             self._room.handle_deadline(now=now)  # after a delay this may be looked at first
             self._begin_next(seen, now=now)
             return
-        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=task.goal)
+        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal_of(task))
         self._note_blocker(first, blocker, now=now)
         if not blocker and self._book.is_durable(first):
             self._begin(task, seen, now=now)

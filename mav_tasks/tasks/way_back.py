@@ -8,8 +8,9 @@ from dataclasses import replace
 from math import copysign, cos, hypot, radians, sin
 
 from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Move, Rotate
+from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate, SingleGoal
 from mav_tasks.tasks.guidance import Motion, cross_track, done_so_far, wrap
+from mav_tasks.tasks.itinerary import goal_of
 from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_of, length_of
 from mav_tasks.tasks.task import Pose, Progress, Task
 
@@ -27,7 +28,7 @@ def is_off_line(task: Task, pose: Pose) -> bool:
     anchor = progress.anchor
     if anchor is None:
         return False
-    leg = leg_of(task.goal, progress)
+    leg = leg_of(goal_of(task), progress)
     match leg:
         case Move():
             along = done_so_far(leg, anchor, pose, before=progress.done)
@@ -39,7 +40,7 @@ def is_off_line(task: Task, pose: Pose) -> bool:
             return False
 
 
-def resumed(goal: Goal, progress: Progress, motion: Motion) -> Progress:
+def resumed(goal: SingleGoal, progress: Progress, motion: Motion) -> Progress:
     """Give the progress with which to go on from here.
 
     A way to a place that was left far behind is simply begun again from here.
@@ -60,7 +61,7 @@ def resumed(goal: Goal, progress: Progress, motion: Motion) -> Progress:
     return replace(progress, leg=0, anchor=again, done=0.0)
 
 
-def way_back(goal: Goal, progress: Progress, motion: Motion) -> Course | None:
+def way_back(goal: SingleGoal, progress: Progress, motion: Motion) -> Course | None:
     """Give the way to where the task can go on exactly, or None if that is here."""
     anchor, pose = progress.anchor, motion.pose
     assert anchor is not None, "what has begun has an anchor"

@@ -6,6 +6,7 @@ from random import Random
 import pytest
 
 from mav_tasks.links.memory import Conditions
+from mav_tasks.tasks.itinerary import goal_of
 from mav_tasks.tasks.legs import leg_of, length_of
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from rover_sim.faults import Faults
@@ -100,5 +101,5 @@ def test_whatever_happens(make_world: MakeWorld, seed: int) -> None:
     for task in world.tasks():
         assert world.history(task.id)[-1][0] is task.state
         if task.state is TaskState.COMPLETED:
-            leg = leg_of(task.goal, task.progress)
+            leg = leg_of(goal_of(task), task.progress)
             assert length_of(leg) - task.progress.done <= 0.02

@@ -11,12 +11,12 @@ from mav_tasks.tasks.goal import (
     Drive,
     Face,
     GlobalPlace,
-    Goal,
     GoTo,
     Head,
     LocalPlace,
     Move,
     Rotate,
+    SingleGoal,
     Wait,
 )
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity, wrap
@@ -55,7 +55,7 @@ class TestLegs:
             (GoTo(EAST_3, yaw=0.0, wait=1.0), 4),
         ],
     )
-    def test_a_goal_has_as_many_as_it_asks_for(self, goal: Goal, count: int) -> None:
+    def test_a_goal_has_as_many_as_it_asks_for(self, goal: SingleGoal, count: int) -> None:
         assert leg_count(goal) == count
 
     def test_a_way_is_facing_driving_turning_and_waiting(self) -> None:
@@ -138,7 +138,7 @@ class TestLegs:
         ],
     )
     def test_what_is_continued_from_here_began_where_its_end_is_right(
-        self, goal: Goal, done: float, anchor: Pose
+        self, goal: SingleGoal, done: float, anchor: Pose
     ) -> None:
         begun = begun_from(goal, Pose(10.0, 0.0, pi / 2), done)
         assert (begun.north, begun.east, begun.yaw) == pytest.approx(
@@ -197,7 +197,7 @@ class TestCourse:
 
 
 class TestDriven:
-    def driven(self, goal: Goal, rover: Rover) -> Rig:
+    def driven(self, goal: SingleGoal, rover: Rover) -> Rig:
         rig = Rig()
         rig.submit(goal)
         run_until(rig, rover, lambda: rig.state(1) is S.COMPLETED)
@@ -240,7 +240,7 @@ class TestDriven:
             (Rotate(radians(450)), 90),
         ],
     )
-    def test_turning_ends_at_the_heading(self, goal: Goal, yaw: float) -> None:
+    def test_turning_ends_at_the_heading(self, goal: SingleGoal, yaw: float) -> None:
         rover = Rover()
         self.driven(goal, rover)
         assert rover.pose.yaw == pytest.approx(radians(yaw), abs=radians(1.0))
@@ -264,7 +264,7 @@ class TestEstimate:
             (Head(0.0, 1.0, 4.0), 4.0),
         ],
     )
-    def test_before_the_start(self, goal: Goal, seconds: float) -> None:
+    def test_before_the_start(self, goal: SingleGoal, seconds: float) -> None:
         assert duration_of(goal, DRIVING) == pytest.approx(SETTLING + seconds)
         assert time_left(goal, Progress(), DRIVING) == duration_of(goal, DRIVING)
 

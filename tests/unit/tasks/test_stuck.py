@@ -5,7 +5,7 @@ from math import pi
 import pytest
 
 from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.goal import Drive, Goal, GoTo, LocalPlace, Move, Rotate, Wait
+from mav_tasks.tasks.goal import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.guidance import Velocity
 from mav_tasks.tasks.stuck import BLIND, StuckWatch
 from mav_tasks.tasks.task import Pose, Progress
@@ -18,7 +18,7 @@ TICK = 0.05
 class Rig:
     """A course and its watch, at 20 Hz."""
 
-    def __init__(self, goal: Goal, progress: Progress | None = None) -> None:
+    def __init__(self, goal: SingleGoal, progress: Progress | None = None) -> None:
         self.now = 100.0
         self.course = Course(goal, progress or Progress(anchor=ORIGIN))
         self.watch = StuckWatch()

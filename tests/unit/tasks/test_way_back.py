@@ -7,7 +7,7 @@ import pytest
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.goal import Drive, Goal, GoTo, LocalPlace, Move, Rotate, Wait
+from mav_tasks.tasks.goal import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.guidance import Motion, cross_track, wrap
 from mav_tasks.tasks.task import Pose, Progress, Task
 from mav_tasks.tasks.way_back import OFF_LINE, ON_SPOT, PAST_END, is_off_line, resumed, way_back
@@ -28,7 +28,7 @@ def beside(along: float, across: float, *, turned: float = 0.0) -> Pose:
     )
 
 
-def back(goal: Goal, done: float, pose: Pose) -> Course | None:
+def back(goal: SingleGoal, done: float, pose: Pose) -> Course | None:
     return way_back(goal, Progress(anchor=ANCHOR, done=done), motion(pose, at=0.0))
 
 
@@ -70,7 +70,7 @@ class TestNothingToDo:
         assert back(Rotate(-2.0), 1.0, beside(0.0, 0.01, turned=-1.0 + turned)) is None
 
     @pytest.mark.parametrize("goal", [Drive(0.5, 0.1, 9.0), Wait(9.0)])
-    def test_for_what_promises_a_time_only(self, goal: Goal) -> None:
+    def test_for_what_promises_a_time_only(self, goal: SingleGoal) -> None:
         assert back(goal, 3.0, beside(7.0, -8.0, turned=2.0)) is None
 
 
@@ -129,7 +129,7 @@ class TestARotation:
         assert back(Rotate(pi), 1.0, beside(0.0, 0.0, turned=1.0 + radians(31))) is not None
 
 
-def task_of(goal: Goal, progress: Progress) -> Task:
+def task_of(goal: SingleGoal, progress: Progress) -> Task:
     book = TaskBook()
     task = book.submit(draft(goal), now=0.0)
     book.note_progress(task.id, progress)
@@ -154,7 +154,7 @@ class TestOffLine:
         ],
     )
     def test_is_further_than_a_metre_or_past_the_end(
-        self, goal: Goal, pose: Pose, is_off: bool
+        self, goal: SingleGoal, pose: Pose, is_off: bool
     ) -> None:
         assert is_off_line(task_of(goal, Progress(anchor=ANCHOR, done=4.0)), pose) is is_off
 

@@ -1,0 +1,108 @@
+"""One stage of a task, a single goal or a step of a plan: how it begins, and what is done on it."""
+
+from dataclasses import dataclass, replace
+from math import inf
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, Near, Perform, Plan, SetSpeed
+from mav_tasks.tasks.guidance import Motion, corner_speed, wrap
+from mav_tasks.tasks.itinerary import begun, goes_on_to_a_place, present_goal
+from mav_tasks.tasks.legs import WAY, anchor_of, bearing, begun_from, distance
+from mav_tasks.tasks.scheduler import place_of
+from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.way_back import resumed
+
+ROLLING = 0.05  # m/s; a vehicle that is faster goes on to its next place without stopping
+
+
+@dataclass(frozen=True, slots=True)
+class OnTheWay:
+    """What of the steps on the way has been done in one look."""
+
+    progress: Progress
+    done: tuple[int, ...] = ()
+    performed: tuple[int, ...] = ()  # of those, commands to the vehicle
+
+
+def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -> Progress | None:
+    """Give the progress with which a task goes on, or begins, here; None: its place is unknown."""
+    if isinstance(goal, Plan) and progress.step < 0:
+        progress = begun(goal, progress)
+    single = present_goal(goal, progress)
+    if progress.anchor is not None:
+        return resumed(single, progress, motion)
+    if not isinstance(single, GoTo):
+        done = 0.0 if isinstance(single, Face) else progress.done  # it means a heading, not a way
+        anchor = begun_from(single, anchor_of(single, 0, motion.pose, None), done)
+        return replace(progress, anchor=anchor, frame=seen.frame, target=None, leg=0, done=done)
+    target = place_of(single, seen)
+    if target is None:
+        return None
+    turn = _off(motion.pose, bearing(motion.pose, target))
+    is_going_on = motion.speed > ROLLING and corner_speed(turn, lead=1.0) > 0.0
+    leg = WAY if is_going_on else 0  # it need not be faced first
+    anchor = anchor_of(single, leg, motion.pose, target)
+    return replace(progress, anchor=anchor, frame=seen.frame, target=target, leg=leg, done=0.0)
+
+
+def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Driving) -> Course:
+    """Give the course of the present stage, which may lead on to the next place."""
+    single = present_goal(goal, progress)
+    passing = 0.0
+    if isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes:
+        passing = _speed_past(goal, single, progress, seen, driving=driving)
+    return Course(single, progress, passing=passing)
+
+
+def _speed_past(
+    plan: Plan, goal: GoTo, progress: Progress, seen: VehicleView, *, driving: Driving
+) -> float:
+    following = goes_on_to_a_place(plan, progress)
+    after = None if following is None else place_of(following, seen)
+    target, anchor = progress.target, progress.anchor
+    if after is None or target is None or anchor is None or not goal.radius:
+        return 0.0
+    here = Pose(target.north, target.east, bearing(anchor, target))
+    if distance(here, after) <= goal.radius:
+        return 0.0
+    turn = _off(here, bearing(here, after))
+    return min(driving.max_speed, corner_speed(turn, lead=goal.radius))
+
+
+def _off(pose: Pose, yaw: float) -> float:
+    return wrap(yaw - pose.yaw)
+
+
+def look_on_the_way(
+    plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
+) -> OnTheWay:
+    """Do of the pending steps what can be done now.
+
+    ``to_place`` is the metres to the place that is driven to, None where none is; ``elapsed`` the
+    seconds since the last look.
+    """
+    done: list[int] = []
+    performed: list[int] = []
+    left_to_place = -inf if to_place is None else to_place
+    for number in progress.pending:
+        step = plan.steps[number]
+        match step:
+            case Delay(seconds=seconds):
+                waited = progress.pending_for + elapsed
+                if waited < seconds:
+                    progress = replace(progress, pending_for=waited)
+                    break
+                elapsed = waited - seconds
+                progress = replace(progress, pending_for=0.0)
+            case Near(distance=near) if left_to_place > near:
+                break
+            case SetSpeed(speed=speed):
+                progress = replace(progress, speed=speed)
+            case Perform():
+                performed.append(number)
+        done.append(number)
+    if done:
+        progress = replace(progress, pending=progress.pending[len(done) :])
+    return OnTheWay(progress, tuple(done), tuple(performed))
