@@ -22,8 +22,8 @@ from mav_tasks.tasks.events import (
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
-from mav_tasks.tasks.goal import Rotate, SingleGoal
-from mav_tasks.tasks.itinerary import goal_of, present_goal
+from mav_tasks.tasks.goal import Plan, Rotate, SingleGoal
+from mav_tasks.tasks.itinerary import goal_of, present_goal, skipped_to
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
@@ -317,6 +317,15 @@ class VehicleTasks:
         if turned or not same_frame(progress.frame, seen.frame):
             words = f"what task {task.id} had done is not known: run it again, or skip it"
             raise Rejection(R.WRONG_STATE, words)
+
+    def skip_to(self, task: Task, step: int, *, now: float) -> None:
+        """Let a plan that is not over go on, or begin, with another of its steps."""
+        assert isinstance(task.goal, Plan), "only plans have steps"
+        if self.begun is not None and self.begun.id == task.id:
+            self._executor.skip_to(step, now=now)
+        else:
+            progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
+            self._book.advance(task.id, progress, now=now)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
         """Set the speed of the task that runs, and of those to come that name none."""
