@@ -51,7 +51,7 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
         case S.SCHEDULED:
             return R.START_TIME
         case S.BLOCKED:
-            return R.DEPENDENCY
+            return R.WAITING_FOR_START if task.terms.is_staged else R.DEPENDENCY
         case S.QUEUED:
             return _why_queued(tasks, task)
         case _:

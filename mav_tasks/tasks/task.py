@@ -90,7 +90,7 @@ class Terms:
 
     ``start_at`` and ``deadline`` are monotonic seconds: not begun before, begun by then;
     ``start_utc`` is in seconds since 1970. ``after`` is the id of the task that must complete
-    first, 0 for none.
+    first, 0 for none. ``is_staged``: waits until somebody starts it.
     """
 
     priority: int = DEFAULT_PRIORITY
@@ -100,6 +100,7 @@ class Terms:
     deadline: float | None = None
     is_preemptible: bool = True
     is_preemptive: bool = False
+    is_staged: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -207,7 +207,8 @@ class WaitingRoom:
     def _state_by(self, terms: Terms, *, now: float) -> TaskState:
         if self._due_by(terms) > now:
             return S.SCHEDULED
-        return S.BLOCKED if self._is_waited_for(terms.after) else S.QUEUED
+        is_blocked = terms.is_staged or self._is_waited_for(terms.after)
+        return S.BLOCKED if is_blocked else S.QUEUED
 
     def _is_waited_for(self, after: int) -> bool:
         """Whether a task that others run after is still to complete."""

@@ -1,0 +1,109 @@
+"""One item of a plan as it is on the wire, whichever of the two messages brought it.
+
+MAVLink guide, "Mission Protocol", MISSION_ITEM_INT. An item has no number of its own: that is its
+place in the plan.
+"""
+
+from base64 import b64decode, b64encode
+from collections.abc import Iterable
+from math import isfinite, isnan
+from struct import Struct
+from typing import NamedTuple
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavFrame
+
+NOT_GIVEN = 0x7FFFFFFF  # of x and y, which have no NaN
+LARGEST = 0x7FFFFFFF
+DEGREES_TO_DEGE7 = 1e7
+METRES_TO_LOCAL = 1e4
+LOCAL_FRAMES = frozenset({MavFrame.LOCAL_NED, MavFrame.LOCAL_ENU})
+
+_WIRE = Struct("<BHBB4fiif")
+
+
+class Item(NamedTuple):
+    """The fields of MISSION_ITEM_INT, but for addresses and numbers."""
+
+    frame: int
+    command: int
+    current: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int
+    y: int
+    z: float
+
+
+def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
+    """Give the item that a message carries; None if its place is beyond all numbers."""
+    x: int | None = None
+    y: int | None = None
+    if isinstance(message, m.MissionItem):
+        scale = _scale(message.frame)
+        x, y = _whole(message.x, scale), _whole(message.y, scale)
+    else:
+        x, y = message.x, message.y
+    if x is None or y is None:
+        return None
+    return Item(
+        message.frame,
+        message.command,
+        message.current,
+        message.autocontinue,
+        message.param1,
+        message.param2,
+        message.param3,
+        message.param4,
+        x,
+        y,
+        message.z,
+    )
+
+
+def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItemInt:
+    """Give the message that carries an item."""
+    return m.MissionItemInt(
+        to.system_id,
+        to.component_id,
+        seq,
+        item.frame,
+        item.command,
+        item.current,
+        item.autocontinue,
+        item.param1,
+        item.param2,
+        item.param3,
+        item.param4,
+        item.x,
+        item.y,
+        item.z,
+        mission_type,
+    )
+
+
+def packed(items: Iterable[Item]) -> str:
+    """Give items as a text to be kept; ``unpacked`` gives them back bit by bit."""
+    return b64encode(b"".join(_WIRE.pack(*item) for item in items)).decode()
+
+
+def unpacked(text: str) -> tuple[Item, ...]:
+    """Give the items that ``packed`` made a text of."""
+    return tuple(Item(*fields) for fields in _WIRE.iter_unpack(b64decode(text)))
+
+
+def _scale(frame: int) -> float:
+    if frame == MavFrame.MISSION:
+        return 1.0
+    return METRES_TO_LOCAL if frame in LOCAL_FRAMES else DEGREES_TO_DEGE7
+
+
+def _whole(value: float, scale: float) -> int | None:
+    if isnan(value):
+        return NOT_GIVEN
+    scaled = value * scale
+    return round(scaled) if isfinite(scaled) and abs(scaled) <= LARGEST else None

@@ -1,0 +1,226 @@
+"""The receiving end of plan uploads to one address, one at a time.
+
+MAVLink guide, "Mission Protocol", "Upload a Mission to the Vehicle". It asks for each item until it
+is there, and gives up before MAVSDK does (2.5 s), so that no request of ours reaches the client's
+next upload. What an item is worth says ``check``; a plan counts only when it is whole and
+``finish`` was called, which is when it is acknowledged.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavMissionResult
+from mav_tasks.services.mission_item import Item, item_of
+
+ASK_AGAIN = 0.2  # s, between requests for one item; MAVSDK loses least between 0.1 and 0.2
+GIVE_UP = 2.3  # s without an item; MAVSDK gives up after 2.5
+QUIET = 0.3  # s after an upload was broken off, in which its last items may still arrive
+REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
+CAPACITY = 10_000  # items of one plan
+
+#: mission type, number, item, those before it, count -> why not, or None
+Check = Callable[[int, int, Item, Sequence[Item], int], MavMissionResult | None]
+
+
+class Sender(NamedTuple):
+    """Who uploads: ``key`` tells clients apart, ``address`` is its own, ``addressed`` ours."""
+
+    key: Hashable
+    address: Address
+    addressed: Address
+
+
+class Upload(NamedTuple):
+    """A whole plan, to be decided about."""
+
+    sender: Sender
+    mission_type: int
+    items: tuple[Item, ...]
+
+
+class ToClient(NamedTuple):
+    """A message to a client."""
+
+    sender: Sender
+    message: m.Message
+
+
+@dataclass(slots=True)
+class _Session:
+    sender: Sender
+    mission_type: int
+    count: int
+    ask_at: float
+    give_up_at: float
+    items: list[Item] = field(default_factory=list)
+    is_whole: bool = False
+
+
+class _Answered(NamedTuple):
+    sender: Sender
+    mission_type: int
+    last: Item | None
+    taken: int  # items, the last of them at most refused
+    ack: m.MissionAck
+    at: float
+
+
+class MissionReceiver:
+    """Takes in one upload; other clients are refused meanwhile."""
+
+    def __init__(self, *, check: Check) -> None:
+        self._check = check
+        self._session: _Session | None = None
+        self._answered: _Answered | None = None
+        self._broken_off_at: float | None = None
+        self._outgoing: list[ToClient] = []
+        self._uploads: list[Upload] = []
+
+    def __repr__(self) -> str:
+        session = self._session
+        words = "idle" if session is None else f"{len(session.items)} of {session.count} items"
+        return f"MissionReceiver({words})"
+
+    def take(self) -> tuple[list[ToClient], list[Upload]]:
+        """Give what is to be sent, and the plans that are whole, since the last call."""
+        outgoing, self._outgoing = self._outgoing, []
+        uploads, self._uploads = self._uploads, []
+        return outgoing, uploads
+
+    def count(self, message: m.MissionCount, sender: Sender, *, now: float) -> None:
+        """A client begins an upload, or begins it again."""
+        kind, session = message.mission_type, self._session
+        if session is not None and session.sender != sender:
+            self._send_ack(sender, kind, MavMissionResult.DENIED)
+            return
+        if session is not None and session.is_whole:
+            return  # it is being decided about
+        if message.count > CAPACITY:
+            self._session = None
+            self._send_ack(sender, kind, MavMissionResult.NO_SPACE)
+            return
+        is_same = session is not None and (session.mission_type, session.count) == (
+            kind,
+            message.count,
+        )
+        if is_same and session is not None and not session.items:
+            session.ask_at = max(now, self._quiet_until(now))
+            session.give_up_at = now + GIVE_UP
+        else:  # never items of one upload with those of another
+            if session is not None and session.items:
+                self._broken_off_at = now
+            self._session = _Session(
+                sender, kind, message.count, self._quiet_until(now), now + GIVE_UP
+            )
+        self._answered = None
+        self._advance(now=now)
+
+    def item(
+        self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float
+    ) -> bool:
+        """Take an item; False: nobody uploads here, it may mean something else."""
+        session = self._session
+        if session is None or session.sender != sender:
+            return self._repeat_answer(message, sender, now=now)
+        is_next = message.seq == len(session.items) and message.mission_type == session.mission_type
+        if not is_next or session.is_whole or now < self._quiet_until(now):
+            return True  # one that was asked for twice, or is left from before
+        item = item_of(message)
+        refusal: MavMissionResult | None = MavMissionResult.INVALID_PARAM5_X
+        if item is not None:
+            refusal = self._check(
+                session.mission_type, message.seq, item, session.items, session.count
+            )
+        if refusal is not None or item is None:
+            self._end(refusal or MavMissionResult.ERROR, item, now=now)
+            return True
+        session.items.append(item)
+        session.ask_at, session.give_up_at = now, now + GIVE_UP
+        self._advance(now=now)
+        return True
+
+    def cancelled(self, message: m.MissionAck, sender: Sender, *, now: float) -> None:
+        """A client's own ack: it gives its upload up."""
+        session = self._session
+        if session is None or session.is_whole:
+            return
+        if (session.sender, session.mission_type) == (sender, message.mission_type):
+            self._session = None
+            self._broken_off_at = now
+
+    def finish(self, result: MavMissionResult, *, opaque_id: int, now: float) -> None:
+        """A whole plan has been decided about: tell the client."""
+        session = self._session
+        if session is None or not session.is_whole:
+            return
+        last = session.items[-1] if session.items else None
+        self._end(result, last, opaque_id=opaque_id, now=now)
+
+    def next_deadline(self) -> float | None:
+        """Give when ``handle_deadline`` has something to do."""
+        session = self._session
+        if session is None or session.is_whole:
+            return None
+        return min(session.ask_at, session.give_up_at)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Ask again, and give up in the end."""
+        session = self._session
+        if session is None or session.is_whole:
+            return
+        if now >= session.give_up_at:
+            self._broken_off_at = now
+            self._end(MavMissionResult.OPERATION_CANCELLED, None, now=now)
+        else:
+            self._advance(now=now)
+
+    def _advance(self, *, now: float) -> None:
+        session = self._session
+        assert session is not None, "an upload is under way"
+        if len(session.items) == session.count:
+            session.is_whole = True
+            items = tuple(session.items)
+            self._uploads.append(Upload(session.sender, session.mission_type, items))
+        elif now >= session.ask_at:
+            session.ask_at = now + ASK_AGAIN
+            sender = session.sender
+            request = m.MissionRequestInt(*sender.address, len(session.items), session.mission_type)
+            self._outgoing.append(ToClient(sender, request))
+
+    def _quiet_until(self, now: float) -> float:
+        return now if self._broken_off_at is None else max(now, self._broken_off_at + QUIET)
+
+    def _end(
+        self, result: MavMissionResult, last: Item | None, *, opaque_id: int = 0, now: float
+    ) -> None:
+        session = self._session
+        assert session is not None, "an upload is under way"
+        self._session = None
+        ack = self._send_ack(session.sender, session.mission_type, result, opaque_id=opaque_id)
+        self._answered = _Answered(
+            session.sender, session.mission_type, last, len(session.items), ack, now
+        )
+
+    def _repeat_answer(
+        self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float
+    ) -> bool:
+        """The last item again: its sender has not heard what became of the plan."""
+        answered = self._answered
+        if answered is None or answered.sender != sender or now - answered.at > REPEATED:
+            return False
+        is_last = message.seq in (answered.taken - 1, answered.taken)
+        if is_last and message.mission_type == answered.mission_type:
+            if item_of(message) == answered.last:
+                self._outgoing.append(ToClient(sender, answered.ack))
+            return True
+        return False
+
+    def _send_ack(
+        self, sender: Sender, mission_type: int, result: MavMissionResult, *, opaque_id: int = 0
+    ) -> m.MissionAck:
+        ack = m.MissionAck(*sender.address, result, mission_type, opaque_id)
+        self._outgoing.append(ToClient(sender, ack))
+        return ack

@@ -1,0 +1,259 @@
+"""Uploads of plans, to exact times, with a client made by hand."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import target_of
+from mav_tasks.mavlink.enums import MavMissionResult as Result
+from mav_tasks.services.mission_item import Item
+from mav_tasks.services.mission_receiver import (
+    ASK_AGAIN,
+    CAPACITY,
+    GIVE_UP,
+    QUIET,
+    MissionReceiver,
+    Sender,
+    Upload,
+)
+
+ROVER = Address(1, 1)
+ALICE = Sender("alice", Address(255, 190), ROVER)
+BOB = Sender("bob", Address(255, 190), ROVER)
+MISSION, FENCE = 0, 1
+
+
+def item(seq: int, *, north: int = 0, kind: int = MISSION) -> m.MissionItemInt:
+    return m.MissionItemInt(
+        1, 1, seq, 3, 16, 0, 1, 0, 0, 0, 0, 470000000 + north, 80000000, 0, kind
+    )
+
+
+class Rig:
+    """A receiver in virtual time."""
+
+    def __init__(self, *, refused: int | None = None) -> None:
+        self.now = 0.0
+        self.refused = refused  # the command that is
+        self.receiver = MissionReceiver(check=self.check)
+        self.uploads: list[Upload] = []
+
+    def check(
+        self, kind: int, seq: int, item: Item, before: Sequence[Item], count: int
+    ) -> Result | None:
+        assert len(before) == seq < count
+        return Result.UNSUPPORTED if item.command == self.refused else None
+
+    def said(self) -> list[tuple[str, str, int]]:
+        """Give whom what was told: requests with their number, acks with their result."""
+        outgoing, uploads = self.receiver.take()
+        self.uploads += uploads
+        words = []
+        for sender, message in outgoing:
+            assert target_of(message) == sender.address
+            match message:
+                case m.MissionRequestInt():
+                    words.append((str(sender.key), "request", message.seq))
+                case m.MissionAck():
+                    words.append((str(sender.key), "ack", message.type))
+        return words
+
+    def count(self, number: int, sender: Sender = ALICE, *, kind: int = MISSION) -> "Rig":
+        self.receiver.count(m.MissionCount(1, 1, number, kind), sender, now=self.now)
+        return self
+
+    def item(self, seq: int, sender: Sender = ALICE, **what: int) -> bool:
+        return self.receiver.item(item(seq, **what), sender, now=self.now)
+
+    def cancel(self, sender: Sender = ALICE) -> None:
+        message = m.MissionAck(1, 1, Result.OPERATION_CANCELLED, MISSION)
+        self.receiver.cancelled(message, sender, now=self.now)
+
+    def run(self, until: float) -> list[tuple[float, str, int]]:
+        """Do what is due at exactly the times that are asked for."""
+        seen = []
+        while (due := self.receiver.next_deadline()) is not None and due <= until:
+            self.now = due
+            self.receiver.handle_deadline(now=due)
+            seen += [(round(due, 6), what, number) for _, what, number in self.said()]
+        self.now = until
+        return seen
+
+    def uploaded(self, count: int = 2, sender: Sender = ALICE) -> "Rig":
+        self.count(count, sender)
+        for seq in range(count):
+            self.item(seq, sender)
+        self.said()
+        return self
+
+
+def test_each_item_is_asked_for_and_the_whole_is_acknowledged_when_it_is_decided() -> None:
+    rig = Rig()
+    rig.count(2)
+    assert rig.said() == [("alice", "request", 0)]
+    rig.item(0)
+    assert rig.said() == [("alice", "request", 1)]
+    rig.item(1, north=5)
+    assert (rig.said(), len(rig.uploads)) == ([], 1)
+    (upload,) = rig.uploads
+    assert [i.x for i in upload.items] == [470000000, 470000005]
+    rig.receiver.finish(Result.ACCEPTED, opaque_id=17, now=0.1)
+    outgoing, _ = rig.receiver.take()
+    (ack,) = [told.message for told in outgoing]
+    assert isinstance(ack, m.MissionAck)
+    assert (ack.type, ack.opaque_id, ack.mission_type) == (Result.ACCEPTED, 17, MISSION)
+
+
+def test_an_empty_plan_is_whole_at_once() -> None:
+    rig = Rig().count(0)
+    assert (rig.said(), rig.uploads) == ([], [Upload(ALICE, MISSION, ())])
+
+
+def test_what_does_not_come_is_asked_for_again_until_it_is_given_up() -> None:
+    rig = Rig().count(2)
+    rig.item(0)
+    rig.said()
+    seen = rig.run(5.0)
+    times = [round(ASK_AGAIN * n, 6) for n in range(1, 12)]
+    assert seen == [
+        *[(t, "request", 1) for t in times],
+        (GIVE_UP, "ack", Result.OPERATION_CANCELLED),
+    ]
+    assert rig.receiver.next_deadline() is None
+
+
+def test_an_item_that_comes_twice_or_too_early_changes_nothing() -> None:
+    rig = Rig().count(3)
+    rig.item(0)
+    for seq in (0, 2, 0):
+        assert rig.item(seq)
+    assert rig.said() == [("alice", "request", 0), ("alice", "request", 1)]
+    rig.item(1)
+    rig.item(2)
+    rig.said()
+    assert len(rig.uploads[0].items) == 3
+
+
+def test_a_bad_item_is_refused_as_it_comes() -> None:
+    rig = Rig(refused=16).count(3)
+    rig.said()
+    rig.item(0)
+    assert rig.said() == [("alice", "ack", Result.UNSUPPORTED)]
+    assert rig.receiver.next_deadline() is None
+
+
+def test_another_client_is_denied_and_disturbs_nothing() -> None:
+    rig = Rig().count(2)
+    rig.said()
+    rig.count(5, BOB)
+    assert rig.said() == [("bob", "ack", Result.DENIED)]
+    rig.item(0, BOB)
+    rig.item(0)
+    rig.item(1)
+    assert ("bob", "ack", Result.DENIED) not in rig.said()
+    assert rig.uploads[0].sender == ALICE
+
+
+def test_another_client_is_denied_also_while_it_is_being_decided() -> None:
+    rig = Rig().uploaded()
+    rig.count(1, BOB)
+    assert rig.said() == [("bob", "ack", Result.DENIED)]
+    rig.count(1)
+    assert rig.said() == []
+    rig.receiver.finish(Result.ACCEPTED, opaque_id=1, now=0.0)
+    assert rig.said() == [("alice", "ack", Result.ACCEPTED)]
+
+
+def test_the_same_count_before_any_item_is_a_repeat() -> None:
+    rig = Rig().count(2)
+    rig.run(0.5)
+    rig.count(2)
+    assert rig.said() == [("alice", "request", 0)]
+
+
+def test_an_upload_begun_again_takes_no_item_of_the_one_before() -> None:
+    rig = Rig().count(2)
+    rig.item(0, north=1)
+    rig.said()
+    rig.count(2)
+    assert rig.said() == []  # until what was on its way has arrived
+    rig.item(0, north=1)
+    assert rig.run(QUIET) == [(QUIET, "request", 0)]
+    rig.item(0, north=2)
+    rig.item(1, north=3)
+    rig.said()
+    assert [i.x - 470000000 for i in rig.uploads[0].items] == [2, 3]
+
+
+def test_after_a_client_has_given_up_nothing_more_is_asked() -> None:
+    rig = Rig().count(2)
+    rig.item(0)
+    rig.said()
+    rig.cancel()
+    assert rig.run(5.0) == []
+    rig.count(1, BOB)
+    assert rig.said() == [("bob", "request", 0)]
+
+
+def test_somebody_elses_ack_cancels_nothing() -> None:
+    rig = Rig().count(2)
+    rig.cancel(BOB)
+    rig.item(0)
+    assert ("alice", "request", 1) in rig.said()
+
+
+def test_another_type_from_the_same_client_is_another_upload() -> None:
+    rig = Rig().count(2)
+    rig.item(0)
+    rig.said()
+    rig.count(1, kind=FENCE)
+    assert rig.run(QUIET) == [(QUIET, "request", 0)]
+    rig.item(0)  # of the mission
+    assert rig.said() == []
+    rig.item(0, kind=FENCE)
+    rig.said()
+    assert rig.uploads[0].mission_type == FENCE
+
+
+def test_the_last_item_again_is_acknowledged_again() -> None:
+    rig = Rig().uploaded(2)
+    rig.receiver.finish(Result.ACCEPTED, opaque_id=7, now=0.0)
+    rig.said()
+    rig.now = 1.0
+    assert rig.item(1)
+    assert rig.said() == [("alice", "ack", Result.ACCEPTED)]
+    assert rig.item(1, north=9)  # another one: it belongs to nothing
+    assert rig.said() == []
+    rig.now = 3.0
+    assert not rig.item(1)
+
+
+def test_an_item_out_of_nowhere_is_not_ours() -> None:
+    assert not Rig().item(0)
+
+
+def test_too_many_items_are_refused_at_once() -> None:
+    rig = Rig().count(CAPACITY + 1)
+    assert rig.said() == [("alice", "ack", Result.NO_SPACE)]
+    assert rig.receiver.next_deadline() is None
+
+
+@pytest.mark.parametrize("x", [float("inf"), 1e30, float("nan")])
+def test_a_place_beyond_all_numbers_is_refused(x: float) -> None:
+    rig = Rig().count(1)
+    rig.said()
+    message = m.MissionItem(1, 1, 0, 3, 16, 0, 1, 0, 0, 0, 0, x, 8.0, 0, MISSION)
+    rig.receiver.item(message, ALICE, now=0.0)
+    is_none = x != x  # which stands for "not given", and is for the check to judge
+    assert rig.said() == ([] if is_none else [("alice", "ack", Result.INVALID_PARAM5_X)])
+
+
+def test_the_float_form_means_the_same_place() -> None:
+    rig = Rig().count(2)
+    for seq, frame, x in ((0, 3, 47.0), (1, 1, -2.5)):
+        message = m.MissionItem(1, 1, seq, frame, 16, 0, 1, 0, 0, 0, 0, x, 8.0, 0, MISSION)
+        rig.receiver.item(message, ALICE, now=0.0)
+    rig.said()
+    assert [(i.x, i.y) for i in rig.uploads[0].items] == [(470000000, 80000000), (-25000, 80000)]
