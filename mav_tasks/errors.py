@@ -7,7 +7,8 @@
     │   ├── LinkUrlError      a link URL that says nothing we can open
     │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
     │   ├── InsecureLinkError a link beyond loopback without a key
-    │   └── StoreError        a store that cannot be opened or read at start
+    │   ├── StoreError        a store that cannot be opened or read at start
+    │   └── PlanFileError     a mission file that cannot be read or understood
     ├── Rejection             a request refused: reason code and words for the client
     └── IllegalTransition     our own mistake: a move that the lifecycle table lacks
 
@@ -39,6 +40,13 @@ class StoreError(UsageError):
     """A store cannot be opened, or what it holds cannot be read.
 
     Only at start: what the disk does later is no exception but an outcome (``NotKept``).
+    """
+
+
+class PlanFileError(UsageError):
+    """A mission file cannot be read, or what it says is not clear enough to drive.
+
+    The text names the part of the file first: "item 3: latitude 91 not in -90..90".
     """
 
 

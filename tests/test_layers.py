@@ -13,6 +13,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.errors": frozenset(),
     "mav_tasks.settings": frozenset(),
     "mav_tasks.mavlink": frozenset({"mav_tasks.errors"}),
+    "mav_tasks.plan_files": frozenset({"mav_tasks.mavlink", "mav_tasks.errors"}),
     "mav_tasks.services": frozenset(
         {"mav_tasks.mavlink", "mav_tasks.settings", "mav_tasks.errors"}
     ),

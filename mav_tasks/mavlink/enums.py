@@ -16,7 +16,7 @@ class MavResult(IntEnum):
 
 
 class MavCmd(IntEnum):
-    """MAV_CMD, as far as the server or the simulated rover tells one from another."""
+    """MAV_CMD, as far as the server, its files or the simulated rover tell one from another."""
 
     NAV_WAYPOINT = 16
     NAV_LOITER_TIME = 19
@@ -26,6 +26,7 @@ class MavCmd(IntEnum):
     NAV_DELAY = 93
     CONDITION_YAW = 115
     DO_SET_MODE = 176
+    DO_JUMP = 177
     DO_CHANGE_SPEED = 178
     DO_SET_HOME = 179
     DO_REPOSITION = 192
@@ -41,6 +42,11 @@ class MavCmd(IntEnum):
     REQUEST_MESSAGE = 512
     REQUEST_PROTOCOL_VERSION = 519
     REQUEST_AUTOPILOT_CAPABILITIES = 520
+    NAV_FENCE_POLYGON_VERTEX_INCLUSION = 5001
+    NAV_FENCE_POLYGON_VERTEX_EXCLUSION = 5002
+    NAV_FENCE_CIRCLE_INCLUSION = 5003
+    NAV_FENCE_CIRCLE_EXCLUSION = 5004
+    NAV_RALLY_POINT = 5100
     TASK_MOVE = 54000
     TASK_ROTATE = 54001
     TASK_DRIVE = 54002

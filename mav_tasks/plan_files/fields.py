@@ -1,0 +1,68 @@
+"""Fields of a mission file, checked: each gives a value or a PlanFileError that says where."""
+
+import json
+import math
+from typing import Any, TypeVar
+
+from mav_tasks.errors import PlanFileError
+
+MAX_FLOAT = 3.4e38  # what a float of MISSION_ITEM_INT holds
+NEEDED = {dict: "an object", list: "a list", str: "text", bool: "true or false", float: "a number"}
+T = TypeVar("T")
+
+
+def get(where: str, holder: dict[str, Any], key: str, kind: type[T]) -> T:
+    """Give what ``holder`` has under ``key``, of one of the kinds in NEEDED."""
+    if key not in holder:
+        raise PlanFileError(f"{where}: {key} is missing")
+    return typed(where, key, holder[key], kind)
+
+
+def typed(where: str, name: str, value: object, kind: type[T]) -> T:
+    """Give ``value`` if it is of ``kind``, one of NEEDED."""
+    if not isinstance(value, kind):
+        raise PlanFileError(f"{where}: {name} is {shown(value)}, {NEEDED[kind]} is needed")
+    return value
+
+
+def check_version(where: str, holder: dict[str, Any], needed: int) -> None:
+    """Refuse what is of another version: the same words could mean something else there."""
+    if (version := get(where, holder, "version", float)) != needed:
+        raise PlanFileError(f"{where}: version {shown(version)} is not read, {needed} is needed")
+
+
+def number(where: str, name: str, value: object) -> float:
+    """Give a number that a float on the wire can hold, or NaN for None: not given."""
+    found = math.nan if value is None else typed(where, name, value, float)
+    if math.isnan(found):
+        return math.nan  # always this one, so that items that hold it can be compared
+    if abs(found) > MAX_FLOAT:
+        raise PlanFileError(f"{where}: {name} {shown(found)} is too large")
+    return found
+
+
+def whole(where: str, name: str, value: object, most: int) -> int:
+    """Give a whole number from 0 to ``most``."""
+    found = typed(where, name, value, float)
+    if not (0 <= found <= most and found.is_integer()):
+        raise PlanFileError(
+            f"{where}: {name} is {shown(found)}, a whole number from 0 to {most} is needed"
+        )
+    return int(found)
+
+
+def refuse_more(what: str, count: int, most: int) -> None:
+    """Refuse more than ``most`` of something."""
+    if count > most:
+        raise PlanFileError(f"more than {most} {what}")
+
+
+def shown(value: object) -> str:
+    """A value of JSON in a few words."""
+    match value:
+        case dict() | list():
+            return NEEDED[type(value)]
+        case float():
+            return repr(value).removesuffix(".0")
+        case _:
+            return json.dumps(value)[:40]

@@ -1,0 +1,604 @@
+"""Mission files: what each format says, and that anything else is one clear error."""
+
+import copy
+import json
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from pymavlink import mavwp
+
+from mav_tasks.errors import PlanFileError
+from mav_tasks.plan_files import (
+    FenceCircle,
+    FencePolygon,
+    GeoPoint,
+    PlanFile,
+    PlanItem,
+    fence_items,
+    parse_plan,
+    rally_items,
+    read_plan,
+)
+from mav_tasks.plan_files.reader import MAX_ITEMS, MAX_SIZE
+
+NAN = math.nan  # items that hold it are equal, as the reader gives this very one
+
+#: waypoint, survey of two items, speed, jump back to the first, jump to the speed, return
+PLAN = """
+{
+    "fileType": "Plan",
+    "geoFence": {
+        "circles": [
+            {"circle": {"center": [47.3975676, 8.5446498], "radius": 319.85},
+             "inclusion": false, "version": 1}
+        ],
+        "polygons": [
+            {"inclusion": true, "version": 1,
+             "polygon": [[47.398, 8.543], [47.399, 8.550], [47.396, 8.544], [47.395, 8.539]]},
+            {"inclusion": false, "version": 1,
+             "polygon": [[-47.1, -8.1], [-47.2, -8.2], [-47.3, -8.3]]}
+        ],
+        "breachReturn": [47.4, 8.5, 30],
+        "version": 2
+    },
+    "groundStation": "QGroundControl",
+    "mission": {
+        "cruiseSpeed": 15,
+        "firmwareType": 12,
+        "globalPlanAltitudeMode": 1,
+        "hoverSpeed": 5,
+        "items": [
+            {"AMSLAltAboveTerrain": null, "Altitude": 50, "AltitudeMode": 1,
+             "autoContinue": true, "command": 16, "doJumpId": 1, "frame": 3,
+             "params": [2.5, 0, 0, null, 47.3985099, 8.5451002, 50], "type": "SimpleItem"},
+            {"TransectStyleComplexItem": {
+                "CameraCalc": {"version": 2},
+                "Items": [
+                    {"autoContinue": true, "command": 16, "doJumpId": 2, "frame": 3,
+                     "params": [0, 0, 0, null, 47.4, 8.6, 0], "type": "SimpleItem"},
+                    {"autoContinue": false, "command": 206, "doJumpId": 3, "frame": 2,
+                     "params": [25, 0, 1, 0, 0, 0, 0], "type": "SimpleItem"}
+                ],
+                "version": 2},
+             "complexItemType": "survey", "type": "ComplexItem", "version": 5},
+            {"autoContinue": true, "command": 178, "doJumpId": 4, "frame": 2,
+             "params": [1, 1.5, -1, 0, 0, 0, 0], "type": "SimpleItem"},
+            {"autoContinue": true, "command": 177, "doJumpId": 5, "frame": 2,
+             "params": [1, 3, 0, 0, 0, 0, 0], "type": "SimpleItem"},
+            {"autoContinue": true, "command": 177, "doJumpId": 6, "frame": 2,
+             "params": [4, -1, 0, 0, 0, 0, 0], "type": "SimpleItem"},
+            {"autoContinue": true, "command": 20, "doJumpId": 7, "frame": 2,
+             "params": [null, null, null, null, null, null, null], "type": "SimpleItem"}
+        ],
+        "plannedHomePosition": [47.3977419, 8.545594, 487.989],
+        "vehicleType": 10,
+        "version": 2
+    },
+    "rallyPoints": {"points": [[47.3976040, 8.5509154, 50], [-0.1, -179.9, 0]], "version": 2},
+    "version": 1
+}
+"""
+JUMP = {
+    "autoContinue": True,
+    "command": 177,
+    "doJumpId": 2,
+    "frame": 2,
+    "params": [1, 3, 0, 0, 0, 0, 0],
+    "type": "SimpleItem",
+}
+FENCE = (
+    FencePolygon(
+        True,
+        (
+            (473980000, 85430000),
+            (473990000, 85500000),
+            (473960000, 85440000),
+            (473950000, 85390000),
+        ),
+    ),
+    FencePolygon(
+        False, ((-471000000, -81000000), (-472000000, -82000000), (-473000000, -83000000))
+    ),
+    FenceCircle(False, (473975676, 85446498), 319.85),
+)
+READ = PlanFile(
+    items=(
+        PlanItem(16, 3, (2.5, 0.0, 0.0, NAN), 473985099, 85451002, 50.0, True),
+        PlanItem(16, 3, (0.0, 0.0, 0.0, NAN), 474000000, 86000000, 0.0, True),
+        PlanItem(206, 2, (25.0, 0.0, 1.0, 0.0), 0, 0, 0.0, False),
+        PlanItem(178, 2, (1.0, 1.5, -1.0, 0.0), 0, 0, 0.0, True),
+        PlanItem(177, 2, (0.0, 3.0, 0.0, 0.0), 0, 0, 0.0, True),
+        PlanItem(177, 2, (3.0, -1.0, 0.0, 0.0), 0, 0, 0.0, True),
+        PlanItem(20, 2, (NAN, NAN, NAN, NAN), 0, 0, NAN, True),
+    ),
+    home=GeoPoint(473977419, 85455940, 487.989),
+    fence=FENCE,
+    rally=(GeoPoint(473976040, 85509154, 50.0), GeoPoint(-1000000, -1799000000, 0.0)),
+)
+
+WPL = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t47.3977419\t8.545594\t487.989\t1
+1\t0\t3\t16\t2.5\t0\t0\tnan\t47.3985099\t8.5451002\t50\t1
+2\t0\t3\t177\t1\t3\t0\t0\t0\t0\t0\t1
+3\t0\t1\t19\t5\t0\t0\t0\t-12.34567\t0.00005\t-1\t0
+"""
+WPL_READ = PlanFile(
+    items=(
+        PlanItem(16, 3, (2.5, 0.0, 0.0, NAN), 473985099, 85451002, 50.0, True),
+        PlanItem(177, 3, (0.0, 3.0, 0.0, 0.0), 0, 0, 0.0, True),
+        PlanItem(19, 1, (5.0, 0.0, 0.0, 0.0), -123457, 0, -1.0, False),
+    ),
+    home=GeoPoint(473977419, 85455940, 487.989),
+    fence=(),
+    rally=(),
+)
+
+
+def edited(change: Callable[[Any], object]) -> str:
+    """PLAN with ``change`` done to its root object."""
+    root = json.loads(PLAN)
+    change(root)
+    return json.dumps(root)
+
+
+def with_items(*items: object) -> str:
+    return edited(lambda root: root["mission"].update(items=items))
+
+
+def waypoint(**fields: object) -> dict[str, object]:
+    return {**json.loads(PLAN)["mission"]["items"][0], **fields}
+
+
+def at(latitude: object, longitude: object) -> list[object]:
+    """The params of a waypoint at a place."""
+    return [0, 0, 0, None, latitude, longitude, 0]
+
+
+def problem(text: str) -> str:
+    """What the reader says is wrong."""
+    with pytest.raises(PlanFileError) as error:
+        parse_plan(text)
+    return str(error.value)
+
+
+def line(seq: int, rest: str = "0 3 16 0 0 0 0 47 8 0 1") -> str:
+    return f"{seq} {rest}\n"
+
+
+def wpl(*lines: str) -> str:
+    return "QGC WPL 110\n" + "".join(lines)
+
+
+def test_a_plan_gives_its_items_home_fence_and_rally_points() -> None:
+    assert parse_plan(PLAN) == READ
+
+
+def test_a_text_file_gives_its_items_and_home() -> None:
+    assert parse_plan(WPL) == WPL_READ
+
+
+@pytest.mark.parametrize(("text", "read"), [(PLAN, READ), (WPL, WPL_READ)])
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda text: text,
+        lambda text: "\ufeff" + text,
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: "\n \n" + text,
+    ],
+)
+def test_marks_and_line_ends_of_other_systems_change_nothing(
+    tmp_path: Path, text: str, read: PlanFile, written: Callable[[str], str]
+) -> None:
+    file = tmp_path / "of any name"
+    file.write_bytes(written(text).encode())
+    assert read_plan(file) == parse_plan(written(text)) == read
+
+
+def test_comments_and_any_blanks_are_allowed_in_a_text_file() -> None:
+    assert parse_plan("# mine\n" + WPL.replace("\t", "   ") + "\n#3 is the last\n\n") == WPL_READ
+
+
+def test_another_program_reads_the_same_from_a_text_file(tmp_path: Path) -> None:
+    file = tmp_path / "mission.txt"
+    file.write_text(WPL, encoding="utf-8")
+    theirs = mavwp.MAVWPLoader()
+    theirs.load(str(file))
+    ours = parse_plan(WPL)
+    assert ours.home is not None
+    for index, item in enumerate(ours.items, 1):
+        other = theirs.wp(index)
+        scale = 1e4 if item.frame == 1 else 1e7
+        assert (item.command, item.frame) == (other.command, other.frame)
+        assert (item.x, item.y) == (round(other.x * scale), round(other.y * scale))
+        assert (item.params[1], item.z) == (other.param2, other.z)
+        assert item.autocontinue == bool(other.autocontinue)
+    home = theirs.wp(0)
+    assert ours.home == (round(home.x * 1e7), round(home.y * 1e7), home.z)
+
+
+@pytest.mark.parametrize(
+    "first", ["1 3 16 0 0 0 0 47 8 0 1", "1 0 17 0 0 0 0 47 8 0 1"], ids=["frame", "command"]
+)
+def test_a_first_line_that_is_no_home_is_an_item(first: str) -> None:
+    plan = parse_plan(wpl(line(0, first), line(1), line(2, "0 2 177 1 3 0 0 0 0 0 1")))
+    assert plan.home is None
+    assert [item.command for item in plan.items][1:] == [16, 177]
+    assert plan.items[2].params[0] == 1.0
+
+
+def test_the_target_of_a_jump_is_an_index_into_the_items() -> None:
+    plan = parse_plan(PLAN)
+    targets = [plan.items[int(item.params[0])] for item in plan.items if item.command == 177]
+    assert [item.command for item in targets] == [16, 178]
+
+
+def test_a_plan_may_have_no_home_no_fence_no_rally_points_and_no_items() -> None:
+    assert parse_plan(
+        '{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}'
+    ) == PlanFile((), None, (), ())
+    assert parse_plan("QGC WPL 110") == PlanFile((), None, (), ())
+
+
+def test_an_older_version_is_no_matter_where_nothing_is_in_it() -> None:
+    empty = {"version": 1, "points": []}
+    text = edited(lambda root: root.update(rallyPoints=empty, geoFence={"version": 1}))
+    assert parse_plan(text) == replace(READ, fence=(), rally=())
+
+
+def test_a_fence_of_circles_only_is_a_fence() -> None:
+    text = edited(lambda root: root["geoFence"].update(polygons=[]))
+    assert parse_plan(text).fence == FENCE[2:]
+
+
+def test_the_fence_as_it_is_sent() -> None:
+    rows = [(i.command, i.frame, i.params[0], i.x, i.y, i.z) for i in fence_items(READ)]
+    assert rows == [
+        (5001, 0, 4.0, 473980000, 85430000, 0.0),
+        (5001, 0, 4.0, 473990000, 85500000, 0.0),
+        (5001, 0, 4.0, 473960000, 85440000, 0.0),
+        (5001, 0, 4.0, 473950000, 85390000, 0.0),
+        (5002, 0, 3.0, -471000000, -81000000, 0.0),
+        (5002, 0, 3.0, -472000000, -82000000, 0.0),
+        (5002, 0, 3.0, -473000000, -83000000, 0.0),
+        (5004, 0, 319.85, 473975676, 85446498, 0.0),
+    ]
+    inside = PlanFile((), None, (FenceCircle(True, (1, 2), 3.0),), ())
+    assert fence_items(inside) == (PlanItem(5003, 0, (3.0, 0.0, 0.0, 0.0), 1, 2, 0.0, False),)
+
+
+def test_the_rally_points_as_they_are_sent() -> None:
+    none = (0.0, 0.0, 0.0, 0.0)
+    assert rally_items(READ) == (
+        PlanItem(5100, 3, none, 473976040, 85509154, 50.0, False),
+        PlanItem(5100, 3, none, -1000000, -1799000000, 0.0, False),
+    )
+
+
+@pytest.mark.parametrize(
+    ("frame", "place", "xy"),
+    [
+        (0, (90, -180), (900000000, -1800000000)),
+        (6, (47.39850995, -8.00000015), (473985100, -80000002)),  # ties, to even
+        (11, (0.00000005, 0.00000015), (0, 2)),
+        (1, (214748, -214748), (2147480000, -2147480000)),
+        (9, (1.00005, -0.33333), (10000, -3333)),
+        (2, (1000, -3), (1000, -3)),
+        (3, (None, None), (0, 0)),
+    ],
+)
+def test_x_and_y_are_ints_in_the_unit_of_the_frame(
+    frame: int, place: tuple[object, object], xy: tuple[int, int]
+) -> None:
+    item = parse_plan(with_items(waypoint(command=22, frame=frame, params=at(*place)))).items[0]
+    assert (item.frame, item.x, item.y) == (frame, *xy)
+
+
+@given(st.decimals(-90, 90, places=12), st.floats(-180, 180))
+def test_degrees_become_the_nearest_int(latitude: object, longitude: float) -> None:
+    item = parse_plan(wpl(line(0, f"0 3 16 0 0 0 0 {latitude} {longitude!r} 0 1"))).items[0]
+    assert item.x == round(Fraction(str(latitude)) * 10**7)
+    assert item.y == round(Fraction(repr(longitude)) * 10**7)
+
+
+ROOT_PROBLEMS: list[tuple[str, str]] = [
+    ("", "not a plan file: it is empty"),
+    ("\ufeff \r\n", "not a plan file: it is empty"),
+    ("<?xml version='1.0'?>", "not a plan file: neither JSON nor QGC WPL 110"),
+    ("[1]", "not a plan file: neither JSON nor QGC WPL 110"),
+    ("QGC WPL 120\n" + line(0), "'QGC WPL 120' is not read, 'QGC WPL 110' is needed"),
+    ("QGC WPL 100", "'QGC WPL 100' is not read, 'QGC WPL 110' is needed"),
+    ("QGC WPL", "'QGC WPL' is not read, 'QGC WPL 110' is needed"),
+    ("{", "not a plan file: JSON line 1 column 2: Expecting property name enclosed in double"),
+    ('{\n"a": 1}\n]', "not a plan file: JSON line 3 column 1: Extra data"),
+    ('{"a": NaN}', "not a plan file: NaN is no number in JSON"),
+    ('{"a": -Infinity}', "not a plan file: -Infinity is no number in JSON"),
+    ('{"a": ' + "[" * 100_000, "not a plan file: JSON nested too deep"),
+    ("{}", "file: fileType is missing"),
+    ('{"fileType": "Mission"}', 'file: fileType is "Mission", "Plan" is needed'),
+    ('{"fileType": ' + "[" * 400 + "]" * 400 + "}", "file: fileType is a list, text is needed"),
+    (edited(lambda root: root.pop("version")), "file: version is missing"),
+    (edited(lambda root: root.update(version=2)), "file: version 2 is not read, 1 is needed"),
+    (edited(lambda root: root.update(version=True)), "file: version is true, a number is needed"),
+    (edited(lambda root: root.pop("mission")), "file: mission is missing"),
+    (edited(lambda root: root.update(mission=[])), "file: mission is a list, an object is needed"),
+    (
+        edited(lambda root: root["mission"].update(version=1)),
+        "mission: version 1 is not read, 2 is needed",
+    ),
+    (edited(lambda root: root["mission"].pop("items")), "mission: items is missing"),
+    (
+        edited(lambda root: root["mission"].update(plannedHomePosition=[1, 2])),
+        "home: a point of 2 numbers, 3 are needed",
+    ),
+    (
+        edited(lambda root: root["mission"].update(plannedHomePosition=[1, 181, 0])),
+        "home: longitude 181 not in -180..180",
+    ),
+    (
+        edited(lambda root: root["geoFence"].update(version=1)),
+        "geoFence: version 1 is not read, 2 is needed",
+    ),
+    (
+        edited(lambda root: root["geoFence"]["polygons"][1]["polygon"].pop()),
+        "fence polygon 2: 2 points, 3 are needed",
+    ),
+    (
+        edited(lambda root: root["geoFence"]["polygons"][0].update(inclusion=1)),
+        "fence polygon 1: inclusion is 1, true or false is needed",
+    ),
+    (
+        edited(lambda root: root["geoFence"]["polygons"][0].update(version=2)),
+        "fence polygon 1: version 2 is not read, 1 is needed",
+    ),
+    (
+        edited(lambda root: root["geoFence"]["circles"][0]["circle"].update(radius=0)),
+        "fence circle 1: radius 0 m is not above 0",
+    ),
+    (
+        edited(lambda root: root["geoFence"]["circles"][0]["circle"].update(center=[91, 0])),
+        "fence circle 1: latitude 91 not in -90..90",
+    ),
+    (
+        edited(lambda root: root.update(geoFence={"polygon": [[1, 2]], "version": 1})),
+        "geoFence: version 1 is not read, 2 is needed",
+    ),
+    (
+        edited(lambda root: root["geoFence"].update(circles={"1": 2})),
+        "geoFence: circles is an object, a list is needed",
+    ),
+    (
+        edited(lambda root: root["rallyPoints"].update(version=1)),
+        "rallyPoints: version 1 is not read, 2 is needed",
+    ),
+    (
+        edited(lambda root: root["rallyPoints"]["points"][1].__setitem__(0, None)),
+        "rally point 2: latitude is null, a number is needed",
+    ),
+]
+
+ITEM_PROBLEMS: list[tuple[object, str]] = [
+    (None, "it is null, an object is needed"),
+    ({}, "type is missing"),
+    (waypoint(type="missionItem"), 'type "missionItem" is not known'),
+    (waypoint(params=[0] * 6), "6 params, 7 are needed"),
+    (waypoint(params=at(91, 8)), "latitude 91 not in -90..90"),
+    (waypoint(params=at(-90.0000001, 8)), "latitude -90.0000001 not in -90..90"),
+    (waypoint(params=at(0, -180.5)), "longitude -180.5 not in -180..180"),
+    (waypoint(params=at("47", 8)), 'param 5 is "47", a number is needed'),
+    (waypoint(params=at(True, 8)), "param 5 is true, a number is needed"),
+    (waypoint(params=at(47, None)), "command 16 needs a place and has none"),
+    (waypoint(params=at(None, 8)), "command 16 needs a place and has none"),
+    (waypoint(command=19, params=at(None, None)), "command 19 needs a place and has none"),
+    (waypoint(frame=2), "command 16 needs a place and has none"),
+    (waypoint(frame=1, params=at(214_749, 0)), "x 214749 not in -214748..214748"),
+    (waypoint(frame=2, command=31, params=at(0, 1e10)), "param 6 10000000000 not in -2147483647.."),
+    (waypoint(params=[1e300, 0, 0, 0, 1, 1, 0]), "param 1 1e+300 is too large"),
+    (waypoint(params=[0, 0, 0, 0, 1, 1, 10**400]), "param 7 inf is too large"),
+    (waypoint(frame=99), "frame 99 is not known"),
+    (waypoint(frame=-1), "frame is -1, a whole number from 0 to 255 is needed"),
+    (waypoint(command=16.5), "command is 16.5, a whole number from 0 to 65535 is needed"),
+    (waypoint(command=65536), "command is 65536, a whole number from 0 to 65535 is needed"),
+    (waypoint(command=None), "command is null, a number is needed"),
+    (waypoint(autoContinue=1), "autoContinue is 1, true or false is needed"),
+    (waypoint(doJumpId="2"), 'doJumpId is "2", a number is needed'),
+    ({**JUMP, "params": [9, 1, 0, 0, 0, 0, 0]}, "jumps to 9, where no item is"),
+    ({**JUMP, "params": [1.5, 1, 0, 0, 0, 0, 0]}, "jumps to 1.5, where no item is"),
+    ({**JUMP, "params": [None, 1, 0, 0, 0, 0, 0]}, "jumps to nan, where no item is"),
+    ({**JUMP, "doJumpId": 1}, "jumps to 1, which is not one item"),
+    (
+        {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "landCoordinate": [1, 2, 3]},
+        'the complex item "fwLandingPattern" does not carry its items',
+    ),
+    (
+        {
+            "type": "ComplexItem",
+            "complexItemType": "survey",
+            "TransectStyleComplexItem": {"Items": []},
+        },
+        'the complex item "survey" does not carry its items',
+    ),
+]
+
+LINE_PROBLEMS: list[tuple[str, str]] = [
+    ("1 0 3 16 0 0 0 0 47 8 0", "11 fields, 12 are needed"),
+    ("1 0 3 16 0 0 0 0 47 8 0 1 1", "13 fields, 12 are needed"),
+    ("2 0 3 16 0 0 0 0 47 8 0 1", "numbered 2, 1 is expected"),
+    ("1 0 3 16 0 0 0 0 47,5 8 0 1", "field 9 is '47,5', a number is needed"),
+    ("1 0 3 16 0 0 0 0 4_7 8 0 1", "field 9 is '4_7', a number is needed"),
+    ("1 0 3 16 0 0 0 0 147 8 0 1", "latitude 147 not in -90..90"),
+    ("1 0 3 16 0 0 0 0 nan nan 0 1", "command 16 needs a place and has none"),
+    ("1 0 3 16 inf 0 0 0 47 8 0 1", "param 1 inf is too large"),
+    ("1 0 3 16 0 0 0 0 47 8 0 2", "autocontinue is 2, a whole number from 0 to 1 is needed"),
+    ("1 0 3 177 0 1 0 0 0 0 0 1", "jumps to 0, where no item is"),  # 0 is home
+    ("1 0 3 177 2 1 0 0 0 0 0 1", "jumps to 2, where no item is"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), ROOT_PROBLEMS)
+def test_an_error_names_the_part_of_the_file(text: str, words: str) -> None:
+    assert problem(text).startswith(words)
+
+
+@pytest.mark.parametrize(("item", "words"), ITEM_PROBLEMS)
+def test_an_error_names_the_item(item: object, words: str) -> None:
+    assert problem(with_items(waypoint(), item)).startswith(f"item 2: {words}")
+
+
+@pytest.mark.parametrize(("words_of_line", "words"), LINE_PROBLEMS)
+def test_an_error_names_the_line(words_of_line: str, words: str) -> None:
+    text = wpl(line(0, "1 0 16 0 0 0 0 47 8 0 1"), "# a comment counts as a line\n", words_of_line)
+    assert problem(text) == f"line 4: {words}"
+
+
+def test_items_are_counted_as_on_the_map_of_the_planner() -> None:
+    first, survey, *_ = json.loads(PLAN)["mission"]["items"]
+    bad = waypoint(params=at(91, 8))
+    assert problem(with_items(first, survey, bad)).startswith("item 4: latitude")
+    inside = copy.deepcopy(survey)
+    inside["TransectStyleComplexItem"]["Items"][1] = bad
+    assert problem(with_items(first, inside)).startswith('item 3 (in "survey"): latitude')
+
+
+def test_no_jump_leads_into_a_survey() -> None:
+    first, survey, *_ = json.loads(PLAN)["mission"]["items"]
+    into = {**JUMP, "params": [3, 1, 0, 0, 0, 0, 0]}
+    assert problem(with_items(first, survey, into)) == "item 4: jumps to 3, where no item is"
+
+
+def test_a_file_that_cannot_be_read_is_such_an_error(tmp_path: Path) -> None:
+    missing = tmp_path / "missing.plan"
+    with pytest.raises(PlanFileError, match=r"missing\.plan: No such file"):
+        read_plan(missing)
+    with pytest.raises(PlanFileError, match="Is a directory"):
+        read_plan(tmp_path)
+    missing.write_bytes(b'{"fileType": "Pl\xe4n"}')
+    with pytest.raises(PlanFileError, match=r"^not a plan file: no UTF-8 text$"):
+        read_plan(missing)
+
+
+def test_size_and_number_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    big = tmp_path / "big"
+    big.write_bytes(PLAN.encode() + b" " * (MAX_SIZE - len(PLAN)))
+    assert read_plan(big) == READ
+    big.write_bytes(PLAN.encode() + b" " * (MAX_SIZE - len(PLAN) + 1))
+    with pytest.raises(PlanFileError, match=r"^more than 10000000 bytes$"):
+        read_plan(big)
+    assert problem(PLAN + " " * MAX_SIZE) == "more than 10000000 characters"
+    rally = [[1, 2, 3]] * (MAX_ITEMS + 1)
+    many = edited(lambda root: root["rallyPoints"].update(points=rally))
+    assert problem(many) == "more than 65534 rally points"
+    corners = [[1, 2]] * MAX_ITEMS
+    fenced = edited(lambda root: root["geoFence"]["polygons"][0].update(polygon=corners))
+    assert problem(fenced) == "more than 65534 fence items"
+    monkeypatch.setattr("mav_tasks.plan_files.reader.MAX_ITEMS", 6)
+    assert problem(PLAN) == "more than 6 mission items"
+
+
+def check_sendable(plan: PlanFile) -> None:
+    """Every item fits a MISSION_ITEM_INT, and every jump leads to an item."""
+    for item in (*plan.items, *fence_items(plan), *rally_items(plan)):
+        struct.pack(
+            "<ffffiifHBB",
+            *item.params,
+            item.x,
+            item.y,
+            item.z,
+            item.command,
+            item.frame,
+            item.autocontinue,
+        )
+    for item in plan.items:
+        if item.command == 177:
+            assert item.params[0] in range(len(plan.items))
+
+
+def check_outcome(text: str) -> None:
+    """A plan that can be sent, or a PlanFileError; whatever else is raised fails the test."""
+    words = "read"
+    try:
+        check_sendable(parse_plan(text))
+    except PlanFileError as error:
+        words = str(error)
+    assert 0 < len(words) < 200
+
+
+def paths(value: object) -> list[tuple[str | int, ...]]:
+    """Where every value of a JSON value is."""
+    inner: list[tuple[str | int, object]] = []
+    if isinstance(value, dict):
+        inner = list(value.items())
+    elif isinstance(value, list):
+        inner = list(enumerate(value))
+    return [(), *((key, *rest) for key, sub in inner for rest in paths(sub))]
+
+
+PATHS = paths(json.loads(PLAN))[1:]
+NUMBERS = st.sampled_from([0, 1, 2, 16, 177, -1, 1.5, 90.5, 181, 3.5e38, 1e300, 10**400, 2**31])
+VALUES = st.recursive(
+    st.none() | st.booleans() | NUMBERS | st.floats() | st.text(max_size=3),
+    lambda inner: st.lists(inner, max_size=7) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=8,
+)
+
+
+CHANGES = st.tuples(st.sampled_from(PATHS), st.none() | VALUES.map(lambda value: [value]))
+
+
+@given(st.lists(CHANGES, min_size=1, max_size=4))
+def test_a_plan_with_any_values_changed_is_read_or_refused(
+    changes: list[tuple[tuple[str | int, ...], list[object] | None]],
+) -> None:
+    root = json.loads(PLAN)
+    for (*way, last), change in changes:
+        holder: Any = root
+        try:
+            for key in way:
+                holder = holder[key]
+            if change is None:
+                del holder[last]
+            else:
+                holder[last] = change[0]
+        except (KeyError, IndexError, TypeError):
+            continue  # an earlier change took the place away
+    check_outcome(json.dumps(root))
+
+
+@given(
+    st.sampled_from([PLAN, WPL]),
+    st.lists(
+        st.tuples(
+            st.integers(0, len(PLAN)),
+            st.integers(0, 30),
+            st.text(max_size=5)
+            | st.sampled_from(["\t", "\n", "1e999", "nan", "9" * 400, '"', "{"]),
+        ),
+        min_size=1,
+        max_size=4,
+    ),
+)
+@example(PLAN, [(0, 0, "9" * 5000)])
+@example(PLAN, [(PLAN.index("47.3985099"), 10, "9" * 5000)])
+@example(WPL, [(WPL.index("47.3985099"), 10, "9" * 5000)])
+def test_a_file_with_any_characters_changed_is_read_or_refused(
+    text: str, edits: list[tuple[int, int, str]]
+) -> None:
+    for start, removed, inserted in edits:
+        start %= len(text) + 1
+        text = text[:start] + inserted + text[start + removed :]
+    check_outcome(text)
+
+
+@given(st.text())
+def test_any_text_is_read_or_refused(text: str) -> None:
+    check_outcome(text)
+    check_outcome("QGC WPL 110\n" + text)
+    check_outcome("{" + text)
