@@ -55,13 +55,14 @@ class Rejection(MavTasksError):
 
     ``reason`` is a TASK_REASON number of the dialect (100 and above); the MAV_RESULT that goes on
     the wire follows from it by the table in ``engine/translate.py``, so that the task domain can
-    refuse without knowing MAVLink.
+    refuse without knowing MAVLink. ``param`` is the parameter that is wrong, 1 to 7, 0 for none.
     """
 
-    def __init__(self, reason: int, text: str) -> None:
+    def __init__(self, reason: int, text: str, *, param: int = 0) -> None:
         super().__init__(text)
         self.reason = reason
         self.text = text
+        self.param = param
 
 
 class IllegalTransition(MavTasksError):

@@ -23,6 +23,7 @@ class Driving:
     turn_acceleration: float = radians(90)  # rad/s², the same for turning
     arrival_distance: float = 0.01  # m, a move is done within this of its end
     arrival_angle: float = radians(0.5)  # rad, a rotation is done within this of its end
+    acceptance_radius: float = 0.5  # m, a plan's place that names none is passed within this
 
 
 @dataclass(frozen=True, slots=True)

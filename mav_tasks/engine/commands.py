@@ -11,8 +11,16 @@ from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import CHANGE_MODE, becomes_task, marks_of, place_in, reposition_flags
+from mav_tasks.engine.goals import (
+    CHANGE_MODE,
+    becomes_task,
+    marks_of,
+    place_in,
+    reposition_flags,
+    whole,
+)
 from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
 from mav_tasks.engine.vehicle import Vehicle
@@ -20,7 +28,7 @@ from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
+from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavMissionType, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.services.command_sender import Answered
@@ -38,7 +46,7 @@ OUR_COMMANDS = range(54000, 54050)
 MOVING = frozenset(
     {
         MavCmd.NAV_WAYPOINT,
-        17,  # NAV_LOITER_UNLIM
+        MavCmd.NAV_LOITER_UNLIM,
         18,  # NAV_LOITER_TURNS
         MavCmd.NAV_LOITER_TIME,
         MavCmd.NAV_TAKEOFF,
@@ -87,6 +95,7 @@ class Commands:
         vehicles: VehicleSide,
         book: TaskBook,
         submissions: Submissions,
+        plans: Plans,
         control: TaskControl,
         displays: Displays,
         settings: Settings,
@@ -96,6 +105,7 @@ class Commands:
         self._vehicles = vehicles
         self._book = book
         self._submissions = submissions
+        self._plans = plans
         self._control = control
         self._displays = displays
 
@@ -149,6 +159,15 @@ class Commands:
                 ):  # in examples for every kind of vehicle: nothing to do
                     asked.answer(MavResult.ACCEPTED)
                     return
+                case MavCmd.MISSION_START as number if at_server or self._claims(number):
+                    first = whole(asked.command, 1, "first item", high=0xFFFF)
+                    self._start_plan(asked, first=first, now=now)
+                    return
+                case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
+                    seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
+                    task = self._plans.go_on_with(asked.vehicle, seq, now=now)
+                    asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
+                    return
                 case MavCmd.DO_PAUSE_CONTINUE:
                     asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
                     return
@@ -185,6 +204,16 @@ class Commands:
             asked.answer(MavResult.ACCEPTED, asked.vehicle.pause(actor=asked.actor, now=now) or 0)
         else:
             self._submissions.submit(asked, now=now)
+
+    def _start_plan(self, asked: Asked, *, first: int, now: float) -> None:
+        """Start or continue the uploaded mission; one that is over is another task."""
+        submitter = asked.client.submitter(asked.packet.source)
+        started = self._plans.start(asked.vehicle, submitter, first=first, now=now)
+        if isinstance(started, Draft):
+            task = self._submissions.submit_draft(asked, started, now=now)
+            self._plans.restarted(asked.vehicle, task, now=now)
+        else:
+            asked.answer(MavResult.ACCEPTED, started.id)
 
     def cancel_latest(
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
@@ -233,6 +262,8 @@ class Commands:
         elif vehicle.tasks.is_stopped:
             words = "STOP is latched: continue first"
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+        elif self._is_mission(vehicle, mode):
+            self._start_unasked(vehicle, client, packet, now=now)
         elif self._is_return(vehicle, mode):
             draft = _return_home(vehicle, client.submitter(packet.source), Marks())
             try:
@@ -243,6 +274,19 @@ class Commands:
             vehicle.client_asks_mode(mode, client.key, now=now)
             vehicle.requests.forward(packet)
 
+    def _start_unasked(
+        self, vehicle: Vehicle, client: GcsClient, packet: Packet, *, now: float
+    ) -> None:
+        try:
+            submitter = client.submitter(packet.source)
+            started = self._plans.start(vehicle, submitter, first=0, now=now)
+            if isinstance(started, Draft):
+                self._submissions.check_open()
+                task = vehicle.tasks.submit(started, now=now)
+                self._plans.restarted(vehicle, task, now=now)
+        except Rejection as refusal:
+            client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
+
     def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether a mode is the return that we drive ourselves: towards a home that is known."""
         return (
@@ -250,6 +294,11 @@ class Commands:
             and mode == vehicle.persona.return_mode
             and vehicle.home is not None
         )
+
+    def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
+        """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""
+        has_plan = bool(self._plans.stored(vehicle.system_id, MavMissionType.MISSION).items)
+        return self._settings.claim and mode == vehicle.persona.mission_mode and has_plan
 
     # STOP, pause, modes
 
@@ -321,6 +370,9 @@ class Commands:
             submitter = asked.client.submitter(asked.packet.source)
             draft = _return_home(vehicle, submitter, marks_of(asked.command, asked.packet.raw))
             self._submissions.run_now(asked, draft, now=now)
+            return
+        if self._is_mission(vehicle, mode):
+            self._start_plan(asked, first=0, now=now)
             return
         vehicle.client_asks_mode(mode, asked.client.key, now=now)
         _relay(asked, now=now)

@@ -25,8 +25,10 @@ from mav_tasks.engine.inputs import (
     StoreFailed,
     WallClock,
 )
+from mav_tasks.engine.mission_reports import MissionReports
 from mav_tasks.engine.motion_gate import may_pass, passed
 from mav_tasks.engine.operator_watch import OperatorWatch
+from mav_tasks.engine.plans import MESSAGES, Plans
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
@@ -76,12 +78,22 @@ class Engine:
         if restored is not None:
             recollection.restore(restored.tasks, now=now)
         self._submissions = Submissions(self._gcs, self._book, recollection, settings)
+        self._plans = Plans(
+            self._gcs,
+            self._vehicles,
+            self._book,
+            self._submissions,
+            settings,
+            restored={} if restored is None else restored.plans,
+        )
+        self._reports = MissionReports(self._gcs, self._vehicles, self._book, self._plans, settings)
         displays = Displays(self._gcs, self._vehicles, self._book)
         self._commands = Commands(
             self._gcs,
             self._vehicles,
             self._book,
             self._submissions,
+            self._plans,
             TaskControl(self._book, settings),
             displays,
             settings,
@@ -128,6 +140,8 @@ class Engine:
             self._publisher.next_deadline(),
             self._vehicles.next_deadline(),
             self._submissions.next_deadline(),
+            self._plans.next_deadline(),
+            self._reports.next_deadline(),
             self._fleet.room.next_deadline(),
             self._operator.next_deadline(limit=self._settings.watch.operator_lost),
             None if self._stopped else self._stop_by,
@@ -140,10 +154,12 @@ class Engine:
         self._vehicles.check_late(now=now)
         self._vehicles.handle_deadline(now=now)
         self._submissions.handle_deadline(now=now)
+        self._plans.handle_deadline(now=now)
         self._fleet.room.handle_deadline(now=now)
         self._watch_operator(now=now)
         self._settle(now=now)
         self._publisher.handle_deadline(now=now)
+        self._reports.handle_deadline(now=now)
 
     def take_events(self) -> list[Event]:
         """Give what happened since the last call, to be made durable in this order.
@@ -198,7 +214,7 @@ class Engine:
                     continue
                 vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
                 if vehicle is not None:
-                    if packet.message_id == m.CommandAck.id:
+                    if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
                         self._publisher.withhold(packet)
                     else:
                         self._gcs.forward(packet, now=now)
@@ -212,6 +228,10 @@ class Engine:
             self._commands.cancel_latest(client, packet, message, now=now)
         elif isinstance(message, m.SetMode):
             self._commands.set_mode(client, packet, message, now=now)
+        elif isinstance(message, MESSAGES) and self._plans.receive(
+            client, packet, message, now=now
+        ):
+            return
         elif packet.message_id not in CLAIMED:
             if isinstance(message, m.Heartbeat):
                 self._operator.receive(message, now=now)
@@ -251,6 +271,7 @@ class Engine:
         events = self._book.take_events()
         if events:
             self._publisher.publish(events, now=now)
+            self._reports.publish(events, now=now)
             self._journal += events
         self._publisher.send_statuses(now=now)
 
@@ -260,6 +281,8 @@ class Engine:
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
         self._commands.apply(settings)
+        self._plans.apply(settings)
+        self._reports.apply(settings)
 
     def _shut_down(self, *, now: float) -> None:
         self._submissions.close()

@@ -24,6 +24,7 @@ from mav_tasks.tasks.goal import (
     Move,
     Place,
     Rotate,
+    SingleGoal,
     Wait,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -78,7 +79,7 @@ def wish_of(
     """
     if command.frame is not None and command.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
-    goal = _GOALS[command.command](command, driving)
+    goal = goal_of(command, driving)
     if command.command not in OURS:
         _refuse_infinite(command)
         return Wish(goal, Terms(priority=priority), marks_of(command, packet))
@@ -88,6 +89,11 @@ def wish_of(
     named = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
     start_at = now + delay if delay > 0 else None
     return Wish(goal, Terms(priority=named, after=after, start_at=start_at), marks)
+
+
+def goal_of(command: Command, driving: Driving) -> SingleGoal:
+    """Give the goal of a command that becomes a task; Rejection names a bad parameter."""
+    return _GOALS[command.command](command, driving)
 
 
 def becomes_task(number: int) -> bool:
@@ -115,6 +121,11 @@ def _digest(data: bytes) -> str:
 # numbers
 
 
+def bad(words: str, *, param: int) -> Rejection:
+    """Give the refusal of a parameter, 1 to 7."""
+    return Rejection(R.BAD_PARAMETER, words, param=param)
+
+
 def number(
     command: Command,
     index: int,
@@ -131,9 +142,9 @@ def number(
     label = f"param{index} {name}"
     if not isnan(value):
         words = f"{label} {value:.8g} not in {low:.8g}..{high:.8g}"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise bad(words, param=index)
     if default is None:
-        raise Rejection(R.BAD_PARAMETER, f"{label} is not given")
+        raise bad(f"{label} is not given", param=index)
     return default
 
 
@@ -148,7 +159,7 @@ def whole(
     value = number(command, index, name, low=low, high=high, default=fallback)
     if value != int(value):
         words = f"param{index} {name} {value:.8g} is not a whole number"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise bad(words, param=index)
     return int(value)
 
 
@@ -173,22 +184,22 @@ def place_in(command: Command) -> Place | None:
     if command.frame not in GLOBAL_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is not supported here")
     if abs(x) > 90e7:
-        raise Rejection(R.BAD_PARAMETER, f"x latitude {x / 1e7:.7f} not in -90..90")
+        raise bad(f"x latitude {x / 1e7:.7f} not in -90..90", param=5)
     if abs(y) > 180e7:
-        raise Rejection(R.BAD_PARAMETER, f"y longitude {y / 1e7:.7f} not in -180..180")
+        raise bad(f"y longitude {y / 1e7:.7f} not in -180..180", param=6)
     return _global(int(x), int(y))
 
 
 def _global(latitude_degE7: int, longitude_degE7: int) -> GlobalPlace:
     if latitude_degE7 == longitude_degE7 == 0:  # what an unset place looks like
-        raise Rejection(R.BAD_PARAMETER, "latitude and longitude are 0: no place is given")
+        raise bad("latitude and longitude are 0: no place is given", param=5)
     return GlobalPlace(latitude_degE7, longitude_degE7)
 
 
 def _place(command: Command) -> Place:
     place = place_in(command)
     if place is None:
-        raise Rejection(R.BAD_PARAMETER, "param5 latitude, param6 longitude: not given")
+        raise bad("param5 latitude, param6 longitude: not given", param=5)
     return place
 
 
@@ -226,35 +237,35 @@ def _rate_or_default(command: Command, index: int, driving: Driving) -> float | 
 # goals
 
 
-def _move(command: Command, driving: Driving) -> Goal:
+def _move(command: Command, driving: Driving) -> SingleGoal:
     longest = driving.max_distance
     distance = number(command, 1, "distance", low=-longest, high=longest)
     speed = _speed_or_default(command, 2, driving)
     _refuse_reserved(command, 3)
     if distance == 0.0:
-        raise Rejection(R.BAD_PARAMETER, "param1 distance is 0: nothing to do")
+        raise bad("param1 distance is 0: nothing to do", param=1)
     return Move(distance, speed)
 
 
-def _rotate(command: Command, driving: Driving) -> Goal:
+def _rotate(command: Command, driving: Driving) -> SingleGoal:
     turn = degrees(driving.max_turn)
     angle = number(command, 1, "angle", low=-turn, high=turn)
     rate = _rate_or_default(command, 2, driving)
     _refuse_reserved(command, 3)
     if angle == 0.0:
-        raise Rejection(R.BAD_PARAMETER, "param1 angle is 0: nothing to do")
+        raise bad("param1 angle is 0: nothing to do", param=1)
     return Rotate(radians(angle), rate)
 
 
-def _drive(command: Command, driving: Driving) -> Goal:
+def _drive(command: Command, driving: Driving) -> SingleGoal:
     top, fastest = driving.max_speed, degrees(driving.max_turn_rate)
     forward = number(command, 1, "forward speed", low=-top, high=top, default=0.0)
     rate = number(command, 2, "yaw rate", low=-fastest, high=fastest, default=0.0)
     duration = number(command, 3, "duration", low=0.0, high=driving.max_duration)
     if duration == 0.0:
-        raise Rejection(R.BAD_PARAMETER, "param3 duration is 0: nothing to do")
+        raise bad("param3 duration is 0: nothing to do", param=3)
     if forward == rate == 0.0:
-        raise Rejection(R.BAD_PARAMETER, "param1 speed and param2 rate are 0: nothing to do")
+        raise bad("param1 speed and param2 rate are 0: nothing to do", param=1)
     return Drive(forward, radians(rate), duration)
 
 
@@ -262,16 +273,16 @@ def _refuse_infinite(command: Command) -> None:
     """Also in what is not used: it cannot be meant."""
     for index, value in enumerate(command.params, 1):
         if isinf(value):
-            raise Rejection(R.BAD_PARAMETER, f"param{index} is infinite")
+            raise bad(f"param{index} is infinite", param=index)
 
 
 def _refuse_reserved(command: Command, index: int) -> None:
     """What may come to mean something is refused until it does, never left out in silence."""
     if not (isnan(command.params[index - 1]) or command.params[index - 1] == 0.0):
-        raise Rejection(R.BAD_PARAMETER, f"param{index} (unused): must be 0 in this version")
+        raise bad(f"param{index} (unused): must be 0 in this version", param=index)
 
 
-def _waypoint(command: Command, _driving: Driving) -> Goal:
+def _waypoint(command: Command, _driving: Driving) -> SingleGoal:
     hold = number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0)
     radius = number(command, 2, "acceptance radius", low=0.0, high=1000.0, default=0.0)
     yaw = _yaw(command, 4, turn=360.0)  # degrees; DO_REPOSITION's is in radians
@@ -283,44 +294,44 @@ def reposition_flags(command: Command) -> int:
     return whole(command, 2, "flags", high=MAX_FLAGS)
 
 
-def _reposition(command: Command, driving: Driving) -> Goal:
+def _reposition(command: Command, driving: Driving) -> SingleGoal:
     speed = _speed(command, 1, driving)
     radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
     yaw = _yaw(command, 4, turn=tau)
     if yaw is not None and reposition_flags(command) & RELATIVE_YAW:
-        raise Rejection(R.BAD_PARAMETER, "param2 relative yaw: not supported, give it from north")
+        raise bad("param2 relative yaw: not supported, give it from north", param=2)
     return GoTo(_place(command), speed, max(radius, 0.0) or None, yaw)
 
 
-def _loiter_time(command: Command, _driving: Driving) -> Goal:
+def _loiter_time(command: Command, _driving: Driving) -> SingleGoal:
     seconds = number(command, 1, "time", low=0.0, high=MAX_WAIT)
     here = tuple(command.params[4:6]) == (0.0, 0.0) or place_in(command) is None
     return Wait(seconds) if here else GoTo(_place(command), wait=seconds)
 
 
-def _return(_command: Command, _driving: Driving) -> Goal:
+def _return(_command: Command, _driving: Driving) -> SingleGoal:
     return GoTo(None)
 
 
-def _delay(command: Command, _driving: Driving) -> Goal:
+def _delay(command: Command, _driving: Driving) -> SingleGoal:
     if command.params[0] == -1.0:
         words = "param1 -1: a time of day is not supported, see START_UTC"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise bad(words, param=1)
     return Wait(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
 
 
-def _condition_yaw(command: Command, driving: Driving) -> Goal:
+def _condition_yaw(command: Command, driving: Driving) -> SingleGoal:
     angle = number(command, 1, "angle", low=-360.0, high=360.0)
     rate = _rate_or_default(command, 2, driving)
     direction = whole(command, 3, "direction", low=-1, high=1)
     if not flag(command, 4, "relative"):
         return Face(radians(angle), direction, rate)
     if angle == 0.0:
-        raise Rejection(R.BAD_PARAMETER, "param1 angle is 0: nothing to do")
+        raise bad("param1 angle is 0: nothing to do", param=1)
     return Rotate(radians(angle if direction >= 0 else -angle), rate)
 
 
-def _set_yaw_speed(command: Command, driving: Driving) -> Goal:
+def _set_yaw_speed(command: Command, driving: Driving) -> SingleGoal:
     angle = number(command, 1, "angle", low=-360.0, high=360.0)
     top = driving.max_speed
     speed = number(command, 2, "speed", low=-top, high=top)
@@ -328,7 +339,7 @@ def _set_yaw_speed(command: Command, driving: Driving) -> Goal:
 
 
 OURS = frozenset({MavCmd.TASK_MOVE, MavCmd.TASK_ROTATE, MavCmd.TASK_DRIVE})
-_GOALS: dict[int, Callable[[Command, Driving], Goal]] = {
+_GOALS: dict[int, Callable[[Command, Driving], SingleGoal]] = {
     MavCmd.TASK_MOVE: _move,
     MavCmd.TASK_ROTATE: _rotate,
     MavCmd.TASK_DRIVE: _drive,

@@ -3,7 +3,7 @@
 from functools import partial
 
 from mav_tasks.engine.asked import Asked
-from mav_tasks.engine.commit_gate import CommitGate
+from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import CHANGE_MODE, reposition_flags, wish_of
 from mav_tasks.engine.vehicle import Vehicle
@@ -83,7 +83,7 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
-        self._check_open()
+        self.check_open()
         if self._is_for_now(asked):
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
         else:
@@ -98,7 +98,7 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
-        self._check_open()
+        self.check_open()
         task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
         self._await_commit(asked, task, now=now)
 
@@ -106,9 +106,43 @@ class Submissions:
         """The same for what no acknowledgement is expected of."""
         known = self._recollection.known(draft, confirmation=0, origin=vehicle.origin, now=now)
         if known is None:
-            self._check_open()
+            self.check_open()
             task = vehicle.run_now(draft, actor=actor, now=now)
             self._recollection.remember(task, at=now, now=now)
+
+    def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
+        """Take in a task that a command means without naming it; Rejection says why not."""
+        self.check_open()
+        task = asked.vehicle.tasks.submit(draft, now=now)
+        self._await_commit(asked, task, now=now)
+        return task
+
+    def known_plan(self, draft: Draft, *, now: float) -> TaskId | None:
+        """Give the task that a plan is already, uploaded a moment ago: its ack may be lost."""
+        known = self._recollection.known(draft, confirmation=1, origin=None, now=now)
+        return None if known is None else known.task_id
+
+    def submit_plan(self, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
+        """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
+        self.check_open()
+        task = vehicle.tasks.submit(draft, now=now)
+        self._recollection.remember(task, at=now, now=now)
+        return task
+
+    def when_durable(self, release: Effect, give_up: Effect, *, now: float) -> None:
+        """Call ``release`` when all that is recorded by now is durable, or ``give_up``."""
+        give_up_at = now + self._settings.watch.commit
+        self._gate.hold(
+            self._book.recorded, give_up_at=give_up_at, release=release, give_up=give_up
+        )
+
+    def take_back(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
+        """A submission was not stored in time: it is none."""
+        self._recollection.forget(task)
+        self._store_is_away = True
+        current = self._book.get(task.id)
+        if current is not None and vehicle.tasks.waits(current):
+            vehicle.tasks.withdraw(current, now=now)
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
         """A client wants a vehicle to stand: what it asks for next is another wish."""
@@ -131,7 +165,8 @@ class Submissions:
             words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
             raise Rejection(R.BAD_PARAMETER, words)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raise Rejection while nothing new is taken in."""
         if self._is_closing:
             raise Rejection(R.RATE_LIMITED, "the server is shutting down")
         if self._store_is_away:
@@ -150,11 +185,8 @@ class Submissions:
     def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
         self._recollection.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
-        self._gate.hold(
-            self._book.recorded,
-            give_up_at=now + self._settings.watch.commit,
-            release=partial(self._accept, asked, task),
-            give_up=partial(self._withdraw, asked, task),
+        self.when_durable(
+            partial(self._accept, asked, task), partial(self._withdraw, asked, task), now=now
         )
 
     def _accept(self, asked: Asked, task: Task, *, now: float) -> None:
@@ -167,12 +199,8 @@ class Submissions:
 
     def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:
         askers = self._undecided.pop(task.id)
-        self._recollection.forget(task)
-        self._store_is_away = True
         was_for_now = asked.vehicle.tasks.urgent == task.id
-        current = self._book.get(task.id)
-        if current is not None and asked.vehicle.tasks.waits(current):
-            asked.vehicle.tasks.withdraw(current, now=now)
+        self.take_back(asked.vehicle, task, now=now)
         words = "not stored in time: not accepted"
         if was_for_now:
             words += "; tasks are paused"

@@ -289,6 +289,10 @@ class Vehicle:
             packet, message, origin, component=target, command=command, urgent=disarms, now=now
         )
 
+    def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
+        """Have the vehicle carry out what an item of a plan orders."""
+        self.requests.perform(command, now=now)
+
     def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
         """Note that a client's mode request goes to the vehicle through us.
 

@@ -92,6 +92,11 @@ class VehicleRequests:
         )
         self.flush(now=now)
 
+    def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
+        """Send a command that a plan orders, repeated until it is answered or given up."""
+        self._sender.request(command, now=now, give_up_after=self._watch.ask_vehicle)
+        self.flush(now=now)
+
     def send_zero(self) -> None:
         """Send one zero setpoint, whoever the vehicle follows."""
         self._outlet.send(self.control.zero_setpoint(), self._source)

@@ -19,11 +19,14 @@ class MavCmd(IntEnum):
     """MAV_CMD, as far as the server, its files or the simulated rover tell one from another."""
 
     NAV_WAYPOINT = 16
+    NAV_LOITER_UNLIM = 17
     NAV_LOITER_TIME = 19
     NAV_RETURN_TO_LAUNCH = 20
     NAV_LAND = 21
     NAV_TAKEOFF = 22
     NAV_DELAY = 93
+    CONDITION_DELAY = 112
+    CONDITION_DISTANCE = 114
     CONDITION_YAW = 115
     DO_SET_MODE = 176
     DO_JUMP = 177
@@ -32,6 +35,7 @@ class MavCmd(IntEnum):
     DO_REPOSITION = 192
     DO_PAUSE_CONTINUE = 193
     DO_MOTOR_TEST = 209
+    DO_SET_MISSION_CURRENT = 224
     NAV_SET_YAW_SPEED = 213
     PREFLIGHT_REBOOT_SHUTDOWN = 246
     MISSION_START = 300
@@ -151,6 +155,15 @@ class MavMissionResult(IntEnum):
     INVALID_SEQUENCE = 13
     DENIED = 14
     OPERATION_CANCELLED = 15
+
+
+class MavMissionType(IntEnum):
+    """MAV_MISSION_TYPE."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+    ALL = 255
 
 
 class MavLandedState(IntEnum):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult
-from mav_tasks.mavlink.messages import CommandAck, CommandLong, Message
+from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.retry import Retry
 
@@ -74,7 +74,12 @@ class CommandSender:
         return f"CommandSender(in_flight={flying})"
 
     def request(
-        self, message: CommandLong, *, now: float, give_up_after: float, urgent: bool = False
+        self,
+        message: CommandLong | CommandInt,
+        *,
+        now: float,
+        give_up_after: float,
+        urgent: bool = False,
     ) -> None:
         """Send a command of our own, repeated until it is answered or given up."""
         retry = Retry.starting(now=now, interval=REPEAT, give_up_after=give_up_after)

@@ -6,7 +6,7 @@ next upload. What an item is worth says ``check``; a plan counts only when it is
 ``finish`` was called, which is when it is acknowledged.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -21,8 +21,8 @@ QUIET = 0.3  # s after an upload was broken off, in which its last items may sti
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
 CAPACITY = 10_000  # items of one plan
 
-#: mission type, number, item, those before it, count -> why not, or None
-Check = Callable[[int, int, Item, Sequence[Item], int], MavMissionResult | None]
+#: mission type, number, item, count -> why not, or None
+Check = Callable[[int, int, Item, int], MavMissionResult | None]
 
 
 class Sender(NamedTuple):
@@ -131,9 +131,7 @@ class MissionReceiver:
         item = item_of(message)
         refusal: MavMissionResult | None = MavMissionResult.INVALID_PARAM5_X
         if item is not None:
-            refusal = self._check(
-                session.mission_type, message.seq, item, session.items, session.count
-            )
+            refusal = self._check(session.mission_type, message.seq, item, session.count)
         if refusal is not None or item is None:
             self._end(refusal or MavMissionResult.ERROR, item, now=now)
             return True

@@ -18,7 +18,9 @@ class Persona:
     hold_mode: int  # custom_mode in which the vehicle stands
     manual_mode: int
     return_mode: int  # drives back to where it was armed
+    mission_mode: int  # drives the uploaded mission
     booting_mode: int  # left without anybody's doing
+    has_home_item: bool  # the first item of a mission is home
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
     mode_names: Mapping[int, str]
@@ -36,7 +38,9 @@ ARDUPILOT = Persona(
     hold_mode=4,
     manual_mode=0,
     return_mode=11,  # RTL
+    mission_mode=10,  # AUTO
     booting_mode=16,  # INITIALISING
+    has_home_item=True,
     setpoint_mask=int(
         T.X_IGNORE
         | T.Y_IGNORE

@@ -6,6 +6,7 @@ from typing import Any
 from mav_tasks.store.codec import Encoder, dumps
 from mav_tasks.tasks.events import (
     Event,
+    PlanStored,
     QueueContinued,
     QueuePaused,
     TaskAdvanced,
@@ -43,6 +44,7 @@ class Batch:
         self.modified: dict[int, tuple[Any, ...]] = {}  # modified, id
         self.advanced: dict[int, tuple[Any, ...]] = {}  # advanced, id
         self.withdrawn: list[tuple[int]] = []
+        self.plans: dict[tuple[int, int], tuple[Any, ...]] = {}  # vehicle, kind, plan_id, source
         self.vehicles: dict[tuple[str, int], Any] = {}  # column and vehicle -> value
         for number, event in enumerate(events, first):
             row = encoder.row(event, offset=offset)
@@ -79,5 +81,8 @@ class Batch:
                 self.vehicles["paused", event.vehicle] = None
             case VehicleIdentified():
                 self.vehicles["uid", event.vehicle] = event.uid
+            case PlanStored():
+                row = (event.vehicle, event.kind, event.plan_id, event.source)
+                self.plans[event.vehicle, event.kind] = row
             case VehicleSpeedSet():
                 self.vehicles["speed", event.vehicle] = event.speed

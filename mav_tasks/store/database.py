@@ -94,6 +94,10 @@ class Database:
                 connection.executemany(
                     "UPDATE tasks SET advanced = ? WHERE id = ?", batch.advanced.values()
                 )
+            if batch.plans:
+                connection.executemany(
+                    "INSERT OR REPLACE INTO plans VALUES (?, ?, ?, ?)", batch.plans.values()
+                )
             if batch.withdrawn:
                 self._withdraw(batch.withdrawn)
             for (column, vehicle), value in batch.vehicles.items():

@@ -38,6 +38,12 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "CREATE TABLE vehicles (vehicle INTEGER PRIMARY KEY, paused INTEGER, uid TEXT, speed REAL)",
     ),
     ("ALTER TABLE tasks ADD COLUMN advanced TEXT",),  # the last leg that was begun
+    (
+        (
+            "CREATE TABLE plans (vehicle INTEGER NOT NULL, kind INTEGER NOT NULL,"
+            " plan_id INTEGER NOT NULL, source TEXT NOT NULL, PRIMARY KEY (vehicle, kind))"
+        ),
+    ),
 )
 
 

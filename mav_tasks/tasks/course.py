@@ -16,11 +16,20 @@ MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end 
 class Course:
     """One goal on its way; ``progress`` is all that there is to resume it."""
 
-    def __init__(self, goal: SingleGoal, progress: Progress, *, passing: float = 0.0) -> None:
+    def __init__(
+        self,
+        goal: SingleGoal,
+        progress: Progress,
+        *,
+        passing: float = 0.0,
+        within: float = 0.0,
+    ) -> None:
         self.goal = goal
         self.progress = progress
         #: m/s, of a way that goes on at its end to another place
         self.passing = passing
+        #: m from that end, where it does
+        self.within = within
 
     def __repr__(self) -> str:
         return f"Course({self.goal}, {self.progress})"
@@ -46,12 +55,8 @@ class Course:
         return (
             self.is_passing
             and target is not None
-            and (distance(motion.pose, target) <= self._radius)
+            and (distance(motion.pose, target) <= self.within)
         )
-
-    @property
-    def _radius(self) -> float:
-        return (isinstance(self.goal, GoTo) and self.goal.radius) or 0.0
 
     def look(self, motion: Motion, *, elapsed: float) -> None:
         """Take in where the vehicle is, ``elapsed`` seconds after the last look."""
@@ -67,8 +72,8 @@ class Course:
         remaining = self.remaining
         if self.is_passing:
             return False
-        if self._radius and self.progress.leg == WAY:
-            return abs(remaining) <= self._radius
+        if isinstance(self.goal, GoTo) and self.goal.radius and self.progress.leg == WAY:
+            return abs(remaining) <= self.goal.radius
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
@@ -93,7 +98,7 @@ class Course:
             return ZERO
         remaining = self.remaining
         if self.is_passing and remaining > 0:
-            remaining = max(remaining - self._radius, 0.0)
+            remaining = max(remaining - self.within, 0.0)
         return guidance.steer(
             leg,
             anchor,

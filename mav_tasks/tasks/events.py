@@ -78,6 +78,26 @@ class StepReached:
 
 
 @dataclass(frozen=True, slots=True)
+class PlanStored:
+    """A vehicle has another mission (``kind`` 0), fence (1) or rally points (2).
+
+    ``plan_id`` names it to clients: a mission's is the id of the task that is made of it; 0 and no
+    ``source``: it has none any more. ``source`` is the items as they came.
+    """
+
+    vehicle: int
+    kind: int
+    plan_id: int
+    source: str
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        what = ("mission", "fence", "rally points")[self.kind]
+        return f"vehicle {self.vehicle}: {what} {self.plan_id or 'cleared'}, by {self.actor}"
+
+
+@dataclass(frozen=True, slots=True)
 class TaskModified:
     """The terms of a task were changed."""
 
@@ -231,6 +251,7 @@ Event = (
     | TaskChanged
     | TaskAdvanced
     | StepReached
+    | PlanStored
     | TaskModified
     | TaskWaits
     | TaskWithdrawn

@@ -50,25 +50,26 @@ def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -
 def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Driving) -> Course:
     """Give the course of the present stage, which may lead on to the next place."""
     single = present_goal(goal, progress)
-    passing = 0.0
-    if isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes:
-        passing = _speed_past(goal, single, progress, seen, driving=driving)
-    return Course(single, progress, passing=passing)
+    if not (isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes):
+        return Course(single, progress)
+    within = single.radius or driving.acceptance_radius
+    passing = _speed_past(goal, within, progress, seen, driving=driving)
+    return Course(single, progress, passing=passing, within=within)
 
 
 def _speed_past(
-    plan: Plan, goal: GoTo, progress: Progress, seen: VehicleView, *, driving: Driving
+    plan: Plan, within: float, progress: Progress, seen: VehicleView, *, driving: Driving
 ) -> float:
     following = goes_on_to_a_place(plan, progress)
     after = None if following is None else place_of(following, seen)
     target, anchor = progress.target, progress.anchor
-    if after is None or target is None or anchor is None or not goal.radius:
+    if after is None or target is None or anchor is None:
         return 0.0
     here = Pose(target.north, target.east, bearing(anchor, target))
-    if distance(here, after) <= goal.radius:
+    if distance(here, after) <= within:
         return 0.0
     turn = _off(here, bearing(here, after))
-    return min(driving.max_speed, corner_speed(turn, lead=goal.radius))
+    return min(driving.max_speed, corner_speed(turn, lead=within))
 
 
 def _off(pose: Pose, yaw: float) -> float:

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 os.environ.setdefault("MAVLINK20", "1")
 
@@ -132,6 +132,14 @@ class _Stream:
     next_at: float
 
 
+class Role(Protocol):
+    """A longer conversation that a client has, such as an upload."""
+
+    def next_deadline(self) -> float | None: ...
+    def turn(self, *, now: float) -> None: ...
+    def take(self, packet: Received, *, now: float) -> None: ...
+
+
 @dataclass
 class FakeClient:
     """One ground station or script, with its own endpoint name."""
@@ -152,6 +160,7 @@ class FakeClient:
         self._under_way: list[Sent] = []
         self._streams: list[_Stream] = []
         self.acks: list[Message] = []
+        self.roles: list[Role] = []
 
     # what it sends
 
@@ -293,6 +302,7 @@ class FakeClient:
             for sent in self._under_way
             if sent.times_sent < len(sent.repeats)
         ]
+        due += [at for role in self.roles if (at := role.next_deadline()) is not None]
         return min(due, default=None)
 
     def turn(self, *, now: float) -> None:
@@ -301,6 +311,10 @@ class FakeClient:
             self.received.append(packet)
             if packet.message_id == ACK:
                 self._take_ack(self.decoded(packet), now)
+            for role in list(self.roles):
+                role.take(packet, now=now)
+        for role in list(self.roles):
+            role.turn(now=now)
         if self.heartbeats and now >= self._next_heartbeat:
             self._next_heartbeat = now + 1.0
             self.send(heartbeat())

@@ -72,6 +72,7 @@ def test_every_setting_is_known_by_name() -> None:
             "turn_acceleration",
             "arrival_distance",
             "arrival_angle",
+            "acceptance_radius",
         ],
         "Identity": ["system_id", "component_id"],
         "Queueing": ["capacity", "quota", "aging", "preemption_gap", "preemption_rest"],

@@ -13,6 +13,7 @@ from mav_tasks.store.schema import APPLICATION_ID, MIGRATIONS, migrate
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
+    PlanStored,
     QueueContinued,
     QueuePaused,
     ServerStopped,
@@ -131,6 +132,9 @@ def test_what_is_known_of_vehicles_comes_back(path: Path) -> None:
         VehicleSpeedSet(1, 0.75, "client", 2.0),
         VehicleSpeedSet(2, 0.5, "client", 2.0),
         VehicleSpeedSet(2, None, "client", 3.0),
+        PlanStored(1, 0, 17, "items", "client", 3.0),
+        PlanStored(2, 1, 5, "fence", "client", 3.0),
+        PlanStored(2, 1, 0, "", "client", 4.0),
     ]
     with opened(path) as store:
         for event in events:
@@ -138,6 +142,7 @@ def test_what_is_known_of_vehicles_comes_back(path: Path) -> None:
         wait_for(store, len(events))
         found = store.load()
         assert (found.paused, found.uids, found.speeds) == ({1: R.STOPPED}, {1: "uid-1"}, {1: 0.75})
+        assert found.plans == {(1, 0): (17, "items")}
 
 
 def test_times_are_those_of_the_process_that_loads(path: Path) -> None:

@@ -30,7 +30,7 @@ RADIUS = 0.5
 
 
 def to(north: float, east: float = 0.0, *, passes: bool = True, wait: float = 0.0) -> GoTo:
-    return GoTo(LocalPlace(north, east), radius=RADIUS, passes=passes, wait=wait)
+    return GoTo(LocalPlace(north, east), passes=passes, wait=wait)
 
 
 class Drive:

@@ -1,0 +1,299 @@
+"""Plans: uploaded, looked at, started, driven, cleared."""
+
+from math import nan
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import ACCEPTED, AUTO, DENIED, HOLD, TEMPORARILY_REJECTED, set_mode
+from tests.kit.mission import Download, Item, Upload, acks, currents, reached
+from tests.kit.world import World, at, is_at, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+WAYPOINT, DELAY, SPEED, JUMP, SERVO, TAKEOFF, LAND, OPTIONS = 16, 93, 178, 177, 183, 22, 21, 54014
+START, SET_CURRENT, MOVE = 300, 224, 54000
+HOME = Item(WAYPOINT, frame=0, current=1)
+NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
+
+
+def place(north: float, east: float, *, hold: float = 0.0, radius: float = 0.0) -> Item:
+    return Item(WAYPOINT, **at(north, east), param1=hold, param2=radius)
+
+
+PLAN = (HOME, place(1.5, 0), place(1.5, 1.5), place(0, 1.5, hold=0.5))
+
+
+def uploaded(world: World, *items: Item, target: tuple[int, int] = (1, 1)) -> Upload:
+    upload = Upload(world.client, items or PLAN, target=target)
+    world.until(lambda: upload.result is not None, within=5)
+    return upload
+
+
+def set_current(seq: int) -> common.MAVLink_message:
+    return common.MAVLink_mission_set_current_message(1, 1, seq)
+
+
+def clear_all(kind: int = 0) -> common.MAVLink_message:
+    return common.MAVLink_mission_clear_all_message(1, 1, kind)
+
+
+def start(world: World) -> tuple[int, int] | None:
+    sent = world.client.command(START, target=(1, 1))
+    world.run(0.2)
+    return sent.answer
+
+
+def test_a_plan_waits_until_it_is_started_and_is_driven(world: World) -> None:
+    upload = uploaded(world)
+    assert (upload.result, upload.opaque_id, upload.requests) == (0, 1, [0, 1, 2, 3])
+    world.run(3)
+    world.client.request_status(1)
+    world.run(0.1)
+    status = world.client.statuses(1)[-1]
+    assert (status.state, status.reason) == (S.BLOCKED, R.WAITING_FOR_START)
+    assert start(world) == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [1, 2, 3]
+    assert is_at(world, 0.0, 1.5)
+    last = currents(world.client)[-1]
+    assert (last.seq, last.total, last.state, last.mission_id) == (3, 4, COMPLETE, 1)
+
+
+def test_at_the_task_server_it_is_queued_at_once_and_so_is_the_next(world: World) -> None:
+    first = uploaded(world, place(1, 0), place(1, 1), target=(1, 191))
+    second = uploaded(world, place(0, 0), target=(1, 191))
+    assert (first.opaque_id, second.opaque_id) == (1, 2)
+    world.until_state(2, S.COMPLETED, within=60)
+    assert world.state(1)[0] is S.COMPLETED
+    assert is_at(world, 0.0, 0.0)
+
+
+def test_the_same_plan_again_a_moment_later_is_the_same_task(world: World) -> None:
+    plan = (place(1, 0), place(1, 1))
+    first = uploaded(world, *plan, target=(1, 191))
+    world.run(2)
+    again = uploaded(world, *plan, target=(1, 191))
+    assert (again.result, again.opaque_id) == (0, first.opaque_id)
+    assert len(world.tasks()) == 1
+
+
+def test_it_comes_back_as_it_was(world: World) -> None:
+    plan = (HOME, *PLAN[1:], Item(SPEED, param1=1, param2=0.7, param3=-1, frame=2, z=nan))
+    upload = uploaded(world, *plan)
+    download = Download(world.client)
+    world.until(lambda: download.is_done, within=5)
+    assert (download.count, download.opaque_id) == (5, upload.opaque_id)
+    for seq, (item, message) in enumerate(zip(plan, download.items, strict=True)):
+        sent = item.message(seq, 0, (255, 190))
+        mav = common.MAVLink(None, 1, 1)
+        assert message.pack(mav)[10:] == sent.pack(mav)[10:]
+
+
+@pytest.mark.parametrize(
+    ("bad", "result"),
+    [
+        (Item(LAND, **at(1, 1)), 3),
+        (Item(WAYPOINT, x=910000000, y=5), 10),
+        (Item(WAYPOINT, x=470000000, y=1810000000), 11),
+        (Item(WAYPOINT, **at(1, 0), param1=-1.0), 6),
+        (Item(WAYPOINT, **at(1, 0), param2=2000.0), 7),
+        (Item(WAYPOINT, **at(1, 0), frame=9), 2),
+        (Item(JUMP, param1=9, param2=1, frame=2), 6),
+        (Item(54003, frame=2), 3),
+        (Item(SPEED, param1=1, param2=-7.0, frame=2), 7),
+    ],
+)
+def test_a_bad_item_is_refused_as_it_comes(world: World, bad: Item, result: int) -> None:
+    upload = uploaded(world, *PLAN[:2], bad, *PLAN[2:])
+    assert upload.result == result
+    assert upload.requests[-1] == 2
+    world.run(0.2)
+    assert world.client.texts(), "and it is said why"
+    assert world.tasks() == ()
+
+
+def test_a_loop_in_which_nothing_is_driven_is_refused(world: World) -> None:
+    speed = Item(SPEED, param1=1, param2=0.5, frame=2)
+    jump = Item(JUMP, param1=2, param2=3, frame=2)
+    upload = uploaded(world, *PLAN[:2], speed, jump)
+    assert upload.result == 5
+    assert world.tasks() == ()
+
+
+def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
+    uploaded(world)
+    uploaded(world, HOME, Item(LAND))
+    download = Download(world.client)
+    world.until(lambda: download.is_done, within=5)
+    assert (download.count, download.opaque_id) == (4, 1)
+    assert world.state(1)[0] is S.BLOCKED
+
+
+def test_another_plan_replaces_the_one_that_waits(world: World) -> None:
+    uploaded(world)
+    second = uploaded(world, HOME, place(0.5, 0, hold=0.1))
+    world.run(0.2)
+    assert world.state(1) == (S.CANCELLED, R.REPLACED)
+    assert start(world) == (ACCEPTED, second.opaque_id)
+    world.until_state(2, S.COMPLETED)
+
+
+def test_another_plan_does_not_disturb_the_one_that_is_driven(world: World) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.EXECUTING)
+    second = uploaded(world, HOME, place(0.5, 0, hold=0.1))
+    world.until_state(1, S.COMPLETED, within=60)
+    assert world.state(second.opaque_id)[0] is S.BLOCKED
+
+
+def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) -> None:
+    uploaded(world, HOME, place(0.3, 0, hold=0.1))
+    world.client.mode(AUTO)
+    world.run(0.1)
+    assert start(world) == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED)
+    world.run(3)
+    assert start(world) == (ACCEPTED, 2)
+    world.until_state(2, S.COMPLETED)
+    assert currents(world.client)[-1].mission_id == 2
+
+
+@pytest.mark.parametrize("how", ["command", "message"])
+def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
+    uploaded(world)
+    start(world)
+    world.until(lambda: 1 in reached(world.client), within=20)
+    world.client.mode(HOLD)
+    world.run(3)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+    assert currents(world.client)[-1].state == PAUSED
+    if how == "command":
+        sent = world.client.mode(AUTO)
+        world.run(0.2)
+        assert sent.answer == (ACCEPTED, 1)
+    else:
+        world.client.send(set_mode(AUTO))
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [1, 2, 3]
+
+
+@pytest.mark.parametrize("what", ["STOP", "takeover"])
+def test_after_a_stop_or_a_takeover_a_start_is_refused(world: World, what: str) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.EXECUTING)
+    if what == "STOP":
+        world.client.stop()
+    else:
+        world.operator_arm(False)
+    world.run(3)
+    answer = start(world)
+    assert answer == (TEMPORARILY_REJECTED, R.QUEUE_PAUSED)
+
+
+def test_a_start_without_a_plan_is_refused(world: World) -> None:
+    assert start(world) == (DENIED, R.NOT_FOUND)
+
+
+def test_it_can_be_started_and_gone_on_with_at_any_item(world: World) -> None:
+    uploaded(world)
+    world.client.command(START, 3, target=(1, 1))
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [3]
+
+
+@pytest.mark.parametrize("how", ["command", "message"])
+def test_another_item_is_gone_on_with(world: World, how: str) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.EXECUTING)
+    if how == "command":
+        sent = world.client.command(SET_CURRENT, 3, target=(1, 1))
+        world.run(0.1)
+        assert sent.answer == (ACCEPTED, 1)
+    else:
+        before = len(currents(world.client))
+        world.client.send(set_current(3))
+        world.run(0.05)
+        assert currents(world.client)[before].seq == 3
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [3]
+
+
+def test_an_item_that_is_not_there_is_answered_all_the_same(world: World) -> None:
+    uploaded(world)
+    before = len(currents(world.client))
+    world.client.send(set_current(77))
+    world.run(0.05)
+    assert currents(world.client)[before].seq == 77
+    assert any("item 77" in text for text in world.client.texts())
+
+
+def test_clearing_takes_away_what_waits_and_not_what_is_driven(world: World) -> None:
+    uploaded(world)
+    world.client.send(clear_all())
+    world.run(0.2)
+    assert acks(world.client)[-1].result == 0
+    assert world.state(1) == (S.CANCELLED, R.CLEARED)
+    assert start(world) == (DENIED, R.NOT_FOUND)
+    uploaded(world)
+    start(world)
+    world.until_state(2, S.EXECUTING)
+    world.client.send(clear_all())
+    world.run(0.2)
+    assert acks(world.client)[-1].result == 14
+    world.until_state(2, S.COMPLETED, within=60)
+
+
+def test_a_second_client_is_denied_while_the_first_one_uploads(world: World) -> None:
+    other = world.add_client("other")
+    world.run(1)
+    first = Upload(world.client, PLAN)
+    second = Upload(other, (HOME, place(9, 9)))
+    world.until(lambda: first.result is not None, within=5)
+    assert (first.result, second.result) == (0, 14)
+    assert len(world.tasks()) == 1
+
+
+def test_options_are_those_of_the_whole_plan(world: World) -> None:
+    options = Item(OPTIONS, param1=9, param2=30.0, param3=60.0, param4=0, frame=2)
+    uploaded(world, options, place(0.5, 0, hold=0.1), target=(1, 191))
+    task = world.task(1)
+    assert (task.priority, task.state) == (9, S.SCHEDULED)
+    assert task.terms.deadline is not None
+
+
+def test_a_servo_is_moved_and_a_takeoff_passed_over(world: World) -> None:
+    items = (HOME, Item(TAKEOFF), place(1, 0), Item(SERVO, param1=5, param2=1500, frame=2))
+    uploaded(world, *items, place(1.5, 0, hold=0.1))
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [2, 3, 4]
+    assert world.observer.sent_since(0).count(str(SERVO)) == 1
+
+
+def test_moves_and_turns_can_be_items(world: World) -> None:
+    move = Item(MOVE, param1=1.0, param4=0, frame=2)
+    turn = Item(54001, param1=90.0, param4=0, frame=2)
+    uploaded(world, move, turn, target=(1, 191))
+    world.until_state(1, S.COMPLETED, within=60)
+    assert near_pose(world.pose(), (1.0, 0.0, 90.0), metres=0.04)
+
+
+def test_what_the_rover_says_about_missions_is_not_shown(world: World) -> None:
+    uploaded(world)
+    world.run(5)
+    assert {current.mission_id for current in currents(world.client)} <= {0, 1}
+    assert currents(world.client)[-1].total == 4
+
+
+def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(claim=False))
+    world.client.send(clear_all())
+    world.run(1)
+    assert world.tasks() == ()
+    assert acks(world.client)
