@@ -25,10 +25,11 @@ from mav_tasks.engine.inputs import (
     StoreFailed,
     WallClock,
 )
+from mav_tasks.engine.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.mission_reports import MissionReports
 from mav_tasks.engine.motion_gate import may_pass, passed
 from mav_tasks.engine.operator_watch import OperatorWatch
-from mav_tasks.engine.plans import MESSAGES, Plans
+from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
@@ -78,13 +79,10 @@ class Engine:
         if restored is not None:
             recollection.restore(restored.tasks, now=now)
         self._submissions = Submissions(self._gcs, self._book, recollection, settings)
-        self._plans = Plans(
-            self._gcs,
-            self._vehicles,
-            self._book,
-            self._submissions,
-            settings,
-            restored={} if restored is None else restored.plans,
+        stored = {} if restored is None else restored.plans
+        self._plans = Plans(self._book, settings, restored=stored)
+        self._desks = MissionDesks(
+            self._gcs, self._vehicles, self._book, self._submissions, self._plans, settings
         )
         self._reports = MissionReports(self._gcs, self._vehicles, self._book, self._plans, settings)
         displays = Displays(self._gcs, self._vehicles, self._book)
@@ -140,7 +138,7 @@ class Engine:
             self._publisher.next_deadline(),
             self._vehicles.next_deadline(),
             self._submissions.next_deadline(),
-            self._plans.next_deadline(),
+            self._desks.next_deadline(),
             self._reports.next_deadline(),
             self._fleet.room.next_deadline(),
             self._operator.next_deadline(limit=self._settings.watch.operator_lost),
@@ -154,7 +152,7 @@ class Engine:
         self._vehicles.check_late(now=now)
         self._vehicles.handle_deadline(now=now)
         self._submissions.handle_deadline(now=now)
-        self._plans.handle_deadline(now=now)
+        self._desks.handle_deadline(now=now)
         self._fleet.room.handle_deadline(now=now)
         self._watch_operator(now=now)
         self._settle(now=now)
@@ -228,7 +226,7 @@ class Engine:
             self._commands.cancel_latest(client, packet, message, now=now)
         elif isinstance(message, m.SetMode):
             self._commands.set_mode(client, packet, message, now=now)
-        elif isinstance(message, MESSAGES) and self._plans.receive(
+        elif isinstance(message, MESSAGES) and self._desks.receive(
             client, packet, message, now=now
         ):
             return
@@ -282,6 +280,7 @@ class Engine:
         self._vehicles.apply(settings)
         self._commands.apply(settings)
         self._plans.apply(settings)
+        self._desks.apply(settings)
         self._reports.apply(settings)
 
     def _shut_down(self, *, now: float) -> None:

@@ -1,0 +1,401 @@
+"""The mission protocol towards clients: uploads, downloads, clearing; and what becomes of uploads.
+
+To the autopilot's address goes one mission, which waits until it is started, as on an autopilot; to
+the task server's go as many as one likes, each queued at once. Fence and rally points are the
+vehicle's, whichever address they were sent to.
+"""
+
+from dataclasses import replace
+from functools import partial
+from hashlib import blake2b
+from zlib import crc32
+
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.motion_gate import GO_TO
+from mav_tasks.engine.plan_items import plan_of, result_of, step_of
+from mav_tasks.engine.plans import (
+    MISSION,
+    NOTHING,
+    STORED,
+    Plans,
+    Stored,
+    plan_of_task,
+    waits_for_start,
+)
+from mav_tasks.engine.submissions import Submissions
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.mission_item import Item, packed, unpacked
+from mav_tasks.services.mission_receiver import MissionReceiver, Sender, ToClient, Upload
+from mav_tasks.services.mission_sender import MissionSender
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Draft, Marks, Task, TaskId, Terms
+
+R = TaskReason
+
+#: what clients speak the mission protocol with
+MESSAGES = (
+    m.MissionCount,
+    m.MissionItem,
+    m.MissionItemInt,
+    m.MissionRequestList,
+    m.MissionRequest,
+    m.MissionRequestInt,
+    m.MissionAck,
+    m.MissionClearAll,
+    m.MissionSetCurrent,
+    m.MissionRequestPartialList,
+    m.MissionWritePartialList,
+)
+MissionMessage = (
+    m.MissionCount
+    | m.MissionItem
+    | m.MissionItemInt
+    | m.MissionRequestList
+    | m.MissionRequest
+    | m.MissionRequestInt
+    | m.MissionAck
+    | m.MissionClearAll
+    | m.MissionSetCurrent
+    | m.MissionRequestPartialList
+    | m.MissionWritePartialList
+)
+
+
+class _Desk:
+    """Uploads to, and downloads from, one address."""
+
+    def __init__(self, receiver: MissionReceiver) -> None:
+        self.receiver = receiver
+        self.sender = MissionSender()
+
+
+class MissionDesks:
+    """The ends of uploads and downloads at all addresses."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        settings: Settings,
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._plans = plans
+        self._settings = settings
+        self._desks: dict[tuple[int, int], _Desk] = {}
+        self._why = ""  # an item was refused, in words
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+
+    # the mission protocol
+
+    def receive(
+        self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
+    ) -> bool:
+        """See to a client's message; False: it is not for us."""
+        vehicle = self._vehicles.get(message.target_system)
+        if vehicle is None:
+            return False
+        component = message.target_component or AUTOPILOT
+        at_server = component == vehicle.server_component
+        if not at_server and (component != AUTOPILOT or not self._settings.claim):
+            return False
+        desk = self._desk(vehicle, component)
+        sender = Sender(client.key, packet.source, Address(vehicle.system_id, component))
+        match message:
+            case m.MissionCount():
+                desk.receiver.count(message, sender, now=now)
+            case m.MissionItem() | m.MissionItemInt():
+                if not desk.receiver.item(message, sender, now=now):
+                    return message.current not in GO_TO
+            case m.MissionAck():
+                desk.receiver.cancelled(message, sender, now=now)
+                desk.sender.end(sender, message.mission_type)
+            case m.MissionRequestList():
+                self._list(desk, vehicle, sender, message.mission_type, now=now)
+            case m.MissionRequest() | m.MissionRequestInt():
+                kind, seq = message.mission_type, message.seq
+                present = self._downloadable(vehicle, component, kind).items
+                self._send(desk.sender.request(sender, kind, seq, present, now=now))
+            case m.MissionClearAll():
+                self._clear(vehicle, sender, message.mission_type, now=now)
+            case m.MissionSetCurrent():
+                self._set_current(vehicle, client, sender, message.seq, now=now)
+            case m.MissionRequestPartialList() | m.MissionWritePartialList():
+                self._ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+        self._flush(desk, vehicle, now=now)
+        return True
+
+    def next_deadline(self) -> float | None:
+        """Give when an item is to be asked for again, or an upload given up."""
+        deadlines = [desk.receiver.next_deadline() for desk in self._desks.values()]
+        return min((d for d in deadlines if d is not None), default=None)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Ask again, and give up."""
+        for (system_id, _), desk in self._desks.items():
+            due = desk.receiver.next_deadline()
+            vehicle = self._vehicles.get(system_id) if due is not None and due <= now else None
+            if vehicle is not None:
+                desk.receiver.handle_deadline(now=now)
+                self._flush(desk, vehicle, now=now)
+
+    def _desk(self, vehicle: Vehicle, component: int) -> _Desk:
+        key = vehicle.system_id, component
+        desk = self._desks.get(key)
+        if desk is None:
+            check = partial(self._check, vehicle, component)
+            desk = self._desks[key] = _Desk(MissionReceiver(check=check))
+        return desk
+
+    def _flush(self, desk: _Desk, vehicle: Vehicle, *, now: float) -> None:
+        outgoing, uploads = desk.receiver.take()
+        for told in outgoing:
+            self._send(told)
+            if self._why and isinstance(told.message, m.MissionAck):
+                self._tell(told.sender, vehicle, self._why, now=now)
+                self._why = ""
+        for upload in uploads:
+            self._decide(desk, vehicle, upload, now=now)
+
+    def _client(self, sender: Sender) -> GcsClient | None:
+        assert isinstance(sender.key, tuple), "only receive() makes senders"
+        return self._gcs.client(sender.key)
+
+    def _send(self, told: ToClient) -> None:
+        client = self._client(told.sender)
+        if client is not None:
+            client.outlet.send(told.message, told.sender.addressed)
+
+    def _ack(self, sender: Sender, kind: int, result: MavMissionResult) -> None:
+        self._send(ToClient(sender, m.MissionAck(*sender.address, result, kind)))
+
+    def _tell(self, sender: Sender, vehicle: Vehicle, words: str, *, now: float) -> None:
+        client = self._client(sender)
+        if client is not None:
+            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+
+    def _check(
+        self,
+        vehicle: Vehicle,
+        component: int,
+        kind: int,
+        seq: int,
+        item: Item,
+        count: int,
+    ) -> MavMissionResult | None:
+        """Whether an item can be part of a plan; keeps why not in words."""
+        if kind not in STORED:
+            return MavMissionResult.UNSUPPORTED
+        if kind != MISSION:
+            return None
+        has_home = vehicle.persona.has_home_item and component == AUTOPILOT
+        driving = self._settings.driving
+        try:
+            step_of(item, seq, count=count, has_home=has_home, driving=driving)
+        except Rejection as refusal:
+            self._why = refusal.text
+            return result_of(refusal)
+        return None
+
+    def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
+        """What an address has to show: the task server, of missions, the one that is driven."""
+        begun = vehicle.tasks.begun
+        if kind == MISSION and component != AUTOPILOT and begun and isinstance(begun.goal, Plan):
+            return Stored(begun.id, unpacked(begun.goal.source))
+        return self._plans.stored(vehicle.system_id, kind)
+
+    def _list(
+        self, desk: _Desk, vehicle: Vehicle, sender: Sender, kind: int, *, now: float
+    ) -> None:
+        if kind not in STORED:
+            self._ack(sender, kind, MavMissionResult.UNSUPPORTED)
+            return
+        stored = self._downloadable(vehicle, sender.addressed.component_id, kind)
+        count = desk.sender.begin(sender, kind, stored.items, opaque_id=stored.plan_id, now=now)
+        self._send(count)
+
+    # what becomes of an upload
+
+    def _decide(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        try:
+            self._submissions.check_open()
+            if upload.mission_type != MISSION or not upload.items:
+                self._replace(desk, vehicle, upload, now=now)
+            else:
+                self._take_in(desk, vehicle, upload, now=now)
+        except Rejection as refusal:
+            self._refuse(desk, vehicle, upload.sender, refusal, now=now)
+
+    def _take_in(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        """A mission: a task that waits to be started, or is queued."""
+        sender = upload.sender
+        is_staged = sender.addressed.component_id == AUTOPILOT
+        has_home = vehicle.persona.has_home_item and is_staged
+        driving = self._settings.driving
+        wanted = plan_of(upload.items, has_home=has_home, driving=driving, now=now)
+        terms = replace(wanted.terms, is_staged=is_staged)
+        draft = self._draft(vehicle, wanted.plan, terms, sender)
+        known = None if is_staged else self._submissions.known_plan(draft, now=now)
+        if known is not None:
+            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
+            self._flush(desk, vehicle, now=now)
+            words = f"same plan again: still task {known}"
+            self._tell(sender, vehicle, words, now=now)
+            return
+        before = self._plans.stored(vehicle.system_id, MISSION)
+        task = self._submissions.submit_plan(vehicle, draft, now=now)
+        if is_staged:
+            self._plans.keep(
+                vehicle, MISSION, Stored(task.id, upload.items), actor=str(sender.address), now=now
+            )
+        self._submissions.when_durable(
+            partial(self._accept, desk, vehicle, sender, task, before),
+            partial(self._withdraw, desk, vehicle, sender, task, before),
+            now=now,
+        )
+
+    def _accept(
+        self,
+        desk: _Desk,
+        vehicle: Vehicle,
+        sender: Sender,
+        task: Task,
+        before: Stored,
+        *,
+        now: float,
+    ) -> None:
+        self._vehicles.get(vehicle.system_id)  # something may begin there
+        desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
+        self._flush(desk, vehicle, now=now)
+        replaced = self._book.get(TaskId(before.plan_id))
+        if task.terms.is_staged and replaced is not None and waits_for_start(replaced):
+            self._plans.end(vehicle, replaced, R.REPLACED, actor=str(sender.address), now=now)
+        if task.terms.is_staged:
+            self._plans.begin_at(vehicle, 0)
+        what = "ready to be started" if task.terms.is_staged else "queued"
+        words = f"Task {task.id} {what}: plan of {len(plan_of_task(task).steps)} items"
+        self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+
+    def _withdraw(
+        self,
+        desk: _Desk,
+        vehicle: Vehicle,
+        sender: Sender,
+        task: Task,
+        before: Stored,
+        *,
+        now: float,
+    ) -> None:
+        self._vehicles.get(vehicle.system_id)
+        self._submissions.take_back(vehicle, task, now=now)
+        if task.terms.is_staged:
+            self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
+        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
+        self._refuse(desk, vehicle, sender, refusal, now=now)
+
+    def _replace(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        """Fence and rally points, and the empty mission: nothing that is driven."""
+        kind, sender = upload.mission_type, upload.sender
+        if kind == MISSION:
+            self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)
+        plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
+        self._plans.keep(
+            vehicle, kind, Stored(plan_id, upload.items), actor=str(sender.address), now=now
+        )
+
+        def accept(*, now: float) -> None:
+            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
+            self._flush(desk, vehicle, now=now)
+
+        def give_up(*, now: float) -> None:
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time")
+            self._refuse(desk, vehicle, sender, refusal, now=now)
+
+        self._submissions.when_durable(accept, give_up, now=now)
+
+    def _refuse(
+        self, desk: _Desk, vehicle: Vehicle, sender: Sender, refusal: Rejection, *, now: float
+    ) -> None:
+        desk.receiver.finish(result_of(refusal), opaque_id=0, now=now)
+        self._flush(desk, vehicle, now=now)
+        self._tell(sender, vehicle, refusal.text, now=now)
+        self._book.record(
+            SubmissionRefused(
+                vehicle.system_id,
+                MavCmd.MISSION_START,
+                TaskReason(refusal.reason),
+                refusal.text,
+                str(sender.address),
+                now,
+            )
+        )
+
+    def _draft(self, vehicle: Vehicle, plan: Plan, terms: Terms, sender: Sender) -> Draft:
+        client = self._client(sender)
+        assert client is not None, "it has just spoken"
+        what = f"{sender.addressed} {plan.source}".encode()
+        marks = Marks(0, blake2b(what, digest_size=9).hexdigest(), "")
+        submitter = client.submitter(sender.address)
+        return Draft(
+            vehicle.system_id, MavCmd.MISSION_START, plan, submitter, terms=terms, marks=marks
+        )
+
+    # clearing
+
+    def _clear(self, vehicle: Vehicle, sender: Sender, kind: int, *, now: float) -> None:
+        kinds = list(STORED) if kind == MavMissionType.ALL else [kind]
+        if kinds[0] not in STORED:
+            self._ack(sender, kind, MavMissionResult.UNSUPPORTED)
+            return
+        begun = vehicle.tasks.begun
+        stored = self._plans.stored(vehicle.system_id, MISSION)
+        if MISSION in kinds and begun is not None and begun.id == stored.plan_id:
+            self._ack(sender, kind, MavMissionResult.DENIED)
+            self._tell(sender, vehicle, f"task {begun.id} is being driven", now=now)
+            return
+        if MISSION in kinds:
+            self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)
+        for each in kinds:
+            if self._plans.stored(vehicle.system_id, each).plan_id:
+                self._plans.keep(vehicle, each, NOTHING, actor=str(sender.address), now=now)
+
+        def answer(result: MavMissionResult, *, now: float) -> None:
+            del now
+            self._ack(sender, kind, result)
+
+        self._submissions.when_durable(
+            partial(answer, MavMissionResult.ACCEPTED),
+            partial(answer, MavMissionResult.ERROR),
+            now=now,
+        )
+
+    def _set_current(
+        self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float
+    ) -> None:
+        """The message MISSION_SET_CURRENT; MAVSDK waits for this very number, for ever."""
+        try:
+            self._plans.go_on_with(vehicle, seq, now=now)
+        except Rejection as refusal:
+            self._tell(sender, vehicle, refusal.text, now=now)
+        client.outlet.send(
+            self._plans.current(vehicle, seq=seq), Address(vehicle.system_id, AUTOPILOT)
+        )
