@@ -22,6 +22,7 @@ class Authority:
         self._mode_is_ours = False
         self._granted: set[Hashable] = set()
         self._other_at = -inf
+        self._client_armed_at = -inf
         #: until somebody disarms or changes the mode
         self.may_arm = may_arm
 
@@ -47,6 +48,14 @@ class Authority:
         if mode == self._persona.control_mode:
             self._granted.add(client)
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
+
+    def client_arms(self, *, now: float) -> None:
+        """A client's wish to arm goes to the vehicle through us."""
+        self._client_armed_at = now
+
+    def armed_by_client(self, *, now: float) -> bool:
+        """Whether that the vehicle is armed now is a client's doing, through us."""
+        return now - self._client_armed_at <= BY_CLIENT
 
     def mode_changed(self, mode: int, *, by_us: bool, now: float) -> bool:
         """The vehicle shows another mode; gives whether it is our, or our clients', doing."""

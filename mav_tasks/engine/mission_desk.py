@@ -238,12 +238,19 @@ class MissionDesks:
     def _decide(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         try:
             self._submissions.check_open()
-            if upload.mission_type != MISSION or not upload.items:
+            if upload.mission_type != MISSION:
                 self._replace(desk, vehicle, upload, now=now)
+            elif self._is_nothing(vehicle, upload):
+                self._replace(desk, vehicle, upload._replace(items=()), now=now)
             else:
                 self._take_in(desk, vehicle, upload, now=now)
         except Rejection as refusal:
             self._refuse(desk, vehicle, upload.sender, refusal, now=now)
+
+    def _is_nothing(self, vehicle: Vehicle, upload: Upload) -> bool:
+        """Whether a mission is none: not an item, or only the home that comes before all others."""
+        is_staged = upload.sender.addressed.component_id == AUTOPILOT
+        return len(upload.items) <= (vehicle.persona.has_home_item and is_staged)
 
     def _take_in(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         """A mission: a task that waits to be started, or is queued."""

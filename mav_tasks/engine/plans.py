@@ -129,6 +129,7 @@ class Plans:
         if vehicle.tasks.paused in NOT_CONTINUED:
             words = "STOP is latched" if vehicle.tasks.is_stopped else "somebody took it over"
             raise Rejection(R.QUEUE_PAUSED, f"{words}: continue first")
+        vehicle.leave_manual(now=now)
         task = self._task(vehicle)
         if task is None or task.state in TERMINAL:
             return self._again(vehicle, stored, submitter, first=first, now=now)

@@ -179,7 +179,8 @@ class Vehicle:
         if was_armed and not armed:
             self._disarmed(now=now)
         by_hand = self.persona.manual_mode in (was_mode, mode)
-        if armed and by_hand and self.control.phase is Phase.ASKING_MODE:
+        by_client = self._authority.armed_by_client(now=now)
+        if armed and by_hand and not by_client and self.control.phase is Phase.ASKING_MODE:
             self._take_over("armed to be driven by hand", now=now)
         if not self._clock.is_running:
             self.step(now=now)
@@ -277,6 +278,8 @@ class Vehicle:
         # an autopilot answers for every component that is not there, and does as it was told
         target = asked if asked in self._own_components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
+        if command == MavCmd.COMPONENT_ARM_DISARM and not disarms:
+            self._authority.client_arms(now=now)
         if disarms and self.control.is_engaged and self.control.phase is not Phase.STOPPING:
             self._authority.withdraw_arming()
             self._zero_what_is_kept()
@@ -305,6 +308,17 @@ class Vehicle:
             return
         if self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
+
+    def leave_manual(self, *, now: float) -> None:
+        """A client starts a mission: as on an autopilot, that ends driving by hand.
+
+        By way of HOLD, from which tasks take the vehicle.
+        """
+        by_hand = self._monitor.custom_mode == self.persona.manual_mode
+        if self.armed and by_hand and not self.control.is_engaged:
+            self.control.begin_release(now=now)
+            self.requests.flush(now=now)
+            self._clock.restart(now=now)
 
     def may_move(self, client: Hashable) -> bool:
         """Whether a client's motion message may pass."""

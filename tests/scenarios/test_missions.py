@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import ARDUPILOT, Mode, Persona
 from tests.kit.client import ACCEPTED, AUTO, DENIED, HOLD, TEMPORARILY_REJECTED, set_mode
 from tests.kit.mission import Download, Item, Upload, acks, currents, reached
 from tests.kit.world import World, at, is_at, near_pose
@@ -249,6 +250,14 @@ def test_clearing_takes_away_what_waits_and_not_what_is_driven(world: World) -> 
     world.until_state(2, S.COMPLETED, within=60)
 
 
+def test_a_plan_of_home_alone_is_none(world: World) -> None:
+    uploaded(world)
+    again = uploaded(world, HOME)
+    assert (again.result, again.opaque_id) == (0, 0)
+    assert world.state(1) == (S.CANCELLED, R.CLEARED)
+    assert start(world) == (DENIED, R.NOT_FOUND)
+
+
 def test_a_second_client_is_denied_while_the_first_one_uploads(world: World) -> None:
     other = world.add_client("other")
     world.run(1)
@@ -297,3 +306,19 @@ def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) ->
     world.run(1)
     assert world.tasks() == ()
     assert acks(world.client)
+
+
+@pytest.mark.parametrize("wait", [0.0, 1.5])
+@pytest.mark.parametrize("persona", [ARDUPILOT, None])
+def test_a_script_that_arms_and_starts_is_obeyed_as_by_an_autopilot(
+    make_world: MakeWorld, wait: float, persona: Persona | None
+) -> None:
+    world = make_world(persona=persona) if persona else make_world()
+    uploaded(world)
+    assert world.rover.autopilot.mode is Mode.MANUAL
+    world.client.arm(True)
+    world.run(wait)
+    world.client.mode(AUTO)
+    world.run(0.05)
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
