@@ -89,7 +89,7 @@ def main(url: str) -> None:
         time.sleep(1.5)
         action.hold()
         action.return_to_launch()
-        time.sleep(1.0)
+        time.sleep(3.0)
     print("done")
 
 
