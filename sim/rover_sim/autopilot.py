@@ -1,7 +1,7 @@
 """The simulated flight stack: messages in, messages and wheel demands out. Pure, no clock, no I/O.
 
-It behaves as ArduPilot Rover 4.6.3 was observed to. This file joins the parts and directs each
-message to one of them; the rules are in the parts.
+It behaves as the make that its persona names. This file joins the parts and directs each message
+to one of them; the rules are in the parts.
 """
 
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.messages import Message
 from rover_sim.body import BodyState
-from rover_sim.commands import CommandReceiver
+from rover_sim.commands import CommandParts, CommandReceiver
 from rover_sim.dispatch import Handler
 from rover_sim.estimate import Estimate, estimate_from
 from rover_sim.faults import NO_FAULTS, Faults
 from rover_sim.file_transfer import refusal_of
 from rover_sim.flight import FlightControl
+from rover_sim.flight_rules import FlightParts
 from rover_sim.geo import Origin
-from rover_sim.guided import Guided
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.motion import MotionControl
 from rover_sim.outbox import Outbox
@@ -52,9 +52,11 @@ class Autopilot:
         self._origin = origin
         self._unix_offset = unix_offset
         self._outbox = Outbox()
-        self._parameters = Parameters(persona.parameters, self._outbox)
-        self._parameters["SYSID_THISMAV"] = system_id
-        self._missions = MissionStorage(origin=origin, outbox=self._outbox)
+        self._parameters = Parameters(persona.parameters, persona.parameter_protocol, self._outbox)
+        self._parameters[persona.system_id_parameter] = system_id
+        self._missions = MissionStorage(
+            conventions=persona.missions, origin=origin, outbox=self._outbox
+        )
         self._estimate: Estimate = estimate_from(truth, NO_FAULTS, None)
         self._faults = NO_FAULTS
         self._start(now)
@@ -63,14 +65,11 @@ class Autopilot:
         return f"Autopilot({self.address}, {self._flight!r})"
 
     def handle(self, message: Message, sender: Address, *, now: float) -> None:
-        """Take one message; those addressed to other systems are passed over.
+        """Take one message; those addressed to others are passed over.
 
-        The target component is not looked at: the real one acts on any. Raises SimulatedCrash for
-        what makes the real one abort.
+        Raises SimulatedCrash for what makes the real one abort.
         """
-        if self._faults.deaf or now < self._up_at:
-            return
-        if getattr(message, "target_system", BROADCAST) not in (BROADCAST, self.address.system_id):
+        if self._faults.deaf or now < self._up_at or not self._is_for_us(message):
             return
         if (handler := self._handlers.get(message.get_msgId())) is not None:
             handler(message, sender, now)
@@ -129,16 +128,33 @@ class Autopilot:
         """Restart: time and state begin anew; parameters and missions are kept."""
         self._start(now + REBOOT_TIME)
 
+    def _is_for_us(self, message: Message) -> bool:
+        target = getattr(message, "target_system", BROADCAST)
+        if target not in (BROADCAST, self.address.system_id):
+            return False
+        component = getattr(message, "target_component", BROADCAST)
+        ours = (BROADCAST, self.address.component_id)
+        return component in ours or not self._persona.heeds_component
+
     def _start(self, up_at: float) -> None:
-        outbox, missions = self._outbox, self._missions
+        outbox, missions, persona = self._outbox, self._missions, self._persona
         self._up_at = up_at
-        self._streams = Streams(now=up_at)
+        self._streams = Streams(persona.streams, now=up_at)
         self._motion = MotionControl()
-        guided = Guided(origin=self._origin, parameters=self._parameters, outbox=outbox)
+        rules = persona.rules(
+            FlightParts(
+                origin=self._origin,
+                parameters=self._parameters,
+                missions=missions,
+                outbox=outbox,
+                speed_limit=lambda: self._parameters[persona.speed_parameter],
+                honours_yaw_rate=persona.honours_yaw_rate,
+                started=up_at,
+            )
+        )
         self._flight = FlightControl(
-            persona=self._persona,
-            parameters=self._parameters,
-            guided=guided,
+            modes=persona.modes,
+            rules=rules,
             missions=missions,
             outbox=outbox,
             home=Destination(self._estimate.north, self._estimate.east),
@@ -146,7 +162,7 @@ class Autopilot:
         )
         self._flight.faults = self._faults
         self._telemetry = Telemetry(
-            persona=self._persona,
+            persona=persona,
             system_id=self.address.system_id,
             origin=self._origin,
             flight=self._flight,
@@ -154,15 +170,16 @@ class Autopilot:
             unix_offset=self._unix_offset,
             started=up_at,
         )
-        self._commands = CommandReceiver(
-            persona=self._persona,
+        commands = CommandParts(
             origin=self._origin,
             flight=self._flight,
+            missions=missions,
             streams=self._streams,
             outbox=outbox,
             send_now=self._send,
             reboot=lambda now: self.reboot(now=now),
         )
+        self._commands = CommandReceiver(persona.commands(commands), outbox)
         self._handlers = self._make_handlers()
 
     def _make_handlers(self) -> Mapping[int, Handler]:
@@ -193,19 +210,17 @@ class Autopilot:
             self._send(messages.Heartbeat.id, now)
 
     def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:
-        self._flight.failsafe.hear_heartbeat(sender.system_id, now=now)
+        self._flight.hear_heartbeat(sender.system_id, now=now)
 
     def _handle_local_target(
         self, message: messages.SetPositionTargetLocalNed, _sender: Address, now: float
     ) -> None:
-        if self._flight.mode is Mode.GUIDED:
-            self._flight.guided.take_local(message, self._estimate, now=now)
+        self._flight.take_local(message, self._estimate, now=now)
 
     def _handle_global_target(
         self, message: messages.SetPositionTargetGlobalInt, _sender: Address, now: float
     ) -> None:
-        if self._flight.mode is Mode.GUIDED:
-            self._flight.guided.take_global(message, now=now)
+        self._flight.take_global(message, self._estimate, now=now)
 
     def _handle_request_data_stream(
         self, message: messages.RequestDataStream, _sender: Address, now: float

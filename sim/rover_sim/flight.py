@@ -1,25 +1,21 @@
 """Modes and arming: what decides, at each moment, who drives.
 
-As observed on Rover 4.6.3: any mode may be entered disarmed, arming needs a settled estimate, and
-a mode that drives by itself starts to when armed.
+What every make does; what they do differently is asked of the persona's ``FlightRules``.
 """
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavSeverity, MavState
 from rover_sim.estimate import Estimate
-from rover_sim.failsafe import OperatorFailsafe
 from rover_sim.faults import NO_FAULTS, Faults
-from rover_sim.guided import Guided
+from rover_sim.flight_rules import FlightRules
 from rover_sim.mission_storage import MissionStorage
+from rover_sim.modes import Mode, ModeNumbers
 from rover_sim.outbox import Outbox
-from rover_sim.parameters import Parameters
-from rover_sim.personas import Mode, Persona
-from rover_sim.route import Route, Waypoint, square_around
-from rover_sim.setpoints import Destination
-from rover_sim.steering import COAST, HOLD, STOP, Demand
+from rover_sim.route import Route, Waypoint
+from rover_sim.setpoints import Destination, Global, Local, Target
+from rover_sim.steering import COAST, STOP, Demand
 
 INITIALISING_TIME = 0.25  # s after start, then MANUAL. The real one takes seconds; tests do not
-SETTLING_TIME = 0.5  # s after start until the position estimate is good for arming
 
 
 class FlightControl:
@@ -28,23 +24,20 @@ class FlightControl:
     def __init__(
         self,
         *,
-        persona: Persona,
-        parameters: Parameters,
-        guided: Guided,
+        modes: ModeNumbers,
+        rules: FlightRules,
         missions: MissionStorage,
         outbox: Outbox,
         home: Destination,
         now: float,
     ) -> None:
-        self.guided = guided
         self.home = home
         self.faults: Faults = NO_FAULTS
-        self.failsafe = OperatorFailsafe(parameters)
-        self.mode = Mode.INITIALISING
+        self.mode = modes.first
         self.armed = False
         self.mission_complete = False
-        self._persona = persona
-        self._parameters = parameters
+        self._modes = modes
+        self._rules = rules
         self._missions = missions
         self._outbox = outbox
         self._started = now
@@ -58,79 +51,102 @@ class FlightControl:
     @property
     def custom_mode(self) -> int:
         """The mode's number, as HEARTBEAT has it."""
-        return self._persona.modes[self.mode]
+        return self._modes.numbers[self.mode]
 
     @property
     def system_status(self) -> MavState:
-        """MAV_STATE as Rover derives it: from failsafe and mode, not from arming."""
-        if self.failsafe.tripped:
-            return MavState.CRITICAL
-        if self.mode is Mode.INITIALISING:
-            return MavState.CALIBRATING
-        return MavState.STANDBY if self.mode is Mode.HOLD else MavState.ACTIVE
+        """MAV_STATE, as HEARTBEAT has it."""
+        return self._rules.system_status(self.mode, armed=self.armed)
+
+    @property
+    def target(self) -> Target | None:
+        """What the setpoints ask for, while they are followed."""
+        return self._rules.target if self.mode is Mode.GUIDED else None
 
     @property
     def destination(self) -> Destination | None:
         """Where it drives to, if it drives to a place."""
         if self.mode is Mode.GUIDED:
-            return self.guided.destination
+            return self.target if isinstance(self.target, Destination) else None
+        if self.mode is Mode.HOLD:
+            return self._rules.hold_destination
         if self._route is not None and self._route.next is not None:
             return self._route.next.place
         return None
 
     @property
     def current_item(self) -> int:
-        """The mission item that AUTO is at, for MISSION_CURRENT."""
+        """The mission item that it is at, for MISSION_CURRENT."""
         waypoint = self._route.next if self._route is not None else None
-        return waypoint.seq if self.mode is Mode.AUTO and waypoint is not None else 0
+        if self.mode is Mode.AUTO and waypoint is not None and waypoint.seq is not None:
+            return waypoint.seq
+        return self._missions.current
 
     def announce(self) -> bool:
         """Whether mode or arming changed since the last call."""
         seen, self._announced = self._announced, (self.mode, self.armed)
         return seen != self._announced
 
-    def request_mode(self, custom_mode: int) -> bool:
+    def request_mode(self, mode: Mode, *, now: float) -> bool:
         """Change the mode at a client's wish."""
-        mode = self._persona.mode_of(custom_mode)
-        if mode is None:
-            self._outbox.say(MavSeverity.INFO, f"No such mode {custom_mode}")
-            return False
-        if self.faults.refuse_mode or Mode.INITIALISING in (mode, self.mode):
-            self._outbox.say(MavSeverity.WARNING, "Flight mode change failed")
+        refusal = self._rules.mode_refusal(mode, self.mode, now=now)
+        if self.faults.refuse_mode:
+            refusal = "Flight mode change failed"
+        if refusal is not None:
+            self._outbox.say(MavSeverity.WARNING, refusal)
             return False
         self.enter(mode)
         return True
 
-    def enter(self, mode: Mode) -> None:
-        """Change the mode. Entering the present one again changes nothing, not even a target."""
-        if mode is self.mode:
-            return
-        self.mode = mode
-        self._route = None
-        self._sticks = STOP
-        if mode is Mode.GUIDED:
-            self.guided.clear()
-        elif mode is Mode.AUTO:
-            self.mission_complete = False
-            self._route = self._missions.route() or square_around(self.home)
-        elif mode is Mode.RTL:
-            self._route = Route((Waypoint(0, self.home),), loop=False)
+    def request_custom_mode(self, custom_mode: int, *, now: float) -> bool:
+        """Change the mode at a client's wish, by its number."""
+        mode = self._modes.mode_of(custom_mode)
+        if mode is None:
+            self._outbox.say(MavSeverity.INFO, self._rules.unknown_mode(custom_mode))
+            return False
+        return self.request_mode(mode, now=now)
 
-    def skip_to_item(self, seq: int) -> None:
-        """Go on with another mission item; only AUTO with a mission has any."""
+    def enter(self, mode: Mode) -> None:
+        """Change the mode, without checks."""
+        self._rules.choose(mode)
+        self._switch(mode)
+
+    def skip_to_item(self, seq: int) -> bool:
+        """Go on with another mission item, now or when AUTO is next entered; False: refused."""
+        if not self._missions.move_to(seq):
+            return False
         if self._route is not None and self._missions.item_count > 0:
             self._route.skip_to(seq)
+        return True
+
+    def reposition(self, destination: Destination | None, *, now: float) -> bool:
+        """Drive to a place (None: stay here) in the mode that is for it, if that may be entered."""
+        mode = self._rules.reposition_mode
+        if self.mode is not mode and not self.request_mode(mode, now=now):
+            return False
+        self._rules.choose(mode)
+        self._rules.go_to(destination, now=now)
+        return True
+
+    @property
+    def can_reposition(self) -> bool:
+        """Whether it is in the mode in which it drives to a place."""
+        return self.mode is self._rules.reposition_mode
+
+    def change_speed(self, speed: float) -> bool:
+        """Change how fast it drives by itself; False: refused."""
+        return self._rules.change_speed(speed, self.mode)
 
     def arm(self, *, forced: bool, now: float) -> bool:
-        """Arm at a client's wish; forcing skips the checks but not a fault."""
+        """Arm at a client's wish; what forcing skips is the make's, but never a fault."""
         if self.armed:
             return True
         if self.faults.refuse_arm:
             self._outbox.say(MavSeverity.CRITICAL, "Arm: refused by a simulated fault")
             return False
-        if not forced and now - self._started < SETTLING_TIME:
-            text = "Arm: AHRS: not using configured AHRS type"
-            self._outbox.say(MavSeverity.CRITICAL, text)
+        refusal = self._rules.arming_refusal(self.mode, forced=forced, now=now)
+        if refusal is not None:
+            self._outbox.say(MavSeverity.CRITICAL, refusal)
             return False
         self.set_armed(True)
         return True
@@ -139,12 +155,24 @@ class FlightControl:
         """Arm or disarm, without checks. Disarming always works: the rover coasts."""
         if armed is not self.armed:
             self.armed = armed
-            text = "Throttle armed" if armed else "Throttle disarmed"
-            self._outbox.say(MavSeverity.INFO, text)
+            self._rules.choose(self.mode)
+            self._outbox.say(MavSeverity.INFO, self._rules.arming_text(armed=armed))
 
     def set_sticks(self, speed: float, yaw_rate: float) -> None:
-        """Drive by hand; has an effect only in MANUAL."""
+        """Drive by hand; has an effect only in MANUAL and POSITION."""
         self._sticks = Demand(speed, yaw_rate)
+
+    def hear_heartbeat(self, system_id: int, *, now: float) -> None:
+        """Note a heartbeat of any system."""
+        self._rules.hear_heartbeat(system_id, now=now)
+
+    def take_local(self, message: Local, estimate: Estimate, *, now: float) -> None:
+        """Take SET_POSITION_TARGET_LOCAL_NED."""
+        self._rules.take_local(message, estimate, mode=self.mode, now=now)
+
+    def take_global(self, message: Global, estimate: Estimate, *, now: float) -> None:
+        """Take SET_POSITION_TARGET_GLOBAL_INT."""
+        self._rules.take_global(message, estimate, mode=self.mode, now=now)
 
     def demand(self, estimate: Estimate, *, now: float) -> Demand:
         """Say how to move now. Called once per control step: it also lets time pass."""
@@ -152,38 +180,51 @@ class FlightControl:
         match self.mode:
             case Mode.INITIALISING:
                 return COAST
-            case Mode.MANUAL:
+            case Mode.MANUAL | Mode.POSITION:
                 demand = self._sticks
             case Mode.HOLD:
-                demand = HOLD
+                demand = self._rules.hold(estimate)
             case Mode.GUIDED:  # asked also while disarmed: its time-out goes on
-                demand = self.guided.demand(estimate, now=now)
+                demand = self._rules.follow_setpoints(estimate, now=now)
             case Mode.AUTO | Mode.RTL:
                 demand = self._follow_route(estimate) if self.armed else STOP
         return demand if self.armed else COAST
 
+    def _switch(self, mode: Mode) -> None:
+        """Entering the present mode again changes nothing, not even a target."""
+        if mode is self.mode:
+            return
+        self.mode = mode
+        self._route = None
+        self._sticks = STOP
+        self._rules.enter(mode)
+        if mode is Mode.AUTO:
+            self.mission_complete = False
+            self._route = self._rules.mission_route(self.home)
+        elif mode is Mode.RTL:
+            self._route = Route((Waypoint(None, self.home),), loop=False)
+
     def _pass_time(self, now: float) -> None:
         if self.mode is Mode.INITIALISING and now - self._started >= INITIALISING_TIME:
             self.enter(Mode.MANUAL)
-        if self.failsafe.changed(now=now):
-            self._act_on_failsafe()
-
-    def _act_on_failsafe(self) -> None:
-        if not self.failsafe.tripped:
-            self._outbox.say(MavSeverity.INFO, "GCS Failsafe Cleared")
+        intervention = self._rules.intervene(self.mode, armed=self.armed, now=now)
+        if intervention is None:
             return
-        # The real one says Radio: the RC check shares the failsafe bits.
-        self._outbox.say(MavSeverity.WARNING, "Radio Failsafe")
-        if self.armed:
-            self.enter(Mode.HOLD)
+        if intervention.mode is not None:
+            self._switch(intervention.mode)
+        if intervention.disarm:
+            self.set_armed(False)
 
     def _follow_route(self, estimate: Estimate) -> Demand:
         if self._route is None:
             return STOP
-        demand, reached = self._route.demand(estimate, self._parameters["WP_SPEED"])
-        if reached is not None and self.mode is Mode.AUTO and reached.seq > 0:
+        demand, reached = self._route.demand(estimate, self._rules.cruise_speed)
+        if reached is not None and reached.seq is not None:
             self._outbox.send(messages.MissionItemReached(reached.seq))
-            if self._route.next is None:
+            following = self._route.next
+            if following is None:
                 self.mission_complete = True
                 self._outbox.say(MavSeverity.INFO, "Mission Complete")
+            elif following.seq is not None:
+                self._missions.move_to(following.seq)
         return demand

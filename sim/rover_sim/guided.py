@@ -1,6 +1,7 @@
 """GUIDED mode: the one target there is, its time-out, and what to do for it now."""
 
 import math
+from collections.abc import Callable
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavSeverity
@@ -8,7 +9,6 @@ from rover_sim.errors import SimulatedCrash
 from rover_sim.estimate import Estimate
 from rover_sim.geo import Origin
 from rover_sim.outbox import Outbox
-from rover_sim.parameters import Parameters
 from rover_sim.setpoints import (
     Destination,
     Global,
@@ -28,10 +28,10 @@ ARRIVAL_RADIUS = 0.1  # m, before braking out
 class Guided:
     """Keeps the last target, armed or not: armed within its time-out, the rover drives off."""
 
-    def __init__(self, *, origin: Origin, parameters: Parameters, outbox: Outbox) -> None:
+    def __init__(self, *, origin: Origin, outbox: Outbox, speed_limit: Callable[[], float]) -> None:
         self._origin = origin
-        self._parameters = parameters
         self._outbox = outbox
+        self._speed_limit = speed_limit
         self._target: Target | None = None
         self._taken_at = 0.0
         self._destination_speed: float | None = None
@@ -40,9 +40,9 @@ class Guided:
         return f"Guided({self._target})"
 
     @property
-    def destination(self) -> Destination | None:
-        """Where it drives to, if it drives to a place."""
-        return self._target if isinstance(self._target, Destination) else None
+    def target(self) -> Target | None:
+        """What it was last asked for, and has not forgotten."""
+        return self._target
 
     def clear(self) -> None:
         """Forget the target: on entering the mode, and only then."""
@@ -50,11 +50,11 @@ class Guided:
 
     def take_local(self, message: Local, estimate: Estimate, *, now: float) -> None:
         """Take SET_POSITION_TARGET_LOCAL_NED."""
-        self._take(read_local(message, estimate, speed_limit=self._speed_limit), now)
+        self._take(read_local(message, estimate, speed_limit=self._speed_limit()), now)
 
     def take_global(self, message: Global, *, now: float) -> None:
         """Take SET_POSITION_TARGET_GLOBAL_INT."""
-        self._take(read_global(message, self._origin, speed_limit=self._speed_limit), now)
+        self._take(read_global(message, self._origin, speed_limit=self._speed_limit()), now)
 
     def go_to(self, destination: Destination, *, now: float) -> None:
         """Take a destination from a command."""
@@ -64,7 +64,7 @@ class Guided:
         """Set the speed towards a destination; refused for any other target."""
         if math.isnan(speed):
             raise SimulatedCrash("NaN in DO_CHANGE_SPEED: ArduPilot aborts")
-        if speed < 0.0 or self.destination is None:
+        if speed < 0.0 or not isinstance(self._target, Destination):
             return False
         self._destination_speed = speed
         return True
@@ -86,10 +86,6 @@ class Guided:
             case TurnRate(yaw_rate, speed):
                 return Demand(speed, yaw_rate)
 
-    @property
-    def _speed_limit(self) -> float:
-        return self._parameters["WP_SPEED"]
-
     def _take(self, target: Target | None, now: float) -> None:
         if target is None:
             return
@@ -100,7 +96,7 @@ class Guided:
 
     def _drive_to(self, estimate: Estimate, north: float, east: float) -> Demand:
         speed = self._destination_speed
-        limit = self._speed_limit if speed is None else min(speed, self._speed_limit)
+        limit = self._speed_limit() if speed is None else min(speed, self._speed_limit())
         demand = steer_to_point(estimate, north, east, limit, radius=ARRIVAL_RADIUS)
         if demand is not None:
             return demand

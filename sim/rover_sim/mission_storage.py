@@ -1,37 +1,24 @@
 """The autopilot's own mission, fence and rally storage: the vehicle's end of the mission protocol.
 
-MAVLink guide, "Mission Protocol", as Rover 4.6.3 speaks it: it asks with MISSION_REQUEST, never
-with the INT form, takes MISSION_ITEM_INT in answer, and knows no opaque ids.
+MAVLink guide, "Mission Protocol"; what it leaves open is in the persona's ``MissionConventions``.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from struct import pack
+from zlib import crc32
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavFrame, MavMissionResult, MavSeverity
 from rover_sim.dispatch import Handler
 from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
+from rover_sim.mission_conventions import ALL, FENCE, MISSION, RALLY, MissionConventions
 from rover_sim.outbox import Outbox
 from rover_sim.route import Route, Waypoint
 from rover_sim.setpoints import Destination
 
-CAPACITY = 655  # items
-REQUEST_INTERVAL = 1.0  # s between repeats of an unanswered MISSION_REQUEST
-UPLOAD_TIMEOUT = 8.0  # s without an item
-MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # MAV_MISSION_TYPE
 NAV_WAYPOINT = 16
-# MAV_CMDs that Rover stores; per type.
-STORABLE: Mapping[int, frozenset[int]] = {
-    MISSION: frozenset({16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115})
-    | frozenset(range(177, 220)),
-    FENCE: frozenset(range(5000, 5005)),
-    RALLY: frozenset({5100}),
-}
-STORED_FRAMES: Mapping[int, int] = {  # INT frames come back as their plain forms
-    MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
-    MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
-}
 
 Item = messages.MissionItemInt | messages.MissionItem
 Request = messages.MissionRequestInt | messages.MissionRequest
@@ -50,11 +37,14 @@ class _Upload:
 class MissionStorage:
     """Three lists of items and at most one upload. They survive a reboot."""
 
-    def __init__(self, *, origin: Origin, outbox: Outbox) -> None:
+    def __init__(self, *, conventions: MissionConventions, origin: Origin, outbox: Outbox) -> None:
+        self._conventions = conventions
         self._origin = origin
         self._outbox = outbox
         self._lists: dict[int, list[messages.MissionItemInt]] = {MISSION: [], FENCE: [], RALLY: []}
         self._upload: _Upload | None = None
+        self._stored: _Upload | None = None  # the last one that came to its end
+        self.current = 0  # where AUTO goes on, for makes that go on
         self.handlers: Mapping[int, Handler] = {
             messages.MissionCount.id: self._handle_count,
             messages.MissionItemInt.id: self._handle_item,
@@ -71,38 +61,64 @@ class MissionStorage:
 
     @property
     def item_count(self) -> int:
-        """How many items of a mission there are, item 0 (home) not counted."""
-        return max(0, len(self._lists[MISSION]) - 1)
+        """How many items of a mission there are, home not counted."""
+        return max(0, len(self._lists[MISSION]) - self._first_item)
 
     def route(self) -> Route | None:
         """Give the stored mission's waypoints, or None if there are none."""
         waypoints = tuple(
             Waypoint(seq, Destination(*self._origin.to_local(item.x, item.y)))
             for seq, item in enumerate(self._lists[MISSION])
-            if seq > 0 and item.command == NAV_WAYPOINT
+            if seq >= self._first_item and item.command == NAV_WAYPOINT
         )
         return Route(waypoints, loop=False) if waypoints else None
+
+    def move_to(self, seq: int) -> bool:
+        """Remember the item at which AUTO goes on; False if there is no such item.
+
+        A make that begins anew each time takes any.
+        """
+        if not self._conventions.goes_on:
+            return True
+        if seq >= len(self._lists[MISSION]):
+            return False
+        self.current = seq
+        return True
+
+    def plan_id(self, mission_type: int) -> int:
+        """Give the opaque id of a list: 0 if it is empty or this make has none, else never 0."""
+        items = self._lists[mission_type]
+        if not items or not self._conventions.has_ids:
+            return 0
+        return crc32(b"".join(_content(item) for item in items)) or 1
 
     def step(self, *, now: float) -> None:
         """Repeat an unanswered request, and give up in the end."""
         upload = self._upload
         if upload is None:
             return
-        if now - upload.last_item_at >= UPLOAD_TIMEOUT:
-            self._outbox.say(MavSeverity.WARNING, "Mission upload timeout")
-            self._finish(upload, MavMissionResult.OPERATION_CANCELLED)
-        elif now - upload.asked_at >= REQUEST_INTERVAL:
+        conventions = self._conventions
+        if now - upload.last_item_at >= conventions.upload_timeout:
+            self._outbox.say(MavSeverity.WARNING, conventions.timeout_text)
+            self._upload = None
+            if conventions.timeout_result is not None:
+                self._ack(upload.partner, upload.mission_type, conventions.timeout_result)
+        elif now - upload.asked_at >= conventions.request_interval:
             self._ask(upload, now)
 
+    @property
+    def _first_item(self) -> int:
+        return 1 if self._conventions.home_is_item_0 else 0
+
     def _handle_count(self, message: messages.MissionCount, sender: Address, now: float) -> None:
-        mission_type = message.mission_type
+        mission_type, conventions = message.mission_type, self._conventions
         if mission_type not in self._lists:
-            self._ack(sender, mission_type, MavMissionResult.UNSUPPORTED)
+            self._ack(sender, mission_type, conventions.unknown_type)
         elif self._upload is not None and self._upload.partner != sender:
-            self._ack(sender, mission_type, MavMissionResult.DENIED)
-        elif message.count > CAPACITY:
-            text = f"Only {CAPACITY} items are supported"
-            self._outbox.say(MavSeverity.WARNING, text)
+            self._ack(sender, mission_type, conventions.busy)
+        elif message.count > conventions.capacity:
+            if conventions.full_text is not None:
+                self._outbox.say(MavSeverity.WARNING, conventions.full_text)
             self._ack(sender, mission_type, MavMissionResult.NO_SPACE)
         else:
             upload = _Upload(sender, mission_type, message.count, last_item_at=now, asked_at=now)
@@ -115,28 +131,44 @@ class MissionStorage:
     def _handle_item(self, message: Item, sender: Address, now: float) -> None:
         upload = self._upload
         if upload is None or upload.partner != sender:
-            self._ack(sender, message.mission_type, MavMissionResult.ERROR)
+            self._handle_stray_item(message, sender)
         elif message.seq != len(upload.items):
-            self._ack(sender, upload.mission_type, MavMissionResult.INVALID_SEQUENCE)
-        elif refusal := _refusal(message, upload.mission_type):
-            self._finish(upload, refusal)
+            if self._conventions.wrong_sequence is not None:
+                self._ack(sender, upload.mission_type, self._conventions.wrong_sequence)
+        elif refusal := self._refusal(message, upload.mission_type):
+            self._upload = None
+            self._ack(sender, upload.mission_type, refusal)
         else:
-            upload.items.append(_as_stored(message))
+            upload.items.append(self._as_stored(message))
             upload.last_item_at = now
             if len(upload.items) == upload.count:
                 self._store(upload)
             else:
                 self._ask(upload, now)
 
+    def _handle_stray_item(self, message: Item, sender: Address) -> None:
+        """The last item again: a make with ids takes the ack for lost, and repeats it."""
+        last = self._stored
+        repeated = last is not None and (last.partner, last.mission_type, last.count) == (
+            sender,
+            message.mission_type,
+            message.seq + 1,
+        )
+        if repeated and self._conventions.has_ids:
+            self._ack_plan(sender, message.mission_type)
+        else:
+            self._ack(sender, message.mission_type, MavMissionResult.ERROR)
+
     def _handle_request_list(
         self, message: messages.MissionRequestList, sender: Address, _now: float
     ) -> None:
         stored = self._lists.get(message.mission_type)
         if stored is None:
-            self._ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+            self._ack(sender, message.mission_type, self._conventions.unknown_type)
         else:
+            plan_id = self.plan_id(message.mission_type)
             self._outbox.send(
-                messages.MissionCount(*sender, len(stored), message.mission_type),
+                messages.MissionCount(*sender, len(stored), message.mission_type, plan_id),
             )
 
     def _handle_request(self, message: Request, sender: Address, _now: float) -> None:
@@ -145,7 +177,7 @@ class MissionStorage:
             self._ack(sender, message.mission_type, MavMissionResult.ERROR)
             return
         item = stored[message.seq]
-        self._outbox.send(_item_for(sender, item, item.x, item.y))
+        self._outbox.send(_item_for(sender, item, item.frame, item.x, item.y))
 
     def _handle_clear_all(
         self, message: messages.MissionClearAll, sender: Address, _now: float
@@ -153,6 +185,8 @@ class MissionStorage:
         for mission_type, stored in self._lists.items():
             if message.mission_type in (mission_type, ALL):
                 stored.clear()
+                if mission_type == MISSION:
+                    self.current = 0
         self._ack(sender, message.mission_type, MavMissionResult.ACCEPTED)
 
     def _handle_ack(self, message: messages.MissionAck, sender: Address, _now: float) -> None:
@@ -165,9 +199,12 @@ class MissionStorage:
 
     def _store(self, upload: _Upload) -> None:
         self._lists[upload.mission_type] = upload.items
-        if upload.mission_type == MISSION and upload.items:
-            self._put_home_first(upload.items)
-        self._finish(upload, MavMissionResult.ACCEPTED)
+        if upload.mission_type == MISSION:
+            self.current = 0
+            if upload.items and self._conventions.home_is_item_0:
+                self._put_home_first(upload.items)
+        self._upload, self._stored = None, upload
+        self._ack_plan(upload.partner, upload.mission_type)
 
     def _put_home_first(self, items: list[messages.MissionItemInt]) -> None:
         """Item 0 is home: what was uploaded there is replaced."""
@@ -177,29 +214,36 @@ class MissionStorage:
         home.x, home.y = origin.latitude_degE7, origin.longitude_degE7
         home.z = origin.altitude
 
-    def _finish(self, upload: _Upload, result: MavMissionResult) -> None:
-        self._upload = None
-        self._ack(upload.partner, upload.mission_type, result)
-
     def _ask(self, upload: _Upload, now: float) -> None:
         upload.asked_at = now
         self._outbox.send(
-            messages.MissionRequest(*upload.partner, len(upload.items), upload.mission_type)
+            self._conventions.request(*upload.partner, len(upload.items), upload.mission_type)
+        )
+
+    def _ack_plan(self, partner: Address, mission_type: int) -> None:
+        plan_id = self.plan_id(mission_type)
+        self._outbox.send(
+            messages.MissionAck(*partner, MavMissionResult.ACCEPTED, mission_type, plan_id)
         )
 
     def _ack(self, partner: Address, mission_type: int, result: MavMissionResult) -> None:
         self._outbox.send(messages.MissionAck(*partner, result, mission_type))
 
+    def _refusal(self, item: Item, mission_type: int) -> MavMissionResult | None:
+        if item.command not in self._conventions.storable[mission_type]:
+            return MavMissionResult.UNSUPPORTED
+        latitude, longitude = _place_of(item)
+        if not abs(latitude) <= LATITUDE_LIMIT_DEGE7:  # NaN, from the float form, is not
+            return MavMissionResult.INVALID_PARAM5_X
+        if not abs(longitude) <= LONGITUDE_LIMIT_DEGE7:
+            return MavMissionResult.INVALID_PARAM6_Y
+        return None
 
-def _refusal(item: Item, mission_type: int) -> MavMissionResult | None:
-    if item.command not in STORABLE[mission_type]:
-        return MavMissionResult.UNSUPPORTED
-    latitude, longitude = _place_of(item)
-    if not abs(latitude) <= LATITUDE_LIMIT_DEGE7:  # NaN, from the float form, is not
-        return MavMissionResult.INVALID_PARAM5_X
-    if not abs(longitude) <= LONGITUDE_LIMIT_DEGE7:
-        return MavMissionResult.INVALID_PARAM6_Y
-    return None
+    def _as_stored(self, item: Item) -> messages.MissionItemInt:
+        """Keep every item in the INT form, in the frame that this make gives back."""
+        latitude, longitude = _place_of(item)
+        frame = self._conventions.stored_frames.get(item.frame, item.frame)
+        return _item_for(Address(0, 0), item, frame, round(latitude), round(longitude))
 
 
 def _place_of(item: Item) -> tuple[float, float]:
@@ -209,17 +253,11 @@ def _place_of(item: Item) -> tuple[float, float]:
     return item.x, item.y
 
 
-def _as_stored(item: Item) -> messages.MissionItemInt:
-    """Keep every item in the INT form, in the frames that ArduPilot gives back."""
-    latitude, longitude = _place_of(item)
-    return _item_for(Address(0, 0), item, round(latitude), round(longitude))
-
-
-def _item_for(partner: Address, item: Item, x: int, y: int) -> messages.MissionItemInt:
+def _item_for(partner: Address, item: Item, frame: int, x: int, y: int) -> messages.MissionItemInt:
     return messages.MissionItemInt(
         *partner,
         item.seq,
-        STORED_FRAMES.get(item.frame, item.frame),
+        frame,
         item.command,
         0,
         item.autocontinue,
@@ -232,3 +270,9 @@ def _item_for(partner: Address, item: Item, x: int, y: int) -> messages.MissionI
         item.z,
         item.mission_type,
     )
+
+
+def _content(item: messages.MissionItemInt) -> bytes:
+    """What makes an item the same item, wherever it comes from."""
+    floats = (item.param1, item.param2, item.param3, item.param4, item.z)
+    return pack("<5f2iHHB", *floats, item.x, item.y, item.seq, item.command, item.frame)

@@ -1,21 +1,22 @@
 """The autopilot's parameters and the parameter protocol, vehicle side.
 
-MAVLink guide, "Parameter Protocol", in ArduPilot's encoding: every value is cast to a float. An
-unknown name gets no answer at all, as from the real one.
+MAVLink guide, "Parameter Protocol"; how values travel is the persona's ``ParameterProtocol``. An
+unknown name gets no answer at all, as from the real ones.
 """
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
 from rover_sim.dispatch import Handler
 from rover_sim.outbox import Outbox
 
-INT8, INT16, INT32, REAL32 = 2, 4, 6, 9  # MAV_PARAM_TYPE
+INT8, INT16, UINT32, INT32, REAL32 = 2, 4, 5, 6, 9  # MAV_PARAM_TYPE
 BY_NAME = -1  # param_index in a request
-UNNUMBERED = 65535  # param_index in an answer to a read by name, or to a set
+UNNUMBERED = 65535  # param_index of what has no place in the list, or is not told it
+HASH_CHECK = "_HASH_CHECK"  # PX4's name for a digest of all: a client with a cache asks for it
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,48 +28,39 @@ class Parameter:
     type: int = REAL32
 
 
-def _rc_channels() -> Iterable[Parameter]:
-    for channel in (1, 2, 3, 4):
-        yield Parameter(f"RC{channel}_MIN", 1000, INT16)
-        yield Parameter(f"RC{channel}_MAX", 2000, INT16)
-        yield Parameter(f"RC{channel}_TRIM", 1500, INT16)
+class ParameterProtocol(Protocol):
+    """How one make reads and writes PARAM_VALUE and PARAM_SET."""
 
+    tells_index: bool  # also in an answer to a read by name, or to a set
 
-# The first 24 keep QGroundControl from complaining at connect; the others steer this simulator.
-ARDUPILOT_PARAMETERS: tuple[Parameter, ...] = (
-    Parameter("SYSID_THISMAV", 1, INT16),
-    Parameter("RCMAP_ROLL", 1, INT8),
-    Parameter("RCMAP_PITCH", 2, INT8),
-    Parameter("RCMAP_THROTTLE", 3, INT8),
-    Parameter("RCMAP_YAW", 4, INT8),
-    *_rc_channels(),
-    Parameter("COMPASS_DEV_ID", 0, INT32),
-    Parameter("COMPASS_DEV_ID2", 0, INT32),
-    Parameter("COMPASS_DEV_ID3", 0, INT32),
-    Parameter("INS_ACCOFFS_X", 0.01),
-    Parameter("INS_ACCOFFS_Y", 0.01),
-    Parameter("INS_ACCOFFS_Z", 0.01),
-    Parameter("FRAME_CLASS", 1, INT8),
-    Parameter("SYSID_MYGCS", 255, INT16),
-    Parameter("SYSID_ENFORCE", 0, INT8),
-    Parameter("FS_GCS_ENABLE", 0, INT8),
-    Parameter("FS_GCS_TIMEOUT", 2.0),
-    Parameter("FS_TIMEOUT", 1.5),
-    Parameter("FS_ACTION", 2, INT8),
-    Parameter("WP_SPEED", 5.0),
-    Parameter("CRUISE_SPEED", 5.0),
-    Parameter("ARMING_CHECK", 1, INT32),
-)
+    def to_wire(self, value: float, type_: int) -> float:
+        """Give the value as PARAM_VALUE carries it."""
+        ...
+
+    def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
+        """Give what PARAM_SET carries under some type for a parameter of another, or the same.
+
+        None: nothing that could be taken.
+        """
+        ...
+
+    answers_untaken: bool  # a PARAM_SET that is not taken is answered with the old value
+
+    def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
+        """Give _HASH_CHECK's value; None: there is no such thing here."""
+        ...
 
 
 class Parameters:
     """The values, and what answers the parameter messages. They survive a reboot."""
 
-    def __init__(self, parameters: Iterable[Parameter], outbox: Outbox) -> None:
-        listed = tuple(parameters)
-        self._types = {parameter.name: parameter.type for parameter in listed}
-        self._values = {parameter.name: parameter.value for parameter in listed}
-        self._names = tuple(self._values)
+    def __init__(
+        self, parameters: Iterable[Parameter], protocol: ParameterProtocol, outbox: Outbox
+    ) -> None:
+        self._listed = tuple(parameters)
+        self._protocol = protocol
+        self._indices = {each.name: index for index, each in enumerate(self._listed)}
+        self._values = {each.name: each.value for each in self._listed}
         self._outbox = outbox
         self.handlers: Mapping[int, Handler] = {
             messages.ParamRequestList.id: self._handle_request_list,
@@ -77,46 +69,63 @@ class Parameters:
         }
 
     def __repr__(self) -> str:
-        return f"Parameters({len(self._names)})"
+        return f"Parameters({len(self._listed)})"
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
 
     def __setitem__(self, name: str, value: float) -> None:
-        if self._types[name] != REAL32:
+        if self._listed[self._indices[name]].type != REAL32:
             value = round(value)
         self._values[name] = value
 
     def _handle_request_list(
         self, _message: messages.ParamRequestList, _sender: Address, _now: float
     ) -> None:
-        for index, name in enumerate(self._names):
-            self._send(name, index)
+        for index in range(len(self._listed)):
+            self._send(index, index)
 
     def _handle_request_read(
         self, message: messages.ParamRequestRead, _sender: Address, _now: float
     ) -> None:
-        index = message.param_index
-        if 0 <= index < len(self._names):
-            self._send(self._names[index], index)
-        elif index == BY_NAME and (name := _name_of(message.param_id)) in self._values:
-            self._send(name, UNNUMBERED)
+        index, name = message.param_index, _name_of(message.param_id)
+        if 0 <= index < len(self._listed):
+            self._send(index, index)
+        elif index == BY_NAME and name == HASH_CHECK:
+            self._send_digest()
+        elif index == BY_NAME and name in self._indices:
+            self._answer(self._indices[name])
 
     def _handle_set(self, message: messages.ParamSet, _sender: Address, _now: float) -> None:
         """The answer carries what is kept, also if that is the old value."""
-        name = _name_of(message.param_id)
-        if name not in self._values:
+        index = self._indices.get(_name_of(message.param_id))
+        if index is None:
             return
-        if math.isfinite(message.param_value):
-            self[name] = message.param_value
-        self._send(name, UNNUMBERED)
+        own = self._listed[index]
+        value = self._protocol.from_wire(message.param_value, message.param_type, own.type)
+        if value is not None:
+            self[own.name] = value
+        elif not self._protocol.answers_untaken:
+            return
+        self._answer(index)
 
-    def _send(self, name: str, index: int) -> None:
+    def _answer(self, index: int) -> None:
+        self._send(index, index if self._protocol.tells_index else UNNUMBERED)
+
+    def _send(self, index: int, told: int) -> None:
+        own = self._listed[index]
+        value = self._protocol.to_wire(self._values[own.name], own.type)
         self._outbox.send(
-            messages.ParamValue(
-                name.encode(), self._values[name], self._types[name], len(self._names), index
-            )
+            messages.ParamValue(own.name.encode(), value, own.type, len(self._listed), told)
         )
+
+    def _send_digest(self) -> None:
+        digest = self._protocol.digest((each, self._values[each.name]) for each in self._listed)
+        if digest is None:
+            return
+        value = self._protocol.to_wire(digest, UINT32)
+        name, count = HASH_CHECK.encode(), len(self._listed)
+        self._outbox.send(messages.ParamValue(name, value, UINT32, count, UNNUMBERED))
 
 
 def _name_of(param_id: str | bytes) -> str:

@@ -1,26 +1,24 @@
-"""What tells one make of autopilot from another: numbers and names, no behaviour.
+"""What tells one make of autopilot from another: its numbers and names, and its strategies.
 
-``ardupilot`` is Rover 4.6.3 as observed on the wire. Behaviour that differs by make (setpoint
-rules, order of arming and mode) belongs into the flight stack, chosen by persona.
+``ardupilot`` is Rover 4.6.3 as observed on the wire. Behaviour that differs by make is in objects
+that a persona names (rules of flight, commands, conventions); nothing asks for a persona's name.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import Enum
 
-from mav_tasks.mavlink.enums import MavAutopilot
-from rover_sim.parameters import ARDUPILOT_PARAMETERS, Parameter
-
-
-class Mode(Enum):
-    """What the flight stack can be doing; each persona has its own numbers for them."""
-
-    INITIALISING = "initialising"
-    MANUAL = "manual"
-    HOLD = "hold"
-    AUTO = "auto"
-    RTL = "rtl"
-    GUIDED = "guided"
+from mav_tasks.mavlink import messages
+from mav_tasks.mavlink.enums import MavAutopilot, MavLandedState, MavModeFlag
+from rover_sim.ardupilot_commands import ardupilot_commands
+from rover_sim.ardupilot_parameters import ARDUPILOT_PARAMETERS, Cast
+from rover_sim.ardupilot_rules import ArduPilotRules
+from rover_sim.commands import CommandParts, CommandTable
+from rover_sim.flight_rules import FlightParts, FlightRules
+from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, MissionConventions
+from rover_sim.modes import Mode as Mode
+from rover_sim.modes import ModeNumbers
+from rover_sim.parameters import Parameter, ParameterProtocol
+from rover_sim.streams import ARDUPILOT_STREAMS, StreamTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,34 +27,66 @@ class Persona:
 
     name: str
     autopilot: MavAutopilot
-    modes: Mapping[Mode, int]  # HEARTBEAT.custom_mode
+    modes: ModeNumbers
+    mode_flags: Mapping[Mode, int]  # HEARTBEAT.base_mode, but for "armed"
     capabilities: int  # AUTOPILOT_VERSION.capabilities
     flight_sw_version: int  # AUTOPILOT_VERSION: major, minor, patch, type, a byte each
     firmware_hash: bytes  # AUTOPILOT_VERSION.flight_custom_version, 8 bytes
-    parameters: tuple[Parameter, ...]
     announces_changes: bool  # a HEARTBEAT at once when mode or arming changes, or only each second
-
-    def mode_of(self, custom_mode: int) -> Mode | None:
-        """Give the mode of a number, or None if there is no such mode."""
-        return next((mode for mode, number in self.modes.items() if number == custom_mode), None)
+    heeds_component: bool  # passes over what is for another component of its system
+    landed_state_armed: MavLandedState  # EXTENDED_SYS_STATE while armed
+    no_mission_total: int  # MISSION_CURRENT.total where no mission is stored
+    lacks: frozenset[int]  # ids of messages that others can send
+    streams: StreamTable
+    rules: Callable[[FlightParts], FlightRules]
+    commands: Callable[[CommandParts], CommandTable]
+    missions: MissionConventions
+    parameter_protocol: ParameterProtocol
+    parameters: tuple[Parameter, ...]
+    system_id_parameter: str  # the name of the one that shows the system id
+    speed_parameter: str  # the name of the one that limits its speed, m/s
+    honours_yaw_rate: bool  # a setpoint's yaw rate turns it; where False it is passed over
 
 
 ARDUPILOT = Persona(
     name="ardupilot",
     autopilot=MavAutopilot.ARDUPILOTMEGA,
-    modes={
-        Mode.MANUAL: 0,
-        Mode.HOLD: 4,
-        Mode.AUTO: 10,
-        Mode.RTL: 11,
-        Mode.GUIDED: 15,
-        Mode.INITIALISING: 16,
+    modes=ModeNumbers(
+        {
+            Mode.MANUAL: 0,
+            Mode.HOLD: 4,
+            Mode.AUTO: 10,
+            Mode.RTL: 11,
+            Mode.GUIDED: 15,
+            Mode.INITIALISING: 16,
+        },
+        first=Mode.INITIALISING,
+    ),
+    mode_flags={
+        Mode.INITIALISING: MavModeFlag.CUSTOM_MODE_ENABLED,
+        Mode.MANUAL: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED,
+        Mode.HOLD: MavModeFlag.CUSTOM_MODE_ENABLED,
+        Mode.AUTO: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.GUIDED_ENABLED,
+        Mode.RTL: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.GUIDED_ENABLED,
+        Mode.GUIDED: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.GUIDED_ENABLED,
     },
     capabilities=61935,
     flight_sw_version=4 << 24 | 6 << 16 | 3 << 8 | 255,  # 4.6.3, official
     firmware_hash=b"3fc7011a",
-    parameters=ARDUPILOT_PARAMETERS,
     announces_changes=False,  # observed: 1 Hz
+    heeds_component=False,
+    landed_state_armed=MavLandedState.ON_GROUND,
+    no_mission_total=0,
+    lacks=frozenset({messages.ProtocolVersion.id, messages.PositionTargetLocalNed.id}),
+    streams=ARDUPILOT_STREAMS,
+    rules=ArduPilotRules,
+    commands=ardupilot_commands,
+    missions=ARDUPILOT_MISSIONS,
+    parameter_protocol=Cast(),
+    parameters=ARDUPILOT_PARAMETERS,
+    system_id_parameter="SYSID_THISMAV",
+    speed_parameter="WP_SPEED",
+    honours_yaw_rate=True,
 )
 
-PERSONAS: Mapping[str, Persona] = {ARDUPILOT.name: ARDUPILOT}
+PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT,)}

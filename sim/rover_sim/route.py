@@ -11,9 +11,9 @@ TRACK_SIDE = 4.0  # m, of the square that AUTO drives when no mission is stored
 
 
 class Waypoint(NamedTuple):
-    """A place, and the sequence number of the mission item that it comes from."""
+    """A place, and the sequence number of the mission item that it comes from, if of one."""
 
-    seq: int
+    seq: int | None
     place: Destination
 
 
@@ -36,7 +36,9 @@ class Route:
     def skip_to(self, seq: int) -> None:
         """Go on from the first waypoint at or after a mission item."""
         numbers = [waypoint.seq for waypoint in self._waypoints]
-        self._index = next((i for i, n in enumerate(numbers) if n >= seq), len(numbers))
+        self._index = next(
+            (i for i, n in enumerate(numbers) if n is not None and n >= seq), len(numbers)
+        )
 
     def demand(self, estimate: Estimate, speed_limit: float) -> tuple[Demand, Waypoint | None]:
         """Say how to move now, and which waypoint has just been reached."""
@@ -58,5 +60,5 @@ def square_around(home: Destination) -> Route:
     side = TRACK_SIDE
     corners = ((side, 0.0), (side, side), (0.0, side), (0.0, 0.0))
     return Route(
-        tuple(Waypoint(0, Destination(north + dn, east + de)) for dn, de in corners), loop=True
+        tuple(Waypoint(None, Destination(north + dn, east + de)) for dn, de in corners), loop=True
     )

@@ -4,54 +4,74 @@ MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals b
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from mav_tasks.mavlink import messages as m
 
-DEFAULT_INTERVAL = 1.0  # s; a SITL streams at 1 Hz unasked
-SHORTEST_INTERVAL = 0.02  # s, the real one's main loop; below it is refused
 OFF = 0.0
 NEVER = float("inf")
 JITTER = 1e-6  # s; clock readings are not exact multiples of anything
+ALL_STREAMS = 0  # MAV_DATA_STREAM
 
-STREAMED: tuple[int, ...] = (
-    m.Heartbeat.id,
-    m.SysStatus.id,
-    m.ExtendedSysState.id,  # the real one sends this and HOME_POSITION on request only; streaming
-    m.HomePosition.id,  # both lets a MAVSDK or QGroundControl without the server see them
-    m.Attitude.id,
-    m.LocalPositionNed.id,
-    m.GlobalPositionInt.id,
-    m.GpsRawInt.id,
-    m.VfrHud.id,
-    m.BatteryStatus.id,
-    m.SystemTime.id,
-    m.MissionCurrent.id,
-    m.PositionTargetGlobalInt.id,
-)
 
-ALL_STREAMS = 0
-GROUPS: Mapping[int, tuple[int, ...]] = {  # MAV_DATA_STREAM, as Rover fills them
-    1: (),  # RAW_SENSORS
-    2: (  # EXTENDED_STATUS
-        m.SysStatus.id,
-        m.MissionCurrent.id,
-        m.GpsRawInt.id,
-        m.PositionTargetGlobalInt.id,
+@dataclass(frozen=True, slots=True)
+class StreamTable:
+    """What one make streams unasked."""
+
+    intervals: Mapping[int, float]  # s, by message id; OFF: only when asked for
+    shortest_interval: float  # s; below it is refused
+    groups: Mapping[int, tuple[int, ...]]  # what REQUEST_DATA_STREAM sets, by MAV_DATA_STREAM
+
+
+ARDUPILOT_STREAMS = StreamTable(
+    intervals=dict.fromkeys(
+        (
+            m.Heartbeat.id,
+            m.SysStatus.id,
+            # The real one sends these two on request only; streaming both lets a MAVSDK or
+            # QGroundControl without the server see them.
+            m.ExtendedSysState.id,
+            m.HomePosition.id,
+            m.Attitude.id,
+            m.LocalPositionNed.id,
+            m.GlobalPositionInt.id,
+            m.GpsRawInt.id,
+            m.VfrHud.id,
+            m.BatteryStatus.id,
+            m.SystemTime.id,
+            m.MissionCurrent.id,
+            m.PositionTargetGlobalInt.id,
+        ),
+        1.0,  # a SITL streams at 1 Hz unasked
     ),
-    3: (),  # RC_CHANNELS
-    6: (m.GlobalPositionInt.id, m.LocalPositionNed.id),  # POSITION
-    10: (m.Attitude.id,),  # EXTRA1
-    11: (m.VfrHud.id,),  # EXTRA2
-    12: (m.SystemTime.id, m.BatteryStatus.id),  # EXTRA3
-}
+    shortest_interval=0.02,  # the real one's main loop
+    groups={  # as Rover fills them
+        1: (),  # RAW_SENSORS
+        2: (  # EXTENDED_STATUS
+            m.SysStatus.id,
+            m.MissionCurrent.id,
+            m.GpsRawInt.id,
+            m.PositionTargetGlobalInt.id,
+        ),
+        3: (),  # RC_CHANNELS
+        6: (m.GlobalPositionInt.id, m.LocalPositionNed.id),  # POSITION
+        10: (m.Attitude.id,),  # EXTRA1
+        11: (m.VfrHud.id,),  # EXTRA2
+        12: (m.SystemTime.id, m.BatteryStatus.id),  # EXTRA3
+    },
+)
 
 
 class Streams:
     """The interval of each message and when it is due next. One set for the whole link."""
 
-    def __init__(self, *, now: float) -> None:
-        self._intervals = dict.fromkeys(STREAMED, DEFAULT_INTERVAL)
-        self._due = dict.fromkeys(STREAMED, now)
+    def __init__(self, table: StreamTable, *, now: float) -> None:
+        self._table = table
+        self._intervals = dict(table.intervals)
+        self._due = {
+            message_id: NEVER if interval == OFF else now
+            for message_id, interval in table.intervals.items()
+        }
         self._next = now  # least of _due: most control steps look at nothing else
 
     def __repr__(self) -> str:
@@ -69,10 +89,10 @@ class Streams:
         if message_id not in self._intervals:
             return False
         if interval_us == 0:
-            self._set(message_id, DEFAULT_INTERVAL, now)
+            self._set(message_id, self._table.intervals[message_id], now)
         elif interval_us == -1:
             self._set(message_id, OFF, now)
-        elif interval_us * 1e-6 < SHORTEST_INTERVAL:
+        elif not interval_us * 1e-6 >= self._table.shortest_interval:  # NaN is not, either
             return False
         else:
             self._set(message_id, interval_us * 1e-6, now)
@@ -80,10 +100,10 @@ class Streams:
 
     def set_group(self, group: int, rate: float, *, now: float) -> None:
         """Set a whole group's rate in Hz; 0 switches it off."""
-        members: Iterable[int] = GROUPS.get(group, ())
+        members: Iterable[int] = self._table.groups.get(group, ())
         if group == ALL_STREAMS:
-            members = (message_id for ids in GROUPS.values() for message_id in ids)
-        interval = max(1.0 / rate, SHORTEST_INTERVAL) if rate > 0 else OFF
+            members = (message_id for ids in self._table.groups.values() for message_id in ids)
+        interval = max(1.0 / rate, self._table.shortest_interval) if rate > 0 else OFF
         for message_id in members:
             self._set(message_id, interval, now)
 

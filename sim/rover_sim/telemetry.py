@@ -4,13 +4,16 @@ import math
 from collections.abc import Callable, Mapping
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavLandedState, MavModeFlag, MavType
+from mav_tasks.mavlink.enums import MavFrame, MavLandedState, MavModeFlag, MavType
 from mav_tasks.mavlink.messages import Message
 from rover_sim.estimate import Estimate
 from rover_sim.flight import FlightControl
 from rover_sim.geo import Origin
+from rover_sim.mission_conventions import FENCE, MISSION, RALLY
 from rover_sim.mission_storage import MissionStorage
-from rover_sim.personas import Mode, Persona
+from rover_sim.modes import Mode
+from rover_sim.personas import Persona
+from rover_sim.setpoints import Destination, Heading, TurnRate
 
 MAVLINK_VERSION = 3
 UNKNOWN_U16 = 65535
@@ -19,7 +22,8 @@ UNKNOWN_U16 = 65535
 SENSORS = 0x1 | 0x2 | 0x4 | 0x20 | 0x1000 | 0x4000 | 0x8000 | 0x200000 | 0x10000000
 CELL_VOLTAGES = (12600,) + (UNKNOWN_U16,) * 9  # mV; ArduPilot puts a pack's total into the first
 GPS_FIX_3D = 3
-TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_GLOBAL_INT
+TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_*
+TARGET_VELOCITY_ONLY = 0x0DC7
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 MISSION_STATES = {"none": 1, "not started": 2, "active": 3, "paused": 4, "complete": 5}
 
@@ -61,6 +65,8 @@ class Telemetry:
             m.AutopilotVersion.id: self._autopilot_version,
             m.HomePosition.id: self._home_position,
             m.ExtendedSysState.id: self._extended_sys_state,
+            m.PositionTargetLocalNed.id: self._position_target_local_ned,
+            m.ProtocolVersion.id: self._protocol_version,
         }
 
     def __repr__(self) -> str:
@@ -68,7 +74,7 @@ class Telemetry:
 
     def knows(self, message_id: int) -> bool:
         """Whether there is such a message here."""
-        return message_id in self._builders
+        return message_id in self._builders and message_id not in self._persona.lacks
 
     def build(self, message_id: int, estimate: Estimate, *, now: float) -> Message | None:
         """Give the message of this moment; None if there is nothing to say."""
@@ -79,18 +85,12 @@ class Telemetry:
         return int((now - self._started) * 1000.0 + 0.5)
 
     def _heartbeat(self, _estimate: Estimate, _boot_ms: int) -> Message:
-        flight = self._flight
-        flags = MavModeFlag.CUSTOM_MODE_ENABLED
-        if flight.mode is Mode.MANUAL:
-            flags |= MavModeFlag.MANUAL_INPUT_ENABLED
-        elif flight.mode in (Mode.GUIDED, Mode.AUTO, Mode.RTL):
-            flags |= MavModeFlag.GUIDED_ENABLED
-        if flight.armed:
-            flags |= MavModeFlag.SAFETY_ARMED
+        flight, persona = self._flight, self._persona
+        armed = MavModeFlag.SAFETY_ARMED if flight.armed else 0
         return m.Heartbeat(
             MavType.GROUND_ROVER,
-            self._persona.autopilot,
-            flags,
+            persona.autopilot,
+            persona.mode_flags[flight.mode] | armed,
             flight.custom_mode,
             flight.system_status,
             MAVLINK_VERSION,
@@ -102,7 +102,10 @@ class Telemetry:
         )  # load 10 %, 12.6 V, 5 A, 100 %
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
-        return m.ExtendedSysState(0, MavLandedState.ON_GROUND)
+        armed = self._flight.armed
+        return m.ExtendedSysState(
+            0, self._persona.landed_state_armed if armed else MavLandedState.ON_GROUND
+        )
 
     def _system_time(self, _estimate: Estimate, boot_ms: int) -> Message:
         unix = self._unix_offset + self._started + boot_ms * 1e-3 if self._unix_offset else 0.0
@@ -189,15 +192,26 @@ class Telemetry:
         )
 
     def _mission_current(self, _estimate: Estimate, _boot_ms: int) -> Message:
-        flight, total = self._flight, self._missions.item_count
-        if total == 0:
-            state = "none"
-        elif flight.mission_complete:
-            state = "complete"
-        else:
-            state = "active" if flight.mode is Mode.AUTO and flight.armed else "not started"
-        in_mission_mode = 1 if flight.mode is Mode.AUTO else 2
-        return m.MissionCurrent(flight.current_item, total, MISSION_STATES[state], in_mission_mode)
+        flight, missions = self._flight, self._missions
+        return m.MissionCurrent(
+            flight.current_item,
+            missions.item_count or self._persona.no_mission_total,
+            MISSION_STATES[self._mission_state()],
+            1 if flight.mode is Mode.AUTO else 2,  # in the mission mode, or not
+            missions.plan_id(MISSION),
+            missions.plan_id(FENCE),
+            missions.plan_id(RALLY),
+        )
+
+    def _mission_state(self) -> str:
+        flight = self._flight
+        if self._missions.item_count == 0:
+            return "none"
+        if flight.mission_complete:
+            return "complete"
+        if flight.mode is Mode.AUTO and flight.armed:
+            return "active"
+        return "paused" if self._missions.current > 0 else "not started"
 
     def _position_target_global_int(self, _estimate: Estimate, boot_ms: int) -> Message | None:
         destination = self._flight.destination
@@ -208,6 +222,27 @@ class Telemetry:
         return m.PositionTargetGlobalInt(
             boot_ms, 5, TARGET_POSITION_ONLY, latitude, longitude, self._origin.altitude, *nothing
         )
+
+    def _position_target_local_ned(self, estimate: Estimate, boot_ms: int) -> Message | None:
+        """What it tries to do, as PX4 shows it: a place or a velocity, the rest left out."""
+        frame, zero = MavFrame.LOCAL_NED, (0.0,) * 5
+        match self._flight.destination or self._flight.target:
+            case Destination(north, east):
+                return m.PositionTargetLocalNed(
+                    boot_ms, frame, TARGET_POSITION_ONLY, north, east, 0.0, *zero, 0.0, 0.0, 0.0
+                )
+            case Heading(yaw, speed):
+                vn, ve = speed * math.cos(yaw), speed * math.sin(yaw)
+            case TurnRate(_, speed):
+                vn, ve = speed * math.cos(estimate.yaw), speed * math.sin(estimate.yaw)
+            case None:
+                return None
+        return m.PositionTargetLocalNed(
+            boot_ms, frame, TARGET_VELOCITY_ONLY, 0.0, 0.0, 0.0, vn, ve, 0.0, *zero
+        )
+
+    def _protocol_version(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        return m.ProtocolVersion(200, 100, 200, (0,) * 8, (0,) * 8)  # MAVLink 2, 1 at least
 
 
 def _cm(metres: float) -> int:

@@ -1,0 +1,62 @@
+"""The parameters of ArduPilot Rover, as far as clients or this simulator need them."""
+
+import math
+from collections.abc import Iterable
+
+from rover_sim.parameters import INT8, INT16, INT32, Parameter
+
+
+class Cast:
+    """ArduPilot's protocol: every value is cast to a float; implements ``ParameterProtocol``."""
+
+    tells_index = False
+    answers_untaken = True
+
+    def to_wire(self, value: float, type_: int) -> float:
+        """Give the value."""
+        del type_
+        return value
+
+    def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
+        """Give the value, whatever type the client says it has; no number is not taken."""
+        del type_, own_type
+        return value if math.isfinite(value) else None
+
+    def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
+        """There is none."""
+        del parameters
+        return None
+
+
+def _rc_channels() -> Iterable[Parameter]:
+    for channel in (1, 2, 3, 4):
+        yield Parameter(f"RC{channel}_MIN", 1000, INT16)
+        yield Parameter(f"RC{channel}_MAX", 2000, INT16)
+        yield Parameter(f"RC{channel}_TRIM", 1500, INT16)
+
+
+# The first 24 keep QGroundControl from complaining at connect; the others steer this simulator.
+ARDUPILOT_PARAMETERS: tuple[Parameter, ...] = (
+    Parameter("SYSID_THISMAV", 1, INT16),
+    Parameter("RCMAP_ROLL", 1, INT8),
+    Parameter("RCMAP_PITCH", 2, INT8),
+    Parameter("RCMAP_THROTTLE", 3, INT8),
+    Parameter("RCMAP_YAW", 4, INT8),
+    *_rc_channels(),
+    Parameter("COMPASS_DEV_ID", 0, INT32),
+    Parameter("COMPASS_DEV_ID2", 0, INT32),
+    Parameter("COMPASS_DEV_ID3", 0, INT32),
+    Parameter("INS_ACCOFFS_X", 0.01),
+    Parameter("INS_ACCOFFS_Y", 0.01),
+    Parameter("INS_ACCOFFS_Z", 0.01),
+    Parameter("FRAME_CLASS", 1, INT8),
+    Parameter("SYSID_MYGCS", 255, INT16),
+    Parameter("SYSID_ENFORCE", 0, INT8),
+    Parameter("FS_GCS_ENABLE", 0, INT8),
+    Parameter("FS_GCS_TIMEOUT", 2.0),
+    Parameter("FS_TIMEOUT", 1.5),
+    Parameter("FS_ACTION", 2, INT8),
+    Parameter("WP_SPEED", 5.0),
+    Parameter("CRUISE_SPEED", 5.0),
+    Parameter("ARMING_CHECK", 1, INT32),
+)

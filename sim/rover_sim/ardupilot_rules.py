@@ -1,0 +1,129 @@
+"""Modes, arming and failsafe of ArduPilot Rover, as observed on 4.6.3.
+
+Any mode may be entered disarmed, arming needs a settled estimate, and a mode that drives by itself
+starts to when armed.
+"""
+
+from mav_tasks.mavlink.enums import MavSeverity, MavState
+from rover_sim.estimate import Estimate
+from rover_sim.failsafe import OperatorFailsafe
+from rover_sim.flight_rules import SETTLING_TIME, FlightParts, Intervention
+from rover_sim.guided import Guided
+from rover_sim.modes import Mode
+from rover_sim.route import Route, square_around
+from rover_sim.setpoints import Destination, Global, Local, Target
+from rover_sim.steering import HOLD, Demand
+
+
+class ArduPilotRules:
+    """Implements ``FlightRules``."""
+
+    reposition_mode = Mode.GUIDED
+    hold_destination: Destination | None = None  # HOLD stands
+
+    def __init__(self, parts: FlightParts) -> None:
+        self._parts = parts
+        self._outbox = parts.outbox
+        self._guided = Guided(
+            origin=parts.origin, outbox=parts.outbox, speed_limit=parts.speed_limit
+        )
+        self._failsafe = OperatorFailsafe(parts.parameters)
+
+    def __repr__(self) -> str:
+        return f"ArduPilotRules({self._guided!r}, {self._failsafe!r})"
+
+    @property
+    def target(self) -> Target | None:
+        """What the setpoints ask for, in GUIDED."""
+        return self._guided.target
+
+    @property
+    def cruise_speed(self) -> float:
+        """How fast AUTO and RTL drive, m/s."""
+        return self._parts.speed_limit()
+
+    def system_status(self, mode: Mode, *, armed: bool) -> MavState:
+        """MAV_STATE as Rover derives it: from failsafe and mode, not from arming."""
+        del armed
+        if self._failsafe.tripped:
+            return MavState.CRITICAL
+        if mode is Mode.INITIALISING:
+            return MavState.CALIBRATING
+        return MavState.STANDBY if mode is Mode.HOLD else MavState.ACTIVE
+
+    def arming_text(self, *, armed: bool) -> str:
+        """Give the text that tells of arming or disarming."""
+        return "Throttle armed" if armed else "Throttle disarmed"
+
+    def unknown_mode(self, custom_mode: int) -> str:
+        """Give the text for a number that is no mode."""
+        return f"No such mode {custom_mode}"
+
+    def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
+        """Refuse only to enter or leave INITIALISING."""
+        del now
+        return "Flight mode change failed" if Mode.INITIALISING in (wanted, present) else None
+
+    def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
+        """Refuse too early; forcing skips the check."""
+        del mode
+        if not forced and now - self._parts.started < SETTLING_TIME:
+            return "Arm: AHRS: not using configured AHRS type"
+        return None
+
+    def choose(self, mode: Mode) -> None:
+        """Nothing hangs on who wanted a mode."""
+
+    def enter(self, mode: Mode) -> None:
+        """Entering GUIDED forgets the target."""
+        if mode is Mode.GUIDED:
+            self._guided.clear()
+
+    def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:
+        """HOLD when the operator is lost, if that failsafe is on."""
+        del mode
+        if not self._failsafe.changed(now=now):
+            return None
+        if not self._failsafe.tripped:
+            self._outbox.say(MavSeverity.INFO, "GCS Failsafe Cleared")
+            return None
+        # The real one says Radio: the RC check shares the failsafe bits.
+        self._outbox.say(MavSeverity.WARNING, "Radio Failsafe")
+        return Intervention(Mode.HOLD) if armed else None
+
+    def hear_heartbeat(self, system_id: int, *, now: float) -> None:
+        """Note a heartbeat of any system."""
+        self._failsafe.hear_heartbeat(system_id, now=now)
+
+    def take_local(self, message: Local, estimate: Estimate, *, mode: Mode, now: float) -> None:
+        """Take a setpoint in GUIDED; dropped in silence elsewhere."""
+        if mode is Mode.GUIDED:
+            self._guided.take_local(message, estimate, now=now)
+
+    def take_global(self, message: Global, estimate: Estimate, *, mode: Mode, now: float) -> None:
+        """Take a setpoint in GUIDED; dropped in silence elsewhere."""
+        del estimate
+        if mode is Mode.GUIDED:
+            self._guided.take_global(message, now=now)
+
+    def go_to(self, destination: Destination | None, *, now: float) -> None:
+        """Take a destination; there is none that means "here"."""
+        if destination is not None:
+            self._guided.go_to(destination, now=now)
+
+    def change_speed(self, speed: float, mode: Mode) -> bool:
+        """Set the speed towards a destination; NaN aborts in any mode."""
+        return self._guided.change_speed(speed) and mode is Mode.GUIDED
+
+    def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
+        """Say how to move in GUIDED."""
+        return self._guided.demand(estimate, now=now)
+
+    def hold(self, estimate: Estimate) -> Demand:
+        """Stand."""
+        del estimate
+        return HOLD
+
+    def mission_route(self, home: Destination) -> Route | None:
+        """Give the stored mission, from its beginning, or the built-in track."""
+        return self._parts.missions.route() or square_around(home)

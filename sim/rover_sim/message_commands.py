@@ -1,0 +1,49 @@
+"""The commands that ask for messages: the same on every make but for the refusing result."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mav_tasks.mavlink import messages
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from rover_sim.commands import Action, Command, CommandParts, as_id
+
+
+@dataclass(frozen=True, slots=True)
+class MessageCommands:
+    """Sends messages now, or changes how often."""
+
+    parts: CommandParts
+    unknown_message: MavResult  # to REQUEST_MESSAGE
+    bad_interval: MavResult  # to SET_MESSAGE_INTERVAL
+
+    def actions(self) -> Mapping[int, Action]:
+        """Give the part of a table that is these commands."""
+        return {
+            MavCmd.SET_MESSAGE_INTERVAL: self._set_message_interval,
+            MavCmd.GET_MESSAGE_INTERVAL: self._get_message_interval,
+            MavCmd.REQUEST_MESSAGE: lambda command, now: self._send(as_id(command.params[0]), now),
+            MavCmd.REQUEST_AUTOPILOT_CAPABILITIES: self._request_capabilities,
+            MavCmd.GET_HOME_POSITION: lambda _, now: self._send(messages.HomePosition.id, now),
+        }
+
+    def _set_message_interval(self, command: Command, now: float) -> MavResult:
+        message_id, interval_us = as_id(command.params[0]), command.params[1]
+        if self.parts.streams.set_interval(message_id, interval_us, now=now):
+            return MavResult.ACCEPTED
+        self.parts.outbox.say(MavSeverity.INFO, f"No ap_message for mavlink id ({message_id})")
+        return self.bad_interval
+
+    def _get_message_interval(self, command: Command, _now: float) -> MavResult:
+        message_id = as_id(command.params[0])
+        if message_id < 0:
+            return MavResult.FAILED
+        interval_us = self.parts.streams.interval_us(message_id)
+        self.parts.outbox.send(messages.MessageInterval(message_id & 0xFFFF, interval_us))
+        return MavResult.ACCEPTED
+
+    def _request_capabilities(self, _command: Command, now: float) -> MavResult:
+        return self._send(messages.AutopilotVersion.id, now)
+
+    def _send(self, message_id: int, now: float) -> MavResult:
+        sent = self.parts.send_now(message_id, now)
+        return MavResult.ACCEPTED if sent else self.unknown_message

@@ -1,0 +1,59 @@
+"""How one make speaks the mission protocol: numbers, and the choices that the guide leaves."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mav_tasks.mavlink import messages
+from mav_tasks.mavlink.enums import MavFrame, MavMissionResult
+
+MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # MAV_MISSION_TYPE
+
+
+@dataclass(frozen=True, slots=True)
+class MissionConventions:
+    """What one make does with missions, fences and rally points."""
+
+    request: type[messages.MissionRequest | messages.MissionRequestInt]  # how it asks for items
+    capacity: int  # items of one list
+    request_interval: float  # s between repeats of an unanswered request
+    upload_timeout: float  # s without an item
+    timeout_text: str
+    timeout_result: MavMissionResult | None  # the ack of a given up upload; None: silence
+    full_text: str | None
+    busy: MavMissionResult  # to another client during an upload
+    unknown_type: MavMissionResult
+    wrong_sequence: MavMissionResult | None  # to an item that was not asked for; None: silence
+    storable: Mapping[int, frozenset[int]]  # MAV_CMDs, by mission type
+    stored_frames: Mapping[int, int]  # frames that come back as others
+    home_is_item_0: bool  # what is uploaded there is replaced, and not driven to
+    has_ids: bool  # opaque ids in MISSION_ACK, MISSION_COUNT and MISSION_CURRENT
+    goes_on: bool  # AUTO goes on where it was left, rather than beginning anew
+
+
+NAVIGATION = frozenset({16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115})
+DO = frozenset(range(177, 220))
+FENCES = frozenset(range(5000, 5005))
+RALLIES = frozenset({5100})
+
+#: Rover 4.6.3: it asks with MISSION_REQUEST, never with the INT form, takes MISSION_ITEM_INT in
+#: answer, and knows no opaque ids
+ARDUPILOT_MISSIONS = MissionConventions(
+    request=messages.MissionRequest,
+    capacity=655,
+    request_interval=1.0,
+    upload_timeout=8.0,
+    timeout_text="Mission upload timeout",
+    timeout_result=MavMissionResult.OPERATION_CANCELLED,
+    full_text="Only 655 items are supported",
+    busy=MavMissionResult.DENIED,
+    unknown_type=MavMissionResult.UNSUPPORTED,
+    wrong_sequence=MavMissionResult.INVALID_SEQUENCE,
+    storable={MISSION: NAVIGATION | DO, FENCE: FENCES, RALLY: RALLIES},
+    stored_frames={  # INT frames come back as their plain forms
+        MavFrame.GLOBAL_INT: MavFrame.GLOBAL,
+        MavFrame.GLOBAL_RELATIVE_ALT_INT: MavFrame.GLOBAL_RELATIVE_ALT,
+    },
+    home_is_item_0=True,
+    has_ids=False,
+    goes_on=False,
+)
