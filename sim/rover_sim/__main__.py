@@ -19,6 +19,7 @@ from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.errors import MissingExtra, SimulatedCrash
 from rover_sim.kinematic import KinematicBody
+from rover_sim.personas import ARDUPILOT, PERSONAS, Persona
 from rover_sim.real_time import Clock, drive
 from rover_sim.vehicle import make_vehicle
 
@@ -44,6 +45,7 @@ class Options:
     insecure: bool
     count: int
     body: str  # "bullet" or "kinematic"
+    persona: Persona
     system_id: int  # of the first rover
     seed: int | None
     friction: float
@@ -81,6 +83,12 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     add("--system-id", type=int, default=1, help="MAVLink system id of the first rover")
     bodies = ("auto", "bullet", "kinematic")
     add("--body", choices=bodies, default="auto", help="physics; auto is bullet")
+    add(
+        "--persona",
+        choices=tuple(PERSONAS),
+        default=ARDUPILOT.name,
+        help="make of autopilot (default %(default)s)",
+    )
     add("--seed", type=int, help="draw each rover's differences from this number")
     add("--friction", type=float, default=0.8, help="tyres on ground (default %(default)s)")
     add("--friction-variation", type=float, default=0.0, help="0.3 for 30 %% (needs --seed)")
@@ -112,6 +120,7 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         insecure=values.insecure,
         count=values.count,
         body="bullet" if values.body == "auto" else values.body,
+        persona=PERSONAS[values.persona],
         system_id=values.system_id,
         seed=values.seed,
         friction=values.friction,
@@ -135,6 +144,7 @@ def run(options: Options, stack: ExitStack) -> None:
             body,
             system_id=options.system_id + index,
             now=now,
+            persona=options.persona,
             unix_offset=time.time() - now,
         )
         for index, body in enumerate(bodies)
@@ -143,7 +153,8 @@ def run(options: Options, stack: ExitStack) -> None:
     for vehicle in vehicles:
         number = vehicle.autopilot.address.system_id
         where = f"udp {host}:{port}"
-        sys.stdout.write(f"rover_sim: rover {number} (ardupilot, {options.body}) on {where}\n")
+        what = f"{options.persona.name}, {options.body}"
+        sys.stdout.write(f"rover_sim: rover {number} ({what}) on {where}\n")
     sys.stdout.flush()
     drive(server, stop, vehicles, clock, truth)
 

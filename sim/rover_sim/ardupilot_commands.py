@@ -21,7 +21,12 @@ REBOOT, REBOOT_TO_BOOTLOADER = 1.0, 3.0
 def ardupilot_commands(parts: CommandParts) -> CommandTable:
     """Give the table of commands of ArduPilot Rover."""
     commands = ArduPilotCommands(parts)
-    asking = MessageCommands(parts, unknown_message=MavResult.FAILED, bad_interval=MavResult.DENIED)
+    asking = MessageCommands(
+        parts,
+        unknown_message=MavResult.FAILED,
+        bad_interval=MavResult.DENIED,
+        bad_interval_text="No ap_message for mavlink id ({})",
+    )
     return CommandTable(
         actions={
             **asking.actions(),

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
+from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Message
 from rover_sim.body import BodyState
 from rover_sim.commands import CommandParts, CommandReceiver
@@ -111,8 +112,9 @@ class Autopilot:
         self._faults = self._outbox.faults = self._flight.faults = faults
 
     def operator_mode(self, mode: Mode, *, now: float) -> None:
-        """Change the mode at the vehicle, as an RC switch would."""
-        self._flight.enter(mode)
+        """Change the mode at the vehicle, as an RC switch would; not to one that it lacks."""
+        if mode in self._persona.modes.numbers:
+            self._flight.enter(mode)
         self._announce(now)
 
     def operator_arm(self, armed: bool, *, now: float) -> None:
@@ -231,7 +233,8 @@ class Autopilot:
     def _handle_mission_set_current(
         self, message: messages.MissionSetCurrent, _sender: Address, now: float
     ) -> None:
-        self._flight.skip_to_item(message.seq)
+        if not self._flight.skip_to_item(message.seq):
+            self._outbox.say(MavSeverity.CRITICAL, "WPM: WP CURR CMD: Not in list")
         self._send(messages.MissionCurrent.id, now)
 
     def _handle_timesync(self, message: messages.Timesync, _sender: Address, now: float) -> None:

@@ -35,10 +35,10 @@ class FlightControl:
         self.faults: Faults = NO_FAULTS
         self.mode = modes.first
         self.armed = False
-        self.mission_complete = False
         self._modes = modes
         self._rules = rules
         self._missions = missions
+        self._missions.complete = False
         self._outbox = outbox
         self._started = now
         self._route: Route | None = None
@@ -199,7 +199,9 @@ class FlightControl:
         self._sticks = STOP
         self._rules.enter(mode)
         if mode is Mode.AUTO:
-            self.mission_complete = False
+            if self._missions.complete:
+                self._missions.move_to(0)
+            self._missions.complete = False
             self._route = self._rules.mission_route(self.home)
         elif mode is Mode.RTL:
             self._route = Route((Waypoint(None, self.home),), loop=False)
@@ -223,7 +225,7 @@ class FlightControl:
             self._outbox.send(messages.MissionItemReached(reached.seq))
             following = self._route.next
             if following is None:
-                self.mission_complete = True
+                self._missions.complete = True
                 self._outbox.say(MavSeverity.INFO, "Mission Complete")
             elif following.seq is not None:
                 self._missions.move_to(following.seq)

@@ -15,6 +15,7 @@ class MessageCommands:
     parts: CommandParts
     unknown_message: MavResult  # to REQUEST_MESSAGE
     bad_interval: MavResult  # to SET_MESSAGE_INTERVAL
+    bad_interval_text: str | None  # said beside it, with the message's id in it
 
     def actions(self) -> Mapping[int, Action]:
         """Give the part of a table that is these commands."""
@@ -30,7 +31,8 @@ class MessageCommands:
         message_id, interval_us = as_id(command.params[0]), command.params[1]
         if self.parts.streams.set_interval(message_id, interval_us, now=now):
             return MavResult.ACCEPTED
-        self.parts.outbox.say(MavSeverity.INFO, f"No ap_message for mavlink id ({message_id})")
+        if self.bad_interval_text is not None:
+            self.parts.outbox.say(MavSeverity.INFO, self.bad_interval_text.format(message_id))
         return self.bad_interval
 
     def _get_message_interval(self, command: Command, _now: float) -> MavResult:

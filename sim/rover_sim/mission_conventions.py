@@ -32,6 +32,8 @@ class MissionConventions:
 
 NAVIGATION = frozenset({16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115})
 DO = frozenset(range(177, 220))
+AIRBORNE = frozenset({21, 22, 31, 84, 85})  # stored, and passed over by a rover
+PAYLOAD = frozenset({530, 531, 532, 1000, 1001, 2000, 2001, 2500, 2501})  # likewise
 FENCES = frozenset(range(5000, 5005))
 RALLIES = frozenset({5100})
 
@@ -56,4 +58,23 @@ ARDUPILOT_MISSIONS = MissionConventions(
     home_is_item_0=True,
     has_ids=False,
     goes_on=False,
+)
+
+#: PX4 1.15: an opaque id for each list, silence to what it did not ask for
+PX4_MISSIONS = MissionConventions(
+    request=messages.MissionRequestInt,
+    capacity=2000,
+    request_interval=0.25,
+    upload_timeout=5.0,
+    timeout_text="Operation timeout",
+    timeout_result=None,
+    full_text=None,
+    busy=MavMissionResult.ERROR,
+    unknown_type=MavMissionResult.INVALID,
+    wrong_sequence=None,
+    storable={MISSION: NAVIGATION | AIRBORNE | DO | PAYLOAD, FENCE: FENCES, RALLY: RALLIES},
+    stored_frames={},
+    home_is_item_0=False,
+    has_ids=True,
+    goes_on=True,
 )

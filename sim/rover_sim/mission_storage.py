@@ -45,6 +45,7 @@ class MissionStorage:
         self._upload: _Upload | None = None
         self._stored: _Upload | None = None  # the last one that came to its end
         self.current = 0  # where AUTO goes on, for makes that go on
+        self.complete = False  # AUTO came to its end
         self.handlers: Mapping[int, Handler] = {
             messages.MissionCount.id: self._handle_count,
             messages.MissionItemInt.id: self._handle_item,
@@ -186,7 +187,7 @@ class MissionStorage:
             if message.mission_type in (mission_type, ALL):
                 stored.clear()
                 if mission_type == MISSION:
-                    self.current = 0
+                    self._begin_anew()
         self._ack(sender, message.mission_type, MavMissionResult.ACCEPTED)
 
     def _handle_ack(self, message: messages.MissionAck, sender: Address, _now: float) -> None:
@@ -200,11 +201,16 @@ class MissionStorage:
     def _store(self, upload: _Upload) -> None:
         self._lists[upload.mission_type] = upload.items
         if upload.mission_type == MISSION:
-            self.current = 0
+            self._begin_anew()
             if upload.items and self._conventions.home_is_item_0:
                 self._put_home_first(upload.items)
         self._upload, self._stored = None, upload
         self._ack_plan(upload.partner, upload.mission_type)
+
+    def _begin_anew(self) -> None:
+        self.current = 0
+        if self._conventions.goes_on:
+            self.complete = False
 
     def _put_home_first(self, items: list[messages.MissionItemInt]) -> None:
         """Item 0 is home: what was uploaded there is replaced."""

@@ -1,11 +1,12 @@
 """What tells one make of autopilot from another: its numbers and names, and its strategies.
 
-``ardupilot`` is Rover 4.6.3 as observed on the wire. Behaviour that differs by make is in objects
-that a persona names (rules of flight, commands, conventions); nothing asks for a persona's name.
+``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a differential rover on PX4 1.15
+after its sources, not observed; ``generic`` speaks as PX4 does. Behaviour that differs by make is
+in objects that a persona names (rules of flight, commands, conventions); nothing asks for its name.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavAutopilot, MavLandedState, MavModeFlag
@@ -14,11 +15,14 @@ from rover_sim.ardupilot_parameters import ARDUPILOT_PARAMETERS, Cast
 from rover_sim.ardupilot_rules import ArduPilotRules
 from rover_sim.commands import CommandParts, CommandTable
 from rover_sim.flight_rules import FlightParts, FlightRules
-from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, MissionConventions
+from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, PX4_MISSIONS, MissionConventions
 from rover_sim.modes import Mode as Mode
 from rover_sim.modes import ModeNumbers
 from rover_sim.parameters import Parameter, ParameterProtocol
-from rover_sim.streams import ARDUPILOT_STREAMS, StreamTable
+from rover_sim.px4_commands import px4_commands
+from rover_sim.px4_parameters import PX4_PARAMETERS, Bytewise
+from rover_sim.px4_rules import Px4Rules
+from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,4 +93,64 @@ ARDUPILOT = Persona(
     honours_yaw_rate=True,
 )
 
-PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT,)}
+STICKS = MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED
+BY_ITSELF = (
+    MavModeFlag.CUSTOM_MODE_ENABLED
+    | MavModeFlag.AUTO_ENABLED
+    | MavModeFlag.STABILIZE_ENABLED
+    | MavModeFlag.GUIDED_ENABLED
+)
+
+PX4 = Persona(
+    name="px4",
+    autopilot=MavAutopilot.PX4,
+    modes=ModeNumbers(
+        {
+            Mode.MANUAL: 1 << 16,
+            Mode.POSITION: 3 << 16,
+            Mode.HOLD: 4 << 16 | 3 << 24,
+            Mode.AUTO: 4 << 16 | 4 << 24,
+            Mode.RTL: 4 << 16 | 5 << 24,
+            Mode.GUIDED: 6 << 16,
+        },
+        first=Mode.HOLD,  # as a SITL without sticks
+    ),
+    mode_flags={
+        Mode.MANUAL: STICKS,
+        Mode.POSITION: STICKS | MavModeFlag.STABILIZE_ENABLED | MavModeFlag.GUIDED_ENABLED,
+        Mode.HOLD: BY_ITSELF,
+        Mode.AUTO: BY_ITSELF,
+        Mode.RTL: BY_ITSELF,
+        Mode.GUIDED: BY_ITSELF,
+    },
+    # MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, FTP, SET_POSITION_TARGET_LOCAL_NED,
+    # SET_POSITION_TARGET_GLOBAL_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
+    capabilities=4 | 8 | 16 | 32 | 128 | 256 | 8192 | 16384 | 32768,
+    flight_sw_version=1 << 24 | 15 << 16 | 4 << 8 | 255,  # 1.15.4, official
+    firmware_hash=b"99c40407",
+    announces_changes=False,  # 1 Hz
+    heeds_component=True,
+    landed_state_armed=MavLandedState.IN_AIR,  # its rover land detector: armed is not landed
+    no_mission_total=65535,
+    lacks=frozenset(),
+    streams=PX4_STREAMS,
+    rules=Px4Rules,
+    commands=px4_commands,
+    missions=PX4_MISSIONS,
+    parameter_protocol=Bytewise(),
+    parameters=PX4_PARAMETERS,
+    system_id_parameter="MAV_SYS_ID",
+    speed_parameter="RD_MAX_SPEED",
+    honours_yaw_rate=False,
+)
+
+#: speaks as PX4 does and says that it is none that anybody knows
+GENERIC = replace(
+    PX4,
+    name="generic",
+    autopilot=MavAutopilot.GENERIC,
+    flight_sw_version=1 << 24 | 255,
+    firmware_hash=bytes(8),
+)
+
+PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT, PX4, GENERIC)}

@@ -1,7 +1,7 @@
 """From where to go to how to move: pure functions, no state.
 
-The rover is skid-steered, and can turn on the spot when asked for a turn rate. Towards a heading it
-steers as a car, as the real one was seen to: no speed, no turn.
+The rover is skid-steered, and can turn on the spot when asked for a turn rate. Towards a heading
+ArduPilot steers it as a car, as the real one was seen to (no speed, no turn), PX4 turns it first.
 """
 
 import math
@@ -39,6 +39,15 @@ def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:
     limit = min(MAX_YAW_RATE, abs(estimate.forward_speed) / TURN_RADIUS)
     wanted = HEADING_GAIN * wrap_angle(yaw - estimate.yaw)
     return Demand(speed, max(-limit, min(limit, wanted)))
+
+
+def turn_then_drive(estimate: Estimate, yaw: float, speed: float) -> Demand:
+    """Drive at ``speed`` towards ``yaw``; turn to it on the spot first, if it is far off."""
+    error = wrap_angle(yaw - estimate.yaw)
+    if speed == 0.0:
+        return STOP
+    yaw_rate = max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
+    return Demand(0.0 if abs(error) > PIVOT_ERROR else speed * math.cos(error), yaw_rate)
 
 
 def steer_to_point(

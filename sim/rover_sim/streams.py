@@ -61,6 +61,31 @@ ARDUPILOT_STREAMS = StreamTable(
     },
 )
 
+#: near to what PX4 streams to an onboard computer, in whole control periods
+PX4_STREAMS = StreamTable(
+    intervals={
+        m.Heartbeat.id: 1.0,
+        m.Attitude.id: 0.025,
+        m.LocalPositionNed.id: 0.05,
+        m.GlobalPositionInt.id: 0.1,
+        m.VfrHud.id: 0.1,
+        m.PositionTargetLocalNed.id: 0.1,
+        m.PositionTargetGlobalInt.id: 0.1,
+        m.GpsRawInt.id: 0.2,
+        m.SysStatus.id: 0.2,
+        m.ExtendedSysState.id: 0.2,
+        m.SystemTime.id: 1.0,
+        m.MissionCurrent.id: 1.0,
+        m.HomePosition.id: 2.0,
+        m.BatteryStatus.id: 2.0,
+        m.GpsGlobalOrigin.id: OFF,
+        m.AutopilotVersion.id: OFF,
+        m.ProtocolVersion.id: OFF,
+    },
+    shortest_interval=0.001,
+    groups={},  # it does not know REQUEST_DATA_STREAM
+)
+
 
 class Streams:
     """The interval of each message and when it is due next. One set for the whole link."""

@@ -207,7 +207,7 @@ class Telemetry:
         flight = self._flight
         if self._missions.item_count == 0:
             return "none"
-        if flight.mission_complete:
+        if self._missions.complete:
             return "complete"
         if flight.mode is Mode.AUTO and flight.armed:
             return "active"

@@ -1,0 +1,61 @@
+"""PX4's OFFBOARD: whether setpoints stream, and what to do for the last one."""
+
+from rover_sim.estimate import Estimate
+from rover_sim.px4_setpoints import Setpoint
+from rover_sim.setpoints import Destination, Heading, Target, TurnRate
+from rover_sim.steering import STOP, Demand, steer_to_point, turn_then_drive
+
+STREAM_GAP = 0.5  # s, at most between two setpoints: PX4's guide asks for 2 Hz
+ARRIVAL_RADIUS = 0.1  # m
+
+
+class Offboard:
+    """Counts setpoints in any mode; follows those that come in OFFBOARD, and keeps none before."""
+
+    def __init__(self) -> None:
+        self.target: Target | None = None
+        self._speed: float | None = None
+        self._last: float | None = None
+        self._gap: float | None = None  # s between the last two
+
+    def __repr__(self) -> str:
+        return f"Offboard({self.target})"
+
+    def clear(self) -> None:
+        """Forget the target."""
+        self.target = None
+
+    def hear(self, *, now: float) -> None:
+        """Count a setpoint."""
+        self._gap = None if self._last is None else now - self._last
+        self._last = now
+
+    def follow(self, setpoint: Setpoint) -> None:
+        """Take a setpoint's target."""
+        self.target, self._speed = setpoint
+
+    def is_streaming(self, *, now: float) -> bool:
+        """Whether setpoints come, two at least and the last one lately."""
+        return (
+            self._gap is not None
+            and self._gap <= STREAM_GAP
+            and self.silence(now=now) <= STREAM_GAP
+        )
+
+    def silence(self, *, now: float) -> float:
+        """Seconds since the last setpoint."""
+        return float("inf") if self._last is None else now - self._last
+
+    def demand(self, estimate: Estimate, speed_limit: float) -> Demand:
+        """Say how to move now."""
+        match self.target:
+            case None:
+                return STOP
+            case Destination(north, east):
+                limit = speed_limit if self._speed is None else min(self._speed, speed_limit)
+                radius = ARRIVAL_RADIUS
+                return steer_to_point(estimate, north, east, limit, radius=radius) or STOP
+            case Heading(yaw, speed):
+                return turn_then_drive(estimate, yaw, min(speed, speed_limit))
+            case TurnRate(yaw_rate, speed):
+                return Demand(max(-speed_limit, min(speed_limit, speed)), yaw_rate)

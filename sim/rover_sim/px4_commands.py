@@ -1,0 +1,161 @@
+"""What a PX4 1.15 rover does on commands, after its commander and its MAVLink receiver."""
+
+import math
+
+from mav_tasks.mavlink import messages
+from mav_tasks.mavlink.enums import MavCmd, MavModeFlag, MavResult, MavSeverity
+from rover_sim.commands import (
+    DO_SET_MISSION_CURRENT,
+    Command,
+    CommandParts,
+    CommandTable,
+)
+from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7
+from rover_sim.message_commands import MessageCommands
+from rover_sim.modes import Mode
+from rover_sim.setpoints import Destination
+
+CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS
+NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT, for NaN
+MISTAKEN_NAN = 0x7FF80000  # a float's NaN, sent as an integer
+NOTHING, REBOOT, REBOOT_TO_BOOTLOADER = 0.0, 1.0, 3.0  # param1 of PREFLIGHT_REBOOT_SHUTDOWN
+
+
+def px4_commands(parts: CommandParts) -> CommandTable:
+    """Give the table of commands of a PX4 rover."""
+    commands = Px4Commands(parts)
+    asking = MessageCommands(
+        parts,
+        unknown_message=MavResult.DENIED,
+        bad_interval=MavResult.FAILED,
+        bad_interval_text=None,
+    )
+    return CommandTable(
+        actions={
+            **asking.actions(),
+            MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
+            MavCmd.DO_SET_MODE: commands.do_set_mode,
+            MavCmd.NAV_RETURN_TO_LAUNCH: commands.return_to_launch,
+            MavCmd.NAV_TAKEOFF: commands.refuse_to_fly,
+            MavCmd.NAV_LAND: commands.refuse_to_fly,
+            MavCmd.MISSION_START: commands.start_mission,
+            MavCmd.DO_REPOSITION: commands.reposition,
+            MavCmd.DO_CHANGE_SPEED: commands.change_speed,
+            DO_SET_MISSION_CURRENT: commands.set_mission_current,
+            MavCmd.PREFLIGHT_REBOOT_SHUTDOWN: commands.reboot_shutdown,
+            MavCmd.REQUEST_PROTOCOL_VERSION: commands.request_protocol_version,
+        },
+        set_mode=commands.set_mode,
+        set_mode_acked_as=MavCmd.DO_SET_MODE,
+    )
+
+
+class Px4Commands:
+    """The actions; each takes a command and now, and gives its result."""
+
+    def __init__(self, parts: CommandParts) -> None:
+        self._parts = parts
+        self._flight = parts.flight
+
+    def __repr__(self) -> str:
+        return f"Px4Commands({self._flight!r})"
+
+    def arm_disarm(self, command: Command, now: float) -> MavResult:
+        """Arm or disarm; a ground vehicle may be disarmed at any time."""
+        arm = command.params[0]
+        if arm == 1.0:
+            return _done(self._flight.arm(forced=False, now=now))
+        if arm == 0.0:
+            self._flight.set_armed(False)
+            return MavResult.ACCEPTED
+        return MavResult.UNSUPPORTED
+
+    def do_set_mode(self, command: Command, now: float) -> MavResult:
+        """Change the mode; param2 is the main mode, param3 the sub mode."""
+        base_mode, main, sub = command.params[:3]
+        sub = 0.0 if math.isnan(sub) else sub
+        if not all(0 <= value <= 255 for value in (base_mode, main, sub)):  # NaN is not, either
+            return MavResult.DENIED
+        return self.set_mode(int(base_mode), int(main) << 16 | int(sub) << 24, now)
+
+    def set_mode(self, base_mode: int, custom_mode: int, now: float) -> MavResult:
+        """Change the mode."""
+        if not base_mode & MavModeFlag.CUSTOM_MODE_ENABLED:
+            return MavResult.DENIED
+        return _done(self._flight.request_custom_mode(custom_mode, now=now))
+
+    def return_to_launch(self, _command: Command, now: float) -> MavResult:
+        """Enter RTL."""
+        return _done(self._flight.request_mode(Mode.RTL, now=now))
+
+    def refuse_to_fly(self, _command: Command, _now: float) -> MavResult:
+        """A rover has no mode for it."""
+        self._parts.outbox.say(MavSeverity.CRITICAL, "A rover neither takes off nor lands")
+        return MavResult.TEMPORARILY_REJECTED
+
+    def start_mission(self, command: Command, now: float) -> MavResult:
+        """Enter MISSION and arm, at an item or (-1) at the present one."""
+        first, missions = command.params[0], self._parts.missions
+        if missions.route() is None:
+            text = "Mission start denied! No valid mission"
+            self._parts.outbox.say(MavSeverity.CRITICAL, text)
+            return MavResult.DENIED
+        if not -1 <= first < missions.item_count:  # NaN is not, either
+            return MavResult.DENIED
+        if first >= 0:
+            self._flight.skip_to_item(int(first))
+        started = self._flight.request_mode(Mode.AUTO, now=now)
+        return _done(started and self._flight.arm(forced=False, now=now))
+
+    def reposition(self, command: Command, now: float) -> MavResult:
+        """Drive to a place in HOLD, from either form of the command; no place: stay here."""
+        if command.params[1] != CHANGE_MODE:
+            return MavResult.UNSUPPORTED
+        place = _place(command)
+        if place is None:
+            return _done(self._flight.reposition(None, now=now))
+        latitude, longitude = place
+        if abs(latitude) > LATITUDE_LIMIT_DEGE7 or abs(longitude) > LONGITUDE_LIMIT_DEGE7:
+            return MavResult.DENIED
+        destination = Destination(*self._parts.origin.to_local(round(latitude), round(longitude)))
+        return _done(self._flight.reposition(destination, now=now))
+
+    def change_speed(self, command: Command, _now: float) -> MavResult:
+        """Change how fast it drives by itself."""
+        changed = self._flight.change_speed(command.params[1])
+        return MavResult.ACCEPTED if changed else MavResult.DENIED
+
+    def set_mission_current(self, command: Command, _now: float) -> MavResult:
+        """Go on with another mission item."""
+        seq = command.params[0]
+        if not 0 <= seq <= 65535 or not self._flight.skip_to_item(int(seq)):
+            return MavResult.DENIED
+        return MavResult.ACCEPTED
+
+    def reboot_shutdown(self, command: Command, now: float) -> MavResult:
+        """Restart, disarmed."""
+        if command.params[0] == NOTHING:
+            return MavResult.ACCEPTED
+        if command.params[0] not in (REBOOT, REBOOT_TO_BOOTLOADER) or self._flight.armed:
+            return MavResult.DENIED
+        self._parts.reboot(now)
+        return MavResult.ACCEPTED
+
+    def request_protocol_version(self, _command: Command, now: float) -> MavResult:
+        """Send PROTOCOL_VERSION; without it a QGroundControl falls back to MAVLink 1."""
+        self._parts.send_now(messages.ProtocolVersion.id, now)
+        return MavResult.ACCEPTED
+
+
+def _place(command: Command) -> tuple[float, float] | None:
+    """Latitude and longitude in degE7, not checked; None: none given. Beyond Earth: a mistake."""
+    if command.place is not None:
+        return None if command.place == (NOT_GIVEN, NOT_GIVEN) else command.place
+    if command.degrees is None or any(math.isnan(value) for value in command.degrees):
+        return None
+    latitude, longitude = command.degrees
+    return latitude * 1e7, longitude * 1e7
+
+
+def _done(success: bool) -> MavResult:
+    return MavResult.ACCEPTED if success else MavResult.TEMPORARILY_REJECTED

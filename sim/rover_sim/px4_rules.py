@@ -1,0 +1,203 @@
+"""Modes, arming and the offboard-loss failsafe of a PX4 1.15 rover, after its commander.
+
+Modelled: what a mode needs to be entered or armed in (OFFBOARD a stream, MISSION a mission), the
+stream's loss (COM_OF_LOSS_T, COM_OBL_RC_ACT) and its return, places for HOLD (DO_REPOSITION).
+Stricter than the real one: that takes any mode while disarmed, and refuses to arm in it instead.
+Not modelled: failsafes of data link, battery, fence and estimator; the 5 s of Hold that precede
+RTL (COM_FAIL_ACT_T); AUTO.LAND; loss of sticks, which nobody holds here until a test does.
+Texts fit into one STATUSTEXT and lack the tab that the real ones end with (it sends an EVENT beside
+each, and a ground station then drops the text).
+"""
+
+import math
+from collections.abc import Mapping
+
+from mav_tasks.mavlink.enums import MavSeverity, MavState
+from rover_sim.estimate import Estimate
+from rover_sim.flight_rules import SETTLING_TIME, FlightParts, Intervention
+from rover_sim.modes import Mode
+from rover_sim.offboard import Offboard
+from rover_sim.px4_setpoints import Setpoint, read_px4_global, read_px4_local
+from rover_sim.route import Route
+from rover_sim.setpoints import Destination, Global, Local, Target
+from rover_sim.steering import HOLD, Demand, steer_to_point
+
+ARRIVAL_RADIUS = 0.3  # m
+
+NAMES: Mapping[Mode, str] = {
+    Mode.MANUAL: "Manual",
+    Mode.POSITION: "Position",
+    Mode.HOLD: "Hold",
+    Mode.AUTO: "Mission",
+    Mode.RTL: "Return",
+    Mode.GUIDED: "Offboard",
+}
+
+# COM_OBL_RC_ACT, 1.15. The modes of 0 to 2 (position, altitude, manual) need sticks; without them
+# the real one goes on to a mode that does not, here HOLD. Landing (4) is standing, for a rover.
+LOST: Mapping[int, Intervention] = {
+    3: Intervention(Mode.RTL),
+    6: Intervention(disarm=True),  # terminate: the real one also stays locked until a restart
+    7: Intervention(disarm=True),
+}
+LOST_OTHERWISE = Intervention(Mode.HOLD)
+
+
+class Px4Rules:
+    """Implements ``FlightRules``."""
+
+    reposition_mode = Mode.HOLD
+
+    def __init__(self, parts: FlightParts) -> None:
+        self._parts = parts
+        self._offboard = Offboard()
+        self._intended = Mode.HOLD  # what somebody asked for; a failsafe does not change it
+        self._failing = False
+        self._place: Destination | None = None
+        self._cruise: float | None = None  # m/s, from DO_CHANGE_SPEED
+
+    def __repr__(self) -> str:
+        return f"Px4Rules({self._intended.name}, {self._offboard!r})"
+
+    @property
+    def target(self) -> Target | None:
+        """What the setpoints ask for, in OFFBOARD."""
+        return self._offboard.target
+
+    @property
+    def hold_destination(self) -> Destination | None:
+        """Where DO_REPOSITION sent it."""
+        return self._place
+
+    @property
+    def cruise_speed(self) -> float:
+        """How fast it drives by itself, m/s."""
+        limit = self._parts.speed_limit()
+        return limit if self._cruise is None else min(self._cruise, limit)
+
+    def system_status(self, mode: Mode, *, armed: bool) -> MavState:
+        """MAV_STATE: from failsafe and arming, not from the mode."""
+        del mode
+        if self._failing:
+            return MavState.CRITICAL
+        return MavState.ACTIVE if armed else MavState.STANDBY
+
+    def arming_text(self, *, armed: bool) -> str:
+        """Give the text that tells of arming or disarming."""
+        return "Armed by external command" if armed else "Disarmed by external command"
+
+    def unknown_mode(self, custom_mode: int) -> str:
+        """Give the text for a number that is no mode."""
+        return f"Unsupported mode {custom_mode:#010x}"
+
+    def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
+        """Refuse a mode that could not run now."""
+        del present
+        if self._can_run(wanted, now):
+            return None
+        return f"Switching to {NAMES[wanted]} is currently not available"
+
+    def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
+        """Refuse too early, or in a mode that could not run; forcing skips nothing from outside."""
+        del forced
+        if now - self._parts.started < SETTLING_TIME:
+            return "Arming denied: health checks not passed yet"
+        if not self._can_run(mode, now):
+            return f"Arming denied: {NAMES[mode]} cannot run"
+        return None
+
+    def choose(self, mode: Mode) -> None:
+        """Note what somebody asked for: it ends a failsafe, also in the same mode."""
+        self._intended = mode
+        self._failing = False
+
+    def enter(self, mode: Mode) -> None:
+        """Begin a mode with nothing left of the one before."""
+        del mode
+        self._offboard.clear()
+        self._place = self._cruise = None
+
+    def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:
+        """Leave OFFBOARD when the stream is lost, and go back to it when it returns.
+
+        Back unasked, and driving: the failsafe holds only while its cause does.
+        """
+        if not armed or self._intended is not Mode.GUIDED:
+            self._failing = False
+            return None
+        lost = self._offboard.silence(now=now) > self._parts.parameters["COM_OF_LOSS_T"]
+        self._failing = lost
+        if lost and mode is Mode.GUIDED:
+            action = LOST.get(int(self._parts.parameters["COM_OBL_RC_ACT"]), LOST_OTHERWISE)
+            what = "disarming" if action.mode is None else f"entering {NAMES[action.mode]}"
+            self._say(f"Failsafe: no offboard signal, {what}")
+            return action
+        if not lost and mode is not Mode.GUIDED:
+            self._say("Failsafe cleared: back to Offboard")
+            return Intervention(Mode.GUIDED)
+        return None
+
+    def hear_heartbeat(self, system_id: int, *, now: float) -> None:
+        """Nothing hangs on a ground station (NAV_DLL_ACT is 0)."""
+
+    def take_local(self, message: Local, estimate: Estimate, *, mode: Mode, now: float) -> None:
+        """Count a setpoint; in OFFBOARD follow it."""
+        yaw_rate = self._parts.honours_yaw_rate
+        self._take(read_px4_local(message, estimate, yaw_rate=yaw_rate), mode, now)
+
+    def take_global(self, message: Global, estimate: Estimate, *, mode: Mode, now: float) -> None:
+        """Count a setpoint; in OFFBOARD follow it."""
+        self._take(read_px4_global(message, estimate, self._parts.origin), mode, now)
+
+    def go_to(self, destination: Destination | None, *, now: float) -> None:
+        """Drive to a place in HOLD; None: stay here."""
+        del now
+        self._place = destination
+
+    def change_speed(self, speed: float, mode: Mode) -> bool:
+        """Set how fast it drives by itself, until the mode changes; 0 or less: as before."""
+        del mode
+        if not math.isfinite(speed):
+            return False
+        self._cruise = speed if speed > 0.0 else None
+        return True
+
+    def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
+        """Say how to move in OFFBOARD."""
+        del now
+        return self._offboard.demand(estimate, self._parts.speed_limit())
+
+    def hold(self, estimate: Estimate) -> Demand:
+        """Drive to the place of DO_REPOSITION, if there is one; stand."""
+        if self._place is None:
+            return HOLD
+        speed, radius = self.cruise_speed, ARRIVAL_RADIUS
+        demand = steer_to_point(estimate, *self._place, speed, radius=radius)
+        if demand is None:
+            self._place = None
+            return HOLD
+        return demand
+
+    def mission_route(self, home: Destination) -> Route | None:
+        """Give the stored mission, from the item that it has come to."""
+        del home
+        route = self._parts.missions.route()
+        if route is not None:
+            route.skip_to(self._parts.missions.current)
+        return route
+
+    def _can_run(self, mode: Mode, now: float) -> bool:
+        if mode is Mode.GUIDED:
+            return self._offboard.is_streaming(now=now)
+        return mode is not Mode.AUTO or self._parts.missions.route() is not None
+
+    def _take(self, reading: Setpoint | str, mode: Mode, now: float) -> None:
+        if isinstance(reading, str):
+            self._say(reading)
+            return
+        self._offboard.hear(now=now)
+        if mode is Mode.GUIDED:
+            self._offboard.follow(reading)
+
+    def _say(self, text: str) -> None:
+        self._parts.outbox.say(MavSeverity.CRITICAL, text)

@@ -1,0 +1,98 @@
+"""SET_POSITION_TARGET_*: what a PX4 rover makes of them. Pure reading; nothing is ever answered.
+
+After PX4 1.15's receiver: a field counts as given if its own bit of the mask is clear and it is a
+number (NaN is "not given", and harmless). In BODY_NED there are velocities only, and only whole.
+"""
+
+import math
+from typing import NamedTuple
+
+from mav_tasks.mavlink.enums import MavFrame
+from rover_sim.body import wrap_angle
+from rover_sim.estimate import Estimate
+from rover_sim.geo import Origin
+from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
+
+# POSITION_TARGET_TYPEMASK, the bits of the first of three axes
+X, VX, AX = 1, 8, 64
+FORCE = 512
+YAW_RATE_IGNORED = 2048
+GLOBAL_INT_FRAMES = (5, 6, 11)  # the INT forms only
+
+Vector = tuple[float | None, float | None, float | None]
+
+
+class Setpoint(NamedTuple):
+    """One that counts as a sign of life of the stream, whether or not a rover can drive it."""
+
+    target: Target | None  # None: it stands (an acceleration, or half of a place or velocity)
+    speed: float | None = None  # m/s towards a place, where one came with it
+
+
+def read_px4_local(message: Local, estimate: Estimate, *, yaw_rate: bool) -> Setpoint | str:
+    """Read SET_POSITION_TARGET_LOCAL_NED; a text says why it does not count.
+
+    ``yaw_rate``: whether the rover turns at one in BODY_NED. Yaw is passed over.
+    """
+    position = _given(message.type_mask, X, (message.x, message.y, message.z))
+    velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
+    acceleration = _given(message.type_mask, AX, (message.afx, message.afy, message.afz))
+    if message.coordinate_frame == MavFrame.LOCAL_NED:
+        return _setpoint(message, position, velocity, acceleration, estimate)
+    if message.coordinate_frame != MavFrame.BODY_NED:
+        return f"Setpoint frame {message.coordinate_frame} unsupported"
+    forward, right, down = velocity
+    if forward is None or right is None or down is None:
+        return _setpoint(message, NOTHING, NOTHING, acceleration, estimate)
+    rate = message.yaw_rate
+    if yaw_rate and not message.type_mask & YAW_RATE_IGNORED and math.isfinite(rate):
+        return Setpoint(TurnRate(rate, forward))
+    cos, sin = math.cos(estimate.yaw), math.sin(estimate.yaw)
+    turned = (forward * cos - right * sin, forward * sin + right * cos, down)
+    return _setpoint(message, NOTHING, turned, acceleration, estimate)
+
+
+def read_px4_global(message: Global, estimate: Estimate, origin: Origin) -> Setpoint | str:
+    """Read SET_POSITION_TARGET_GLOBAL_INT; a text says why it does not count."""
+    position: Vector = NOTHING
+    if not message.type_mask & (X | X << 1 | X << 2):
+        if message.coordinate_frame not in GLOBAL_INT_FRAMES:
+            return f"Setpoint frame {message.coordinate_frame} unsupported"
+        position = (*origin.to_local(message.lat_int, message.lon_int), 0.0)
+    velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
+    acceleration = _given(message.type_mask, AX, (message.afx, message.afy, message.afz))
+    return _setpoint(message, position, velocity, acceleration, estimate)
+
+
+NOTHING: Vector = (None, None, None)
+
+
+def _given(mask: int, first_bit: int, values: tuple[float, float, float]) -> Vector:
+    x, y, z = (
+        value if not mask & first_bit << axis and math.isfinite(value) else None
+        for axis, value in enumerate(values)
+    )
+    return x, y, z
+
+
+def _setpoint(
+    message: Local | Global,
+    position: Vector,
+    velocity: Vector,
+    acceleration: Vector,
+    estimate: Estimate,
+) -> Setpoint | str:
+    if acceleration != NOTHING and message.type_mask & FORCE:
+        return "Setpoint with force unsupported"
+    if position == velocity == acceleration == NOTHING:
+        return "Setpoint invalid: nothing given"
+    north, east, _ = position
+    vn, ve, _ = velocity
+    speed = math.hypot(vn, ve) if vn is not None and ve is not None else None
+    if north is not None and east is not None:
+        return Setpoint(Destination(north, east), speed or None)
+    if speed is None or vn is None or ve is None:
+        return Setpoint(None)
+    # There is no backwards: a rover drives to where the vector points, and turns round for it.
+    yaw = math.atan2(ve, vn) if speed > 0.0 else estimate.yaw
+    return Setpoint(Heading(wrap_angle(yaw), speed))
