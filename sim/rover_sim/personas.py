@@ -49,7 +49,7 @@ class Persona:
     parameters: tuple[Parameter, ...]
     system_id_parameter: str  # the name of the one that shows the system id
     speed_parameter: str  # the name of the one that limits its speed, m/s
-    honours_yaw_rate: bool  # a setpoint's yaw rate turns it; where False it is passed over
+    honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
 
 
 ARDUPILOT = Persona(
