@@ -47,7 +47,7 @@ def simulator(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     try:
         line = process.stdout.readline()
         started = re.fullmatch(
-            r"rover_sim: rover \d+ \(ardupilot, \w+\) on udp 127\.0\.0\.1:(\d+)\n", line
+            r"rover_sim: rover \d+ \(\w+, \w+\) on udp 127\.0\.0\.1:(\d+)\n", line
         )
         assert started, line
         yield process, int(started[1])
@@ -193,6 +193,15 @@ def test_several_rovers_share_the_socket_and_are_told_apart() -> None:
         assert c.wait("LOCAL_POSITION_NED", is_from(7)).y == pytest.approx(6.0, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("persona", "autopilot", "custom_mode"),
+    [("ardupilot", 3, 0), ("px4", 12, 0x03040000), ("generic", 0, 0x03040000)],
+)
+def test_a_rover_is_of_the_make_asked_for(persona: str, autopilot: int, custom_mode: int) -> None:
+    with simulator("--body", "kinematic", "--persona", persona) as (_, port), client(port) as c:
+        assert c.wait("HEARTBEAT", shows(1, custom_mode)).autopilot == autopilot
+
+
 def test_interrupt_ends_it_orderly() -> None:
     with simulator("--body", "kinematic") as (process, _):
         process.send_signal(signal.SIGINT)
@@ -244,6 +253,7 @@ def test_missing_pybullet_is_one_clear_line(tmp_path: Path) -> None:
         (("--count", "0"), "--count"),
         (("--system-id", "255", "--count", "2"), "--system-id"),
         (("--speed", "never"), "--speed"),
+        (("--persona", "betaflight"), "--persona"),
         (("--friction", "-1"), "--friction"),
         (("--friction", "nan"), "--friction"),
         (("--friction-variation", "0.3"), "--seed"),

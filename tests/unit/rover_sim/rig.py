@@ -1,5 +1,6 @@
 """A simulated rover in virtual time with clients on its link; no socket, no sleep."""
 
+import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import TypeVar
@@ -12,7 +13,7 @@ from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import BodyState, Pose
 from rover_sim.kinematic import KinematicBody
-from rover_sim.personas import ARDUPILOT
+from rover_sim.personas import ARDUPILOT, PX4, Persona
 from rover_sim.vehicle import make_vehicle
 
 #: shows each change at once, so that a test need not wait for the next second
@@ -27,6 +28,8 @@ VELOCITY_AND_YAW = 0x09C7
 POSITION = 0x0DF8
 LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED = 1, 7, 8, 9
 MANUAL, HOLD, AUTO, RTL, GUIDED, INITIALISING = 0, 4, 10, 11, 15, 16
+PX4_MANUAL, PX4_POSCTL, PX4_OFFBOARD = 1 << 16, 3 << 16, 6 << 16
+PX4_HOLD, PX4_MISSION, PX4_RTL = 0x03040000, 0x04040000, 0x05040000
 READY = 1.0  # s after which a rover has started and can be armed
 
 M = TypeVar("M", bound=Message)
@@ -35,10 +38,17 @@ M = TypeVar("M", bound=Message)
 class Rig:
     """One rover with system id 1, and what its client hears."""
 
-    def __init__(self, *, start: Pose = ORIGIN, slip: float = 0.3, wait: float = READY) -> None:
+    def __init__(
+        self,
+        *,
+        start: Pose = ORIGIN,
+        slip: float = 0.3,
+        wait: float = READY,
+        persona: Persona = PROMPT,
+    ) -> None:
         self.now = 1000.0
         body = KinematicBody(start=start, slip=slip, seed=None)
-        self.vehicle = make_vehicle(body, system_id=1, persona=PROMPT, now=self.now)
+        self.vehicle = make_vehicle(body, system_id=1, persona=persona, now=self.now)
         self.autopilot = self.vehicle.autopilot
         self.heard: list[Message] = []
         self._decoder = Decoder()
@@ -140,6 +150,31 @@ class Rig:
                 message = self._decoder.decode(packet)
                 assert message is not None
                 self.heard.append(message)
+
+
+class Px4Rig(Rig):
+    """One rover that speaks as PX4 does."""
+
+    def __init__(
+        self, *, start: Pose = ORIGIN, wait: float = READY, persona: Persona = PX4
+    ) -> None:
+        super().__init__(start=start, wait=wait, persona=persona)
+
+    def set_mode(self, custom_mode: int) -> MavResult:
+        return self.command(
+            MavCmd.DO_SET_MODE, 1, custom_mode >> 16 & 0xFF, custom_mode >> 24, math.nan
+        )
+
+    def mode(self) -> int:
+        """The mode as HEARTBEAT has it, without waiting for the next one."""
+        self.command(MavCmd.REQUEST_MESSAGE, m.Heartbeat.id)
+        return int(self.last(m.Heartbeat).custom_mode)
+
+    def ready_to_drive(self) -> None:
+        """Armed in HOLD, then OFFBOARD on a stream of zeros."""
+        assert self.arm() == MavResult.ACCEPTED
+        self.run(1.0, velocity(0.0))
+        assert self.set_mode(PX4_OFFBOARD) == MavResult.ACCEPTED
 
 
 def heartbeat() -> m.Heartbeat:

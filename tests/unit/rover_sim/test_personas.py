@@ -1,0 +1,148 @@
+"""What each make answers: one table of (persona, message, answer)."""
+
+import math
+from typing import Any
+
+import pytest
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
+from mav_tasks.mavlink.messages import Message
+from rover_sim.geo import DEFAULT_ORIGIN
+from rover_sim.personas import PERSONAS
+from tests.unit.rover_sim.rig import Rig
+
+A, P, G = "ardupilot", "px4", "generic"
+NAN = math.nan
+X, Y = DEFAULT_ORIGIN.to_global(4.0, 2.0)
+NO_PLACE = 0x7FFFFFFF
+
+
+def long(command: int, *params: float, component: int = 1) -> m.CommandLong:
+    padded = (*params, *(0.0,) * (7 - len(params)))
+    return m.CommandLong(1, component, command, 0, *padded)
+
+
+def reposition(flags: float = 1.0, *, x: int = X, y: int = Y, frame: int = 0) -> m.CommandInt:
+    return m.CommandInt(1, 1, frame, MavCmd.DO_REPOSITION, 0, 0, -1.0, flags, 0.0, NAN, x, y, 0.0)
+
+
+def ack(command: int, result: MavResult) -> list[dict[str, Any]]:
+    return [{"mavpackettype": "COMMAND_ACK", "command": command, "result": result}]
+
+
+def mission_ack(result: MavMissionResult) -> list[dict[str, Any]]:
+    return [{"mavpackettype": "MISSION_ACK", "type": result}]
+
+
+ACCEPTED, FAILED, DENIED = MavResult.ACCEPTED, MavResult.FAILED, MavResult.DENIED
+REJECTED, UNSUPPORTED = MavResult.TEMPORARILY_REJECTED, MavResult.UNSUPPORTED
+MODE, ARM, GO = MavCmd.DO_SET_MODE, MavCmd.COMPONENT_ARM_DISARM, MavCmd.DO_REPOSITION
+SILENCE: list[dict[str, Any]] = []
+
+TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
+    # modes: ArduPilot's number in param2; PX4's main mode in param2, sub mode in param3
+    (A, long(MODE, 1, 4), ack(MODE, ACCEPTED)),
+    (P, long(MODE, 1, 4, 3), ack(MODE, ACCEPTED)),
+    (P, long(MODE, 1 | 128, 4, 5), ack(MODE, ACCEPTED)),
+    (P, long(MODE, 1, 1, NAN), ack(MODE, ACCEPTED)),
+    (P, long(MODE, 1, 3), ack(MODE, ACCEPTED)),
+    (P, long(MODE, 1, 4, 4), ack(MODE, REJECTED)),  # there is no mission
+    (P, long(MODE, 1, 6), ack(MODE, REJECTED)),  # nothing streams
+    (P, long(MODE, 1, 4, 9), ack(MODE, REJECTED)),
+    (P, long(MODE, 1, 99), ack(MODE, REJECTED)),
+    (P, long(MODE, 0, 4, 3), ack(MODE, DENIED)),
+    (P, long(MODE, NAN, NAN, NAN), ack(MODE, DENIED)),
+    (A, long(MODE, 1, 99), ack(MODE, FAILED)),
+    # the old message: the whole number for all; PX4 answers as to the command
+    (A, m.SetMode(1, 1, 4), ack(11, ACCEPTED)),
+    (P, m.SetMode(1, 1, 0x03040000), ack(MODE, ACCEPTED)),
+    (P, m.SetMode(1, 1, 0x00060000), ack(MODE, REJECTED)),
+    # arming
+    (P, long(ARM, 1), ack(ARM, ACCEPTED)),
+    (P, long(ARM, 0), ack(ARM, ACCEPTED)),
+    (P, long(ARM, 0.5), ack(ARM, UNSUPPORTED)),
+    # going somewhere
+    (A, reposition(), ack(GO, ACCEPTED)),
+    (A, long(GO, -1, 1, 0, NAN, NAN, NAN, NAN), ack(GO, UNSUPPORTED)),
+    (P, reposition(), ack(GO, ACCEPTED)),
+    (P, reposition(x=NO_PLACE, y=NO_PLACE), ack(GO, ACCEPTED)),
+    (P, reposition(x=0x7FF80000, y=0x7FF80000), ack(GO, DENIED)),
+    (P, reposition(0.0), ack(GO, UNSUPPORTED)),  # only with the mode change
+    (P, long(GO, -1, 1, 0, NAN, X * 1e-7, Y * 1e-7, NAN), ack(GO, ACCEPTED)),
+    (P, long(GO, -1, 1, 0, NAN, NAN, NAN, NAN), ack(GO, ACCEPTED)),
+    (P, long(GO, -1, 1, 0, NAN, 91.0, 0.0, 0.0), ack(GO, DENIED)),
+    (P, long(GO, -1, 1, 0, NAN, math.inf, 0.0, 0.0), ack(GO, DENIED)),
+    (P, long(MavCmd.NAV_RETURN_TO_LAUNCH), ack(MavCmd.NAV_RETURN_TO_LAUNCH, ACCEPTED)),
+    (P, long(MavCmd.NAV_TAKEOFF), ack(MavCmd.NAV_TAKEOFF, REJECTED)),
+    (P, long(MavCmd.NAV_LAND), ack(MavCmd.NAV_LAND, REJECTED)),
+    (A, long(MavCmd.NAV_TAKEOFF), ack(MavCmd.NAV_TAKEOFF, UNSUPPORTED)),
+    (P, long(MavCmd.DO_CHANGE_SPEED, 1, 2.0), ack(MavCmd.DO_CHANGE_SPEED, ACCEPTED)),
+    (P, long(MavCmd.DO_CHANGE_SPEED, 1, NAN), ack(MavCmd.DO_CHANGE_SPEED, DENIED)),
+    (A, long(MavCmd.MISSION_START), ack(MavCmd.MISSION_START, ACCEPTED)),  # its own square
+    (P, long(MavCmd.MISSION_START), ack(MavCmd.MISSION_START, DENIED)),
+    (P, long(224, 3), ack(224, DENIED)),  # no such mission item
+    # whatever else
+    (A, long(31010), ack(31010, UNSUPPORTED)),
+    (P, long(31010), ack(31010, UNSUPPORTED)),
+    (P, long(MavCmd.DO_PAUSE_CONTINUE), ack(MavCmd.DO_PAUSE_CONTINUE, UNSUPPORTED)),
+    (A, long(512, 397), ack(512, FAILED)),
+    (P, long(512, 397), ack(512, DENIED)),
+    (P, long(512, 435), ack(512, DENIED)),
+    (P, long(511, 12_000, 1e5), ack(511, FAILED)),
+    (P, long(511, 30, 50_000), ack(511, ACCEPTED)),
+    (P, long(246, 0), ack(246, ACCEPTED)),
+    (P, long(246, 1), ack(246, ACCEPTED)),
+    (P, long(246, 2), ack(246, DENIED)),
+    (A, long(31010, component=50), ack(31010, UNSUPPORTED)),
+    (P, long(31010, component=0), ack(31010, UNSUPPORTED)),
+    (P, long(31010, component=50), SILENCE),
+    # plans
+    (A, m.MissionCount(1, 1, 1), [{"mavpackettype": "MISSION_REQUEST", "seq": 0}]),
+    (P, m.MissionCount(1, 1, 1), [{"mavpackettype": "MISSION_REQUEST_INT", "seq": 0}]),
+    (P, m.MissionCount(1, 1, 0), mission_ack(MavMissionResult.ACCEPTED)),
+    (P, m.MissionCount(1, 1, 3000), mission_ack(MavMissionResult.NO_SPACE)),
+    (P, m.MissionCount(1, 1, 1, 7), mission_ack(MavMissionResult.INVALID)),
+    (P, m.MissionClearAll(1, 1, 255), mission_ack(MavMissionResult.ACCEPTED)),
+    (P, m.MissionRequestList(1, 1), [{"mavpackettype": "MISSION_COUNT", "opaque_id": 0}]),
+    # parameters
+    (P, m.ParamRequestRead(1, 1, b"NO_SUCH", -1), SILENCE),
+    (P, m.ParamSet(1, 1, b"NO_SUCH", 1.0, 9), SILENCE),
+    (P, m.ParamSet(1, 1, b"COM_OF_LOSS_T", 1.0, 6), SILENCE),  # of another type
+    (A, m.ParamRequestRead(1, 1, b"_HASH_CHECK", -1), SILENCE),
+]
+#: a generic one speaks as PX4 does
+TABLE += [(G, message, answer) for name, message, answer in TABLE if name == P]
+
+
+@pytest.mark.parametrize(("name", "message", "answer"), TABLE)
+def test_what_it_answers(name: str, message: Message, answer: list[dict[str, Any]]) -> None:
+    rig = Rig(persona=PERSONAS[name])
+    rig.heard.clear()
+    rig.send(message)
+    heard = [each.to_dict() for each in rig.heard if not isinstance(each, m.Statustext)]
+    wanted = [{key: found[key] for key in each} for each, found in zip(answer, heard, strict=True)]
+    assert wanted == answer
+
+
+def test_each_persona_shows_itself() -> None:
+    shown = {}
+    for name, persona in PERSONAS.items():
+        rig = Rig(persona=persona)
+        beat = rig.last(m.Heartbeat)
+        shown[name] = (beat.autopilot, beat.type, hex(beat.custom_mode), beat.base_mode & 129)
+    assert shown == {
+        A: (3, 10, "0x10", 1),  # still initialising, with the first beat
+        P: (12, 10, "0x3040000", 1),
+        G: (0, 10, "0x3040000", 1),
+    }
+
+
+@pytest.mark.parametrize("name", PERSONAS)
+@pytest.mark.parametrize("value", [NAN, math.inf, -math.inf, -1e30, 1e30])
+def test_unusable_numbers_in_commands_arm_nothing(name: str, value: float) -> None:
+    rig = Rig(persona=PERSONAS[name])
+    for command in (*MavCmd, 224):
+        if (name, command) != (A, MavCmd.DO_CHANGE_SPEED):  # which makes ArduPilot abort
+            rig.send(long(command, *[value] * 7))
+    assert not rig.autopilot.armed
