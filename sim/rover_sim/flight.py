@@ -115,7 +115,7 @@ class FlightControl:
         """Go on with another mission item, now or when AUTO is next entered; False: refused."""
         if not self._missions.move_to(seq):
             return False
-        if self._route is not None and self._missions.item_count > 0:
+        if self.mode is Mode.AUTO and self._route is not None and self._missions.item_count > 0:
             self._route.skip_to(seq)
         return True
 

@@ -35,10 +35,8 @@ class Route:
 
     def skip_to(self, seq: int) -> None:
         """Go on from the first waypoint at or after a mission item."""
-        numbers = [waypoint.seq for waypoint in self._waypoints]
-        self._index = next(
-            (i for i, n in enumerate(numbers) if n is not None and n >= seq), len(numbers)
-        )
+        numbers = [waypoint.seq or 0 for waypoint in self._waypoints]
+        self._index = next((i for i, n in enumerate(numbers) if n >= seq), len(numbers))
 
     def demand(self, estimate: Estimate, speed_limit: float) -> tuple[Demand, Waypoint | None]:
         """Say how to move now, and which waypoint has just been reached."""

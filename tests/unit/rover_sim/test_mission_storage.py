@@ -8,7 +8,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.unit.rover_sim.rig import AUTO, CLIENT, Rig
+from tests.unit.rover_sim.rig import AUTO, CLIENT, RTL, Rig, velocity
 
 OTHER_CLIENT = Address(255, 190)
 
@@ -145,3 +145,14 @@ def test_set_current_is_answered_with_mission_current() -> None:
     rig.set_mode(AUTO)
     rig.send(m.MissionSetCurrent(1, 1, 2))
     assert rig.take(m.MissionCurrent)[-1].seq == 2
+
+
+def test_set_current_on_the_way_home_leaves_it_on_its_way() -> None:
+    rig = Rig()
+    upload(rig, SQUARE)
+    rig.ready_to_drive()
+    rig.run(5.0, velocity(1.0))
+    rig.set_mode(RTL)
+    rig.send(m.MissionSetCurrent(1, 1, 2))
+    rig.run(10.0)
+    assert math.hypot(rig.truth.north, rig.truth.east) < 0.4
