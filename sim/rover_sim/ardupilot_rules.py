@@ -19,6 +19,7 @@ class ArduPilotRules:
     """Implements ``FlightRules``."""
 
     reposition_mode = Mode.GUIDED
+    home_is_where_armed = False
     hold_destination: Destination | None = None  # HOLD stands
 
     def __init__(self, parts: FlightParts) -> None:

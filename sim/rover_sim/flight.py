@@ -43,6 +43,7 @@ class FlightControl:
         self._started = now
         self._route: Route | None = None
         self._sticks = STOP
+        self._home_due = False  # home is to be where it is now
         self._announced = (self.mode, self.armed)
 
     def __repr__(self) -> str:
@@ -155,6 +156,7 @@ class FlightControl:
         """Arm or disarm, without checks. Disarming always works: the rover coasts."""
         if armed is not self.armed:
             self.armed = armed
+            self._home_due = armed and self._rules.home_is_where_armed
             self._rules.choose(self.mode)
             self._outbox.say(MavSeverity.INFO, self._rules.arming_text(armed=armed))
 
@@ -177,6 +179,9 @@ class FlightControl:
     def demand(self, estimate: Estimate, *, now: float) -> Demand:
         """Say how to move now. Called once per control step: it also lets time pass."""
         self._pass_time(now)
+        if self._home_due:
+            self.home = Destination(estimate.north, estimate.east)
+            self._home_due = False
         match self.mode:
             case Mode.INITIALISING:
                 return COAST

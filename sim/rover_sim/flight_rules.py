@@ -45,6 +45,7 @@ class FlightRules(Protocol):
     """Modes, arming, setpoints and failsafes of one make."""
 
     reposition_mode: Mode  # in which it drives to the place of DO_REPOSITION
+    home_is_where_armed: bool  # else where it was switched on
 
     @property
     def target(self) -> Target | None:

@@ -4,7 +4,8 @@ Modelled: what a mode needs to be entered or armed in (OFFBOARD a stream, MISSIO
 stream's loss (COM_OF_LOSS_T, COM_OBL_RC_ACT) and its return, places for HOLD (DO_REPOSITION).
 Stricter than the real one: that takes any mode while disarmed, and refuses to arm in it instead.
 Not modelled: failsafes of data link, battery, fence and estimator; the 5 s of Hold that precede
-RTL (COM_FAIL_ACT_T); AUTO.LAND; loss of sticks, which nobody holds here until a test does.
+RTL (COM_FAIL_ACT_T); AUTO.LAND; a mission that is replaced while it is driven (the real one drives
+the new one); loss of sticks, which nobody holds here until a test does.
 Texts fit into one STATUSTEXT and lack the tab that the real ones end with (it sends an EVENT beside
 each, and a ground station then drops the text).
 """
@@ -47,6 +48,7 @@ class Px4Rules:
     """Implements ``FlightRules``."""
 
     reposition_mode = Mode.HOLD
+    home_is_where_armed = True
 
     def __init__(self, parts: FlightParts) -> None:
         self._parts = parts
@@ -118,10 +120,15 @@ class Px4Rules:
         self._place = self._cruise = None
 
     def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:
-        """Leave OFFBOARD when the stream is lost, and go back to it when it returns.
+        """Leave OFFBOARD when the stream is lost, and MISSION when there is nothing left of it.
 
-        Back unasked, and driving: the failsafe holds only while its cause does.
+        When the stream returns, so does OFFBOARD, unasked and driving: the failsafe holds only
+        while its cause does.
         """
+        missions = self._parts.missions
+        if armed and mode is Mode.AUTO and (missions.complete or missions.item_count == 0):
+            self.choose(Mode.HOLD)
+            return Intervention(Mode.HOLD)
         if not armed or self._intended is not Mode.GUIDED:
             self._failing = False
             return None

@@ -237,13 +237,21 @@ def test_change_speed_holds_while_it_drives_by_itself() -> None:
     assert rig.truth.forward_speed == pytest.approx(0.8, abs=0.02)
 
 
-def test_rtl_drives_home() -> None:
+def test_rtl_drives_to_where_it_was_armed() -> None:
     rig = Px4Rig(start=Pose(north=5.0, east=-3.0))
     rig.ready_to_drive()
     rig.run(6.0, velocity(1.0, 1.0))
+    rig.set_mode(PX4_HOLD)
+    rig.run(3.0)
+    rig.command(MavCmd.COMPONENT_ARM_DISARM, 0)
+    there = rig.truth
+    rig.ready_to_drive()
+    rig.run(6.0, velocity(1.0, 0.0))
     rig.set_mode(PX4_RTL)
     rig.run(20.0)
-    assert distance_from(rig, 5.0, -3.0) < 0.4
+    assert distance_from(rig, there.north, there.east) < 0.4
+    home = rig.last(m.HomePosition)
+    assert (home.x, home.y) == pytest.approx((there.north, there.east), abs=0.01)
 
 
 @pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.POSITION])

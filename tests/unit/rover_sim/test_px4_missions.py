@@ -129,6 +129,7 @@ def test_mission_start_arms_and_drives_it_to_its_end() -> None:
     assert math.dist((3.0, 3.0), (rig.truth.north, rig.truth.east)) < 0.4
     rig.run(1.1)
     assert rig.last(m.MissionCurrent).mission_state == 5
+    assert rig.mode() == PX4_HOLD
     assert [reached.seq for reached in rig.take(m.MissionItemReached)] == [0, 1]
 
 
@@ -149,13 +150,28 @@ def test_it_goes_on_where_it_was_left() -> None:
 
 def test_a_finished_mission_begins_anew_and_a_new_one_is_not_finished() -> None:
     rig = Px4Rig()
-    upload(rig, CORNER[:1])
+    upload(rig, CORNER)
     rig.command(MavCmd.MISSION_START)
     rig.until(lambda: "Mission Complete" in rig.texts(), limit=20.0)
-    rig.set_mode(PX4_HOLD)
+    rig.run(0.1)
+    rig.take(m.MissionItemReached)
+    assert rig.set_mode(PX4_MISSION) == MavResult.ACCEPTED
+    rig.until(lambda: "Mission Complete" in rig.texts(), limit=20.0)
+    assert [reached.seq for reached in rig.take(m.MissionItemReached)] == [0, 1]
+    rig.run(0.1)
     upload(rig, CORNER)
     rig.run(1.1)
     assert rig.last(m.MissionCurrent).mission_state == 2
+
+
+def test_a_mission_cleared_while_it_drives_ends_in_hold() -> None:
+    rig = Px4Rig()
+    upload(rig, CORNER)
+    rig.command(MavCmd.MISSION_START)
+    rig.run(2.0)
+    rig.send(m.MissionClearAll(1, 1, 0))
+    rig.run(3.0)
+    assert (rig.mode(), rig.truth.forward_speed) == (PX4_HOLD, 0.0)
 
 
 @pytest.mark.parametrize("first", [-2.0, 2.0, math.nan])
