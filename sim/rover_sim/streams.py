@@ -10,6 +10,7 @@ from mav_tasks.mavlink import messages as m
 
 OFF = 0.0
 NEVER = float("inf")
+LONGEST_TOLD = 2**31 - 1  # µs, what MESSAGE_INTERVAL has room for
 JITTER = 1e-6  # s; clock readings are not exact multiples of anything
 ALL_STREAMS = 0  # MAV_DATA_STREAM
 
@@ -107,7 +108,7 @@ class Streams:
         interval = self._intervals.get(message_id)
         if interval is None:
             return 0
-        return -1 if interval == OFF else round(interval * 1e6)
+        return -1 if interval == OFF else round(min(interval * 1e6, LONGEST_TOLD))
 
     def set_interval(self, message_id: int, interval_us: float, *, now: float) -> bool:
         """Set microseconds between two messages; 0 is the default, -1 off. False: refused."""

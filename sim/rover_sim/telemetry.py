@@ -8,7 +8,7 @@ from mav_tasks.mavlink.enums import MavFrame, MavLandedState, MavModeFlag, MavTy
 from mav_tasks.mavlink.messages import Message
 from rover_sim.estimate import Estimate
 from rover_sim.flight import FlightControl
-from rover_sim.geo import Origin
+from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
 from rover_sim.mission_conventions import FENCE, MISSION, RALLY
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
@@ -218,6 +218,8 @@ class Telemetry:
         if destination is None:
             return None
         latitude, longitude = self._origin.to_global(*destination)
+        if abs(latitude) > LATITUDE_LIMIT_DEGE7 or abs(longitude) > LONGITUDE_LIMIT_DEGE7:
+            return None  # a local place that is so far off that Earth has none
         nothing = (0.0,) * 8
         return m.PositionTargetGlobalInt(
             boot_ms, 5, TARGET_POSITION_ONLY, latitude, longitude, self._origin.altitude, *nothing

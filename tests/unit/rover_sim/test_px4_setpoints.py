@@ -168,6 +168,12 @@ def test_no_number_crashes_it_or_moves_it(mask: int, frame: int, value: float) -
     assert driven(stream, seconds=0.5).truth.forward_speed == 0.0
 
 
+def test_a_place_beyond_earth_is_driven_towards_and_not_shown_on_it() -> None:
+    rig = driven(local_target(POSITION, position=(1e30, 0.0)), seconds=2.0)
+    assert rig.truth.north > 0.5
+    assert rig.take(m.PositionTargetGlobalInt) == []
+
+
 @pytest.mark.parametrize(
     ("target", "acted_on"),
     [((0, 0), True), ((1, 0), True), ((1, 1), True), ((1, 99), False), ((2, 1), False)],

@@ -1,6 +1,9 @@
 """What a PX4 rover tells about itself, and how often."""
 
+import math
 from collections import Counter
+
+import pytest
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
@@ -74,3 +77,11 @@ def test_an_interval_goes_back_to_its_own_default() -> None:
     rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.Attitude.id, 0)
     rig.command(MavCmd.GET_MESSAGE_INTERVAL, m.Attitude.id)
     assert rig.last(m.MessageInterval).interval_us == 25_000
+
+
+@pytest.mark.parametrize("interval", [1e30, math.inf])
+def test_an_interval_of_ages_is_told_as_the_longest_there_is(interval: float) -> None:
+    rig = Px4Rig()
+    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.Attitude.id, interval) == MavResult.ACCEPTED
+    rig.command(MavCmd.GET_MESSAGE_INTERVAL, m.Attitude.id)
+    assert rig.last(m.MessageInterval).interval_us == 2**31 - 1
