@@ -19,6 +19,8 @@ from rover_sim.mission_storage import MissionStorage
 from rover_sim.outbox import Outbox
 from rover_sim.streams import Streams
 
+DO_SET_MISSION_CURRENT = 224  # MAV_CMD
+
 
 class Command(NamedTuple):
     """Either form of a command, as far as the answers need it."""
@@ -101,6 +103,3 @@ def _first_four(
 def as_id(value: float) -> int:
     """A message id from a float parameter; -1 for what cannot be one (NaN among them)."""
     return int(value) if 0 <= value <= 0xFFFFFF else -1
-
-
-DO_SET_MISSION_CURRENT = 224
