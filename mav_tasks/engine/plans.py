@@ -25,8 +25,6 @@ R, S = TaskReason, TaskState
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
 STARTED_TWICE = 2.5  # s in which a second wish to start means the first: MAVSDK sends two
-#: queues that a start does not set going again: a person must have said that all is well
-NOT_CONTINUED = frozenset({R.STOPPED, R.TAKEOVER})
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +115,8 @@ class Plans:
         Gives the task; or, when that is over, the draft of another one to be submitted, after
         which ``restarted`` is called. Rejection when there is nothing to start, or it must not be.
         """
+        if vehicle.tasks.is_stopped:
+            raise Rejection(R.STOPPED, "STOP is latched: continue first")
         stored = self.stored(vehicle.system_id, MISSION)
         if not stored.items:
             raise Rejection(R.NOT_FOUND, "no plan is uploaded")
@@ -126,9 +126,8 @@ class Plans:
         started = self._started.get(vehicle.system_id)
         if started and started.by == submitter and now - started.at <= STARTED_TWICE:
             return self._book.get(started.task.id) or started.task
-        if vehicle.tasks.paused in NOT_CONTINUED:
-            words = "STOP is latched" if vehicle.tasks.is_stopped else "somebody took it over"
-            raise Rejection(R.QUEUE_PAUSED, f"{words}: continue first")
+        if vehicle.tasks.paused is R.TAKEOVER:  # a person must have said that all is well
+            raise Rejection(R.QUEUE_PAUSED, "somebody took the rover over: continue first")
         vehicle.leave_manual(now=now)
         task = self._task(vehicle)
         if task is None or task.state in TERMINAL:

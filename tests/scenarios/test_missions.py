@@ -182,8 +182,8 @@ def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
     assert reached(world.client) == [1, 2, 3]
 
 
-@pytest.mark.parametrize("what", ["STOP", "takeover"])
-def test_after_a_stop_or_a_takeover_a_start_is_refused(world: World, what: str) -> None:
+@pytest.mark.parametrize(("what", "reason"), [("STOP", R.STOPPED), ("takeover", R.QUEUE_PAUSED)])
+def test_after_a_stop_or_a_takeover_a_start_is_refused(world: World, what: str, reason: R) -> None:
     uploaded(world)
     start(world)
     world.until_state(1, S.EXECUTING)
@@ -192,8 +192,7 @@ def test_after_a_stop_or_a_takeover_a_start_is_refused(world: World, what: str) 
     else:
         world.operator_arm(False)
     world.run(3)
-    answer = start(world)
-    assert answer == (TEMPORARILY_REJECTED, R.QUEUE_PAUSED)
+    assert start(world) == (TEMPORARILY_REJECTED, reason)
 
 
 def test_a_start_without_a_plan_is_refused(world: World) -> None:
