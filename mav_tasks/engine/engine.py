@@ -80,7 +80,7 @@ class Engine:
             recollection.restore(restored.tasks, now=now)
         self._submissions = Submissions(self._gcs, self._book, recollection, settings)
         stored = {} if restored is None else restored.plans
-        self._plans = Plans(self._book, settings, restored=stored)
+        self._plans = Plans(self._book, self._fleet, settings, restored=stored)
         self._desks = MissionDesks(
             self._gcs, self._vehicles, self._book, self._submissions, self._plans, settings
         )

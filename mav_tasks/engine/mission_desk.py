@@ -10,6 +10,7 @@ from functools import partial
 from hashlib import blake2b
 from zlib import crc32
 
+from mav_tasks.engine.fence_items import check_fence_item, check_rally_item, fence_of
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.motion_gate import GO_TO
@@ -37,7 +38,7 @@ from mav_tasks.services.mission_sender import MissionSender
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
-from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.goal import GoTo, Plan, Step
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Task, TaskId, Terms
 
@@ -205,16 +206,38 @@ class MissionDesks:
         """Whether an item can be part of a plan; keeps why not in words."""
         if kind not in STORED:
             return MavMissionResult.UNSUPPORTED
-        if kind != MISSION:
-            return None
         has_home = vehicle.persona.has_home_item and component == AUTOPILOT
         driving = self._settings.driving
         try:
-            step_of(item, seq, count=count, has_home=has_home, driving=driving)
+            if kind == MavMissionType.FENCE:
+                check_fence_item(item, seq, count=count)
+            elif kind == MavMissionType.RALLY:
+                check_rally_item(item, seq)
+            else:
+                step = step_of(item, seq, count=count, has_home=has_home, driving=driving)
+                if isinstance(step, GoTo):
+                    self._check_fence(vehicle, component, step, seq)
         except Rejection as refusal:
             self._why = refusal.text
             return result_of(refusal)
         return None
+
+    def _check_fence(self, vehicle: Vehicle, component: int, step: GoTo, seq: int) -> None:
+        """Whether a place, and the straight way from the one before, stay within the fence."""
+        if not vehicle.is_within_fence(step):
+            raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
+        items = self._desk(vehicle, component).receiver.items
+        steps: list[Step] = [step]
+        for number in range(len(items) - 1, -1, -1):  # as far as the last place
+            has_home = vehicle.persona.has_home_item and component == AUTOPILOT
+            driving = self._settings.driving
+            steps.insert(
+                0, step_of(items[number], number, count=seq, has_home=has_home, driving=driving)
+            )
+            if isinstance(steps[0], GoTo):
+                break
+        if vehicle.leg_over_fence(steps) is not None:
+            raise Rejection(R.OUTSIDE_FENCE, f"item {seq}: the way there leads over the fence")
 
     def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
         """What an address has to show: the task server, of missions, the one that is driven."""
@@ -259,6 +282,10 @@ class MissionDesks:
         has_home = vehicle.persona.has_home_item and is_staged
         driving = self._settings.driving
         wanted = plan_of(upload.items, has_home=has_home, driving=driving, now=now)
+        forbidden = vehicle.leg_over_fence(wanted.plan.steps)
+        if forbidden is not None:
+            words = f"item {forbidden}: a jump there leads over the fence"
+            raise Rejection(R.OUTSIDE_FENCE, words)
         terms = replace(wanted.terms, is_staged=is_staged)
         draft = self._draft(vehicle, wanted.plan, terms, sender)
         known = None if is_staged else self._submissions.known_plan(draft, now=now)
@@ -322,6 +349,8 @@ class MissionDesks:
     def _replace(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         """Fence and rally points, and the empty mission: nothing that is driven."""
         kind, sender = upload.mission_type, upload.sender
+        if kind == MavMissionType.FENCE:
+            fence_of(upload.items)  # a Rejection leaves the one before in force
         if kind == MISSION:
             self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)
         plan_id = crc32(packed(upload.items).encode()) if upload.items else 0

@@ -7,6 +7,7 @@ when it is over, it is another task.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from mav_tasks.engine.fence_items import fence_of, rally_of
 from mav_tasks.engine.plan_items import plan_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -16,6 +17,7 @@ from mav_tasks.services.mission_item import Item, packed, unpacked
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import PlanStored
+from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
@@ -51,17 +53,21 @@ class Plans:
     def __init__(
         self,
         book: TaskBook,
+        fleet: Fleet,
         settings: Settings,
         *,
         restored: Mapping[tuple[int, int], tuple[int, str]],
     ) -> None:
         self._book = book
+        self._fleet = fleet
         self._settings = settings
         self._stored = {
             key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
         }
         self._first: dict[int, int] = {}  # by vehicle: the item with which the next start begins
         self._started: dict[int, _Started] = {}
+        for (system_id, kind), stored in self._stored.items():
+            self._apply_bounds(system_id, kind, stored.items)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -85,8 +91,16 @@ class Plans:
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
         """Let a plan take the place of the one before; NOTHING: there is none any more."""
         self._stored[vehicle.system_id, kind] = stored
+        self._apply_bounds(vehicle.system_id, kind, stored.items)
         source = packed(stored.items)
         self._book.record(PlanStored(vehicle.system_id, kind, stored.plan_id, source, actor, now))
+
+    def _apply_bounds(self, system_id: int, kind: int, items: tuple[Item, ...]) -> None:
+        bounds = self._fleet.of(system_id).bounds
+        if kind == MavMissionType.FENCE:
+            bounds.fence = fence_of(items)
+        elif kind == MavMissionType.RALLY:
+            bounds.rally = rally_of(items)
 
     def forget_mission(self, vehicle: Vehicle, *, actor: str, now: float) -> None:
         """The staged mission is taken away, or replaced by nothing: it will not be started."""

@@ -164,6 +164,8 @@ class Submissions:
         if far is not None and far > longest:
             words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
             raise Rejection(R.BAD_PARAMETER, words)
+        if not vehicle.is_within_fence(goal):
+            raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
 
     def check_open(self) -> None:
         """Raise Rejection while nothing new is taken in."""

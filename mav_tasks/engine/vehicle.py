@@ -4,7 +4,7 @@ Its rule of order: STOP before everything; what somebody else did to the vehicle
 want; and no setpoint at all to a vehicle that is not ours.
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from math import inf
 
@@ -25,7 +25,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.frames import local_place
-from mav_tasks.tasks.goal import GlobalPlace, GoTo
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, Step
 from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
@@ -432,14 +432,28 @@ class Vehicle:
 
     @property
     def home(self) -> GlobalPlace | None:
-        """Where the vehicle returns to, if it has said so."""
-        return self._frame.home
+        """Where the vehicle returns to: the nearest rally point, else the home that it has said."""
+        motion = self._motion.latest()
+        bounds, origin = self.tasks.bounds, self._frame.origin
+        rally = bounds.refuge(motion.pose, origin) if motion is not None else None
+        return rally or self._frame.home
 
     def distance_to(self, goal: GoTo) -> float | None:
         """Give the metres to the place that a goal means, or None while that is not known."""
         motion, origin = self._motion.latest(), self._frame.origin
         place = local_place(self.home if goal.place is None else goal.place, origin)
         return None if motion is None or place is None else distance(motion.pose, place)
+
+    def is_within_fence(self, goal: GoTo) -> bool:
+        """Whether the place that a goal means is one where it may be, as far as that is known."""
+        origin = self._frame.origin
+        fence = self.tasks.bounds.local(origin)
+        place = local_place(self.home if goal.place is None else goal.place, origin)
+        return fence is None or place is None or fence.allows(place)
+
+    def leg_over_fence(self, steps: Sequence[Step]) -> int | None:
+        """Give a step of a plan to which the straight way leads over the fence, if there is one."""
+        return self.tasks.bounds.forbidden_leg(steps, self._frame.origin)
 
     def operator_lost(self, *, now: float) -> None:
         """No ground station is heard any more: nothing runs unseen."""
@@ -550,7 +564,8 @@ class Vehicle:
             still=self._motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,
             frame=self._frame.frame(),
-            home=self._frame.home,
+            home=self.home,
+            is_fence_unknown=self.tasks.bounds.is_unknown(self._frame.origin),
         )
 
     def apply(self, settings: Settings) -> None:

@@ -6,7 +6,7 @@ next upload. What an item is worth says ``check``; a plan counts only when it is
 ``finish`` was called, which is when it is acknowledged.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -83,6 +83,11 @@ class MissionReceiver:
         session = self._session
         words = "idle" if session is None else f"{len(session.items)} of {session.count} items"
         return f"MissionReceiver({words})"
+
+    @property
+    def items(self) -> Sequence[Item]:
+        """The items of the upload under way that have come so far."""
+        return self._session.items if self._session is not None else ()
 
     def take(self) -> tuple[list[ToClient], list[Upload]]:
         """Give what is to be sent, and the plans that are whole, since the last call."""

@@ -9,14 +9,15 @@ from dataclasses import replace
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.goal import GoTo, Plan, Wait
-from mav_tasks.tasks.guidance import ZERO, Motion
+from mav_tasks.tasks.goal import GoTo, Move, Plan, Rotate, Wait
+from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import WAY, distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.limits import limited
+from mav_tasks.tasks.limits import limited, within_fence
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.stage import course_of, look_on_the_way, set_out
 from mav_tasks.tasks.stuck import StuckWatch
@@ -33,8 +34,9 @@ LOSSES = frozenset({R.LINK_LOST, R.POSITION_LOST})
 class Executor:
     """The begun task of one vehicle, if there is one."""
 
-    def __init__(self, book: TaskBook, settings: Settings) -> None:
+    def __init__(self, book: TaskBook, settings: Settings, bounds: Bounds) -> None:
         self._book = book
+        self._bounds = bounds
         self._settings = settings
         self._task_id: TaskId | None = None
         self._course: Course | None = None  # while EXECUTING
@@ -47,6 +49,7 @@ class Executor:
         self._stuck = StuckWatch()
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
         self._resumes_by_itself = False
+        self._is_coming_back = False  # from outside the fence
         #: m/s, overrides what the task says (DO_CHANGE_SPEED); for this task only
         self.speed: float | None = None
 
@@ -221,9 +224,22 @@ class Executor:
         if here.target is not None and distance(motion.pose, here.target) > longest:
             self._finish(S.FAILED, R.BAD_PARAMETER, actor=SERVER, now=now)
             return None
+        if not self._bounds.allows_stage(
+            present_goal(task.goal, here), here, motion.pose, seen.origin
+        ):
+            self._refuse_stage(task, now=now)
+            return None
+        self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         self._course = course_of(task.goal, here, seen, driving=self._settings.driving)
         self._stuck.begin(now=now)
         return here
+
+    def _refuse_stage(self, task: Task, *, now: float) -> None:
+        """The way leads over the fence: nothing of it is driven."""
+        if task.progress.anchor is None and task.progress.step < 0:
+            self._finish(S.FAILED, R.OUTSIDE_FENCE, actor=SERVER, now=now)
+        else:
+            self._change(S.HELD, R.FENCE, actor=SERVER, now=now)
 
     def _execute(self, task: Task, seen: VehicleView, now: float, elapsed: float) -> Demand:
         if self._pause_if_lost(seen, now):
@@ -260,8 +276,23 @@ class Executor:
             self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
             return view.HOLD
         speed = None if course is self._way_back else self.speed or course.progress.speed
-        velocity = course.steer(motion, driving=self._settings.driving, speed=speed)
+        wish = course.steer(motion, driving=self._settings.driving, speed=speed)
+        velocity = self._within_fence(course, wish, motion, seen)
+        if velocity is None:
+            self._change(S.HELD, R.FENCE, actor=SERVER, now=now)
+            return view.HOLD
         return Demand(DemandKind.DRIVE, velocity)
+
+    def _within_fence(
+        self, course: Course, wish: Velocity, motion: Motion, seen: VehicleView
+    ) -> Velocity | None:
+        """Slow down before the fence; None: stop. A vehicle that began outside may come back in."""
+        if self._is_coming_back and isinstance(course.leg, Move | Rotate):
+            self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
+            if self._is_coming_back:
+                return wish
+        fence = self._bounds.local(seen.origin)
+        return within_fence(wish, motion.pose, fence, driving=self._settings.driving)
 
     def _arrive(
         self, task: Task, course: Course, seen: VehicleView, motion: Motion, now: float
@@ -320,6 +351,7 @@ class Executor:
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> bool:
         """Begin the next step where the vehicle is, moving or not."""
+        self._book.note_progress(task.id, progress)  # whatever becomes of it: the last one is done
         here = self._set_out(task, progress, seen, motion, now=now)
         if here is None:
             return False

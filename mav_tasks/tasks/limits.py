@@ -3,10 +3,37 @@
 Zeros pass at once and unramped: they are STOP, cancel and faults.
 """
 
-from math import isfinite
+from dataclasses import replace
+from math import copysign, isfinite, sqrt
 
 from mav_tasks.settings import Driving
+from mav_tasks.tasks.fence import LocalFence
 from mav_tasks.tasks.guidance import ZERO, Velocity
+from mav_tasks.tasks.task import Pose
+
+MARGIN = 0.05  # m left between a vehicle and its fence
+LATENCY = 0.3  # s in which a vehicle does not yet do what it is told
+CREEP = 0.02  # m/s; slower than this is standing
+
+
+def within_fence(
+    wish: Velocity, pose: Pose, fence: LocalFence | None, *, driving: Driving
+) -> Velocity | None:
+    """Give what may be asked for so that the vehicle can stop before the fence; None: stop now.
+
+    It goes by the room straight ahead, or behind for one that reverses.
+    """
+    if fence is None or wish.forward == 0.0:
+        return wish
+    ahead = wish.forward > 0.0
+    speed, braking = abs(wish.forward), driving.acceleration
+    needed = speed * LATENCY + speed * speed / (2 * braking) + MARGIN
+    room = fence.room(pose, forward=ahead, limit=needed) - MARGIN
+    if room >= needed - MARGIN:
+        return wish
+    lag = braking * LATENCY
+    most = sqrt(lag * lag + 2 * braking * max(room, 0.0)) - lag
+    return None if most < CREEP else replace(wish, forward=copysign(most, wish.forward))
 
 
 def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float) -> Velocity:

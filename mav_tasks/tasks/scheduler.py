@@ -23,6 +23,8 @@ def start_blocker(
         return TaskReason.WRONG_MODE
     if view.motion is None or now - view.motion.at > watch.motion_fresh:
         return TaskReason.NO_POSITION
+    if view.is_fence_unknown:
+        return TaskReason.NO_POSITION
     if isinstance(goal, GoTo) and place_of(goal, view) is None:
         return TaskReason.NO_POSITION
     if not view.armed and not view.may_arm:

@@ -13,6 +13,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.events import (
     SERVER,
     QueueContinued,
@@ -46,7 +47,9 @@ class VehicleTasks:
         self._room = room
         self._queue = room.queue(vehicle)
         self._settings = settings
-        self._executor = Executor(book, settings)
+        #: where it may drive, and where it returns to
+        self.bounds = Bounds()
+        self._executor = Executor(book, settings, self.bounds)
         self._jumps = JumpWatch()
         self._aside: dict[TaskId, None] = {}
         self._of_earlier_run: set[TaskId] = set()

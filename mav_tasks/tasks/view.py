@@ -36,7 +36,8 @@ class VehicleView:
     still: bool  # measured to stand still
     other_controller: bool  # somebody else's setpoints were seen just now
     frame: Frame | None = None  # that positions are in, where it is known
-    home: GlobalPlace | None = None
+    home: GlobalPlace | None = None  # where it returns to
+    is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
 
     @property
     def origin(self) -> GlobalPlace | None:

@@ -10,8 +10,9 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, DENIED, MOVE
+from tests.kit.mission import Download, Item, Upload, reached
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import World, near_pose
+from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
@@ -236,3 +237,40 @@ def test_a_place_on_earth_is_driven_to_after_a_restart(world: World, path: Path)
     world.client.proceed()
     world.until_idle(tasks=1)
     assert world.pose()[0] == pytest.approx(1.51, abs=0.04)
+
+
+def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
+    plan = (Item(16, frame=0, current=1), Item(16, **at(1, 0)), Item(16, **at(1, 1)))
+    yard = [
+        Item(5001, **at(*corner), param1=4, param4=0, frame=0)
+        for corner in ((-3, -3), (3, -3), (3, 3), (-3, 3))
+    ]
+    for kind, items in ((0, plan), (1, yard)):
+        upload = Upload(world.client, items, kind=kind)
+        world.until(lambda upload=upload: upload.result == 0, within=5)  # type: ignore[misc]
+    restart(world, path, well=True)
+    world.run(1)
+    world.client.command_int(192, -1, 0, 0, 0, **at(5, 0), frame=0)
+    world.run(0.2)
+    assert world.client.acks_of(192)[-1] == (DENIED, R.OUTSIDE_FENCE)
+    download = Download(world.client)
+    world.until(lambda: download.is_done, within=5)
+    assert (download.count, download.opaque_id) == (3, 1)
+    world.client.command(300, target=(1, 1))
+    world.until_state(1, S.COMPLETED, within=60)
+    assert is_at(world, 1, 1)
+
+
+def test_a_plan_goes_on_with_the_item_that_was_driven(world: World, path: Path) -> None:
+    items = [Item(16, **at(*p)) for p in ((1, 0), (3, 0), (3, 2))]
+    upload = Upload(world.client, items, target=(1, 191))
+    world.until(lambda: upload.result == 0, within=5)
+    world.until(lambda: reached(world.client) == [0], within=20)
+    world.run(1)
+    restart(world, path)
+    assert world.state(1) == (S.HELD, R.OUTCOME_UNKNOWN)
+    assert release(world, 1, REMAINDER) == (ACCEPTED, 1)
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [0, 1, 2]
+    assert is_at(world, 3, 2)

@@ -1,0 +1,154 @@
+"""The fence: what it forbids at submission, at the start, and while driving; rally points."""
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
+from tests.kit.mission import Download, Item, Upload, currents
+from tests.kit.world import World, at, is_at
+
+REPOSITION, WAYPOINT, START, RETURN, RELEASE = 192, 16, 300, 20, 54013
+INCLUSION, EXCLUSION, CIRCLE_IN, CIRCLE_OUT, RALLY = 5001, 5002, 5003, 5004, 5100
+MISSION, FENCE, RALLY_POINTS = 0, 1, 2
+GLOBAL = 0
+HOME = Item(WAYPOINT, frame=0, current=1)
+
+
+def corners(command: int, *places: tuple[float, float]) -> list[Item]:
+    return [Item(command, **at(*p), param1=len(places), param4=0, frame=0) for p in places]
+
+
+def box(command: int, south: float, west: float, north: float, east: float) -> list[Item]:
+    return corners(command, (south, west), (north, west), (north, east), (south, east))
+
+
+YARD = box(INCLUSION, -3, -3, 3, 3)
+POND = box(EXCLUSION, 1, -1, 2, 1)
+
+
+def fenced(world: World, *items: Item, kind: int = FENCE) -> int | None:
+    upload = Upload(world.client, items, kind=kind)
+    world.until(lambda: upload.result is not None, within=5)
+    return upload.result
+
+
+def go_to(world: World, north: float, east: float) -> tuple[int, int] | None:
+    sent = world.client.command_int(REPOSITION, -1, 0, 0, 0, **at(north, east), frame=GLOBAL)
+    world.run(0.2)
+    return sent.answer
+
+
+def place(north: float, east: float) -> Item:
+    return Item(WAYPOINT, **at(north, east))
+
+
+def test_a_place_outside_is_denied_and_one_inside_is_driven_to(world: World) -> None:
+    assert fenced(world, *YARD) == 0
+    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
+    assert go_to(world, 2, 1) == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED)
+    assert is_at(world, 2, 1)
+
+
+def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
+    fenced(world, *YARD, *POND)
+    download = Download(world.client, kind=FENCE)
+    world.until(lambda: download.is_done, within=5)
+    world.run(1.1)
+    assert (len(download.items), download.opaque_id > 0) == (8, True)
+    assert currents(world.client)[-1].fence_id == download.opaque_id
+
+
+@pytest.mark.parametrize(
+    "items",
+    [
+        YARD[:2],
+        [Item(CIRCLE_IN, **at(0, 0), param1=0.0, frame=0)],
+        [Item(WAYPOINT, **at(0, 0), frame=0)],
+        [*YARD[:3], *POND],
+        corners(INCLUSION, (0, 0), (1, 0), (2, 0)),
+    ],
+)
+def test_a_fence_that_is_none_is_refused_and_the_one_before_stays(
+    world: World, items: list[Item]
+) -> None:
+    fenced(world, *YARD)
+    assert fenced(world, *items) not in (0, None)
+    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
+
+
+def test_an_item_outside_or_behind_an_exclusion_is_refused_as_it_comes(world: World) -> None:
+    fenced(world, *YARD, *POND)
+    outside = Upload(world.client, (HOME, place(0.5, 0), place(5, 0), place(0, 0)))
+    world.until(lambda: outside.result is not None, within=5)
+    assert (outside.result, outside.requests[-1]) == (14, 2)
+    across = Upload(world.client, (HOME, place(0.5, 0), place(2.5, 0), place(0, 0)))
+    world.until(lambda: across.result is not None, within=5)
+    assert (across.result, across.requests[-1]) == (14, 2)
+    around = Upload(world.client, (HOME, place(0.5, 2), place(2.5, 2), place(2.5, 0)))
+    world.until(lambda: around.result is not None, within=5)
+    assert around.result == 0
+
+
+def test_a_move_that_would_leave_it_fails_before_it_begins(world: World) -> None:
+    fenced(world, *YARD)
+    world.client.move(5)
+    world.client.move(1)
+    world.until_idle(tasks=2)
+    assert world.state(1) == (S.FAILED, R.OUTSIDE_FENCE)
+    assert world.state(2)[0] is S.COMPLETED
+
+
+@pytest.mark.parametrize("speed", [0.5, 2.0, -2.0])
+def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: float) -> None:
+    fenced(world, *YARD)
+    world.client.command(DRIVE, speed, 0, 30, 0, 0, 0, 5)
+    world.until_state(1, S.HELD)
+    world.run(3)
+    assert world.state(1) == (S.HELD, R.FENCE)
+    assert 2.3 < abs(world.truth.north) < 3.0
+    assert world.stands()
+
+
+def test_a_way_that_a_new_fence_forbids_is_stopped(world: World) -> None:
+    world.client.move(20)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+    fenced(world, *YARD)
+    world.until_state(1, S.HELD)
+    world.run(3)
+    assert world.state(1) == (S.HELD, R.FENCE)
+    assert world.truth.north < 3.0
+
+
+def test_a_rover_outside_may_come_back_in(world: World) -> None:
+    world.client.move(4)
+    world.until_idle(tasks=1)
+    fenced(world, *YARD)
+    assert go_to(world, 1, 0) == (ACCEPTED, 2)
+    world.until_state(2, S.COMPLETED)
+    assert is_at(world, 1, 0)
+
+
+def test_without_a_fence_again_nothing_is_forbidden(world: World) -> None:
+    fenced(world, *YARD)
+    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, FENCE))
+    world.run(0.2)
+    assert go_to(world, 4, 0) == (ACCEPTED, 1)
+
+
+@pytest.mark.parametrize("how", ["command", "mode"])
+def test_a_return_goes_to_the_nearest_rally_point(world: World, how: str) -> None:
+    world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
+    points = [Item(RALLY, **at(*p)) for p in ((2, 2), (2, -1), (-2, 0))]
+    assert fenced(world, *points, kind=RALLY_POINTS) == 0
+    world.client.move(2)
+    world.until_idle(tasks=1)
+    if how == "command":
+        world.client.command(RETURN)
+    else:
+        world.client.mode(RTL)
+    world.until_state(2, S.COMPLETED)
+    assert is_at(world, 2, -1)
