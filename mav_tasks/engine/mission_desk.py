@@ -5,11 +5,14 @@ the task server's go as many as one likes, each queued at once. Fence and rally 
 vehicle's, whichever address they were sent to.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
+from typing import Protocol
 from zlib import crc32
 
+from mav_tasks.engine.commit_gate import Effect
 from mav_tasks.engine.fence_items import check_fence_item, check_rally_item, fence_of
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
@@ -71,6 +74,12 @@ MissionMessage = (
     | m.MissionRequestPartialList
     | m.MissionWritePartialList
 )
+
+
+class Refuse(Protocol):
+    """What is done when something is refused."""
+
+    def __call__(self, refusal: Rejection, *, now: float) -> None: ...
 
 
 class _Desk:
@@ -347,16 +356,52 @@ class MissionDesks:
         self._refuse(desk, vehicle, sender, refusal, now=now)
 
     def _replace(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
-        """Fence and rally points, and the empty mission: nothing that is driven."""
-        kind, sender = upload.mission_type, upload.sender
-        if kind == MavMissionType.FENCE:
+        """Fence and rally points, which the vehicle keeps as well, and the empty mission."""
+        if upload.mission_type == MISSION:
+            actor = str(upload.sender.address)
+            self._plans.forget_mission(vehicle, actor=actor, now=now)
+            self._store(desk, vehicle, upload, now=now)
+            return
+        if upload.mission_type == MavMissionType.FENCE:
             fence_of(upload.items)  # a Rejection leaves the one before in force
-        if kind == MISSION:
-            self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)
+        store = partial(self._store, desk, vehicle, upload)
+        refuse = partial(self._refuse, desk, vehicle, upload.sender)
+        kind, items = upload.mission_type, upload.items
+        self._write_through(vehicle, kind, items, store, refuse, now=now)
+
+    def _write_through(
+        self,
+        vehicle: Vehicle,
+        kind: int,
+        items: tuple[Item, ...],
+        go_on: Effect,
+        refuse: Refuse,
+        *,
+        now: float,
+    ) -> None:
+        """First the vehicle, which keeps it where we cannot watch; one that has no such thing may.
+
+        What it refuses, or does not answer, changes nothing here.
+        """
+
+        def done(result: MavMissionResult | None, *, now: float) -> None:
+            self._vehicles.get(vehicle.system_id)
+            if result in (MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED):
+                go_on(now=now)
+            elif result is None:
+                words = f"vehicle {vehicle.system_id} does not answer: not stored"
+                refuse(Rejection(R.VEHICLE_SILENT, words), now=now)
+            else:
+                words = f"vehicle {vehicle.system_id} refuses it: {result.name}"
+                refuse(Rejection(R.NOT_ALLOWED, words), now=now)
+
+        vehicle.requests.write_plan(kind, items, done, now=now)
+
+    def _store(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        sender, kind = upload.sender, upload.mission_type
         plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
-        self._plans.keep(
-            vehicle, kind, Stored(plan_id, upload.items), actor=str(sender.address), now=now
-        )
+        stored = Stored(plan_id, upload.items)
+        self._plans.keep(vehicle, kind, stored, actor=str(sender.address), now=now)
 
         def accept(*, now: float) -> None:
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
@@ -398,7 +443,7 @@ class MissionDesks:
     # clearing
 
     def _clear(self, vehicle: Vehicle, sender: Sender, kind: int, *, now: float) -> None:
-        kinds = list(STORED) if kind == MavMissionType.ALL else [kind]
+        kinds: list[int] = list(STORED) if kind == MavMissionType.ALL else [kind]
         if kinds[0] not in STORED:
             self._ack(sender, kind, MavMissionResult.UNSUPPORTED)
             return
@@ -410,19 +455,38 @@ class MissionDesks:
             return
         if MISSION in kinds:
             self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)
-        for each in kinds:
-            if self._plans.stored(vehicle.system_id, each).plan_id:
-                self._plans.keep(vehicle, each, NOTHING, actor=str(sender.address), now=now)
+        self._forget(vehicle, sender, kind, kinds, now=now)
 
-        def answer(result: MavMissionResult, *, now: float) -> None:
-            del now
-            self._ack(sender, kind, result)
+    def _forget(
+        self, vehicle: Vehicle, sender: Sender, asked: int, kinds: Sequence[int], *, now: float
+    ) -> None:
+        """One kind after the other, what the vehicle keeps first there; then the answer."""
+        stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
+        if not stored:
+            self._submissions.when_durable(
+                partial(self._answer, sender, asked, MavMissionResult.ACCEPTED),
+                partial(self._answer, sender, asked, MavMissionResult.ERROR),
+                now=now,
+            )
+            return
+        first, rest = stored[0], stored[1:]
 
-        self._submissions.when_durable(
-            partial(answer, MavMissionResult.ACCEPTED),
-            partial(answer, MavMissionResult.ERROR),
-            now=now,
-        )
+        def go_on(*, now: float) -> None:
+            self._plans.keep(vehicle, first, NOTHING, actor=str(sender.address), now=now)
+            self._forget(vehicle, sender, asked, rest, now=now)
+
+        def refuse(refusal: Rejection, *, now: float) -> None:
+            self._ack(sender, asked, result_of(refusal))
+            self._tell(sender, vehicle, refusal.text, now=now)
+
+        if first == MISSION:
+            go_on(now=now)
+        else:
+            self._write_through(vehicle, first, (), go_on, refuse, now=now)
+
+    def _answer(self, sender: Sender, kind: int, result: MavMissionResult, *, now: float) -> None:
+        del now
+        self._ack(sender, kind, result)
 
     def _set_current(
         self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float

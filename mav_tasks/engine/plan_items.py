@@ -66,6 +66,8 @@ PERFORMED = frozenset(
 #: mission result of each refusal; of a parameter it is that parameter's
 RESULT_OF: dict[int, MavMissionResult] = {
     R.BAD_PARAMETER: MavMissionResult.INVALID,
+    R.VEHICLE_SILENT: MavMissionResult.ERROR,
+    R.STORE_UNAVAILABLE: MavMissionResult.ERROR,
     R.BAD_FRAME: MavMissionResult.UNSUPPORTED_FRAME,
     R.NOT_SUPPORTED_BY_VEHICLE: MavMissionResult.UNSUPPORTED,
 }

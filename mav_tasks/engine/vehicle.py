@@ -156,6 +156,8 @@ class Vehicle:
                 self.step(now=now)
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt):
             self._receive_of_frame(message, now=now)
+        elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
+            self.requests.receive_of_plan(message, now=now)
         elif isinstance(message, m.AutopilotVersion):
             self.tasks.identified(_uid_of(message), now=now)
             self.requests.is_identified = True

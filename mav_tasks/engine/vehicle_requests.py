@@ -9,10 +9,13 @@ from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_sender import Answered, CommandSender
 from mav_tasks.services.interval_requester import IntervalRequester
+from mav_tasks.services.mission_item import Item
+from mav_tasks.services.mission_uploader import Done, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Watch
@@ -40,6 +43,7 @@ class VehicleRequests:
         self._outlet = outlet
         self._sender = CommandSender(source)
         self._answers: list[Answered] = []
+        self._uploader = MissionUploader(target)
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         self._versions_asked = 0
@@ -97,6 +101,19 @@ class VehicleRequests:
         self._sender.request(command, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
 
+    def write_plan(
+        self, mission_type: int, items: tuple[Item, ...], done: Done, *, now: float
+    ) -> None:
+        """Let the vehicle itself keep a plan; ``done`` is called with what became of it."""
+        self._uploader.begin(mission_type, items, done, now=now)
+        self.flush(now=now)
+
+    def receive_of_plan(self, message: m.Message, *, now: float) -> None:
+        """Take in what the vehicle says of a plan that it is sent."""
+        if target_of(message).reaches(self._source):
+            self._uploader.receive(message, now=now)
+            self.flush(now=now)
+
     def send_zero(self) -> None:
         """Send one zero setpoint, whoever the vehicle follows."""
         self._outlet.send(self.control.zero_setpoint(), self._source)
@@ -126,11 +143,13 @@ class VehicleRequests:
 
     def next_deadline(self) -> float | None:
         """Give when a command is to be repeated or given up."""
-        return self._sender.next_deadline()
+        deadlines = (self._sender.next_deadline(), self._uploader.next_deadline())
+        return min((d for d in deadlines if d is not None), default=None)
 
     def handle_deadline(self, *, now: float) -> None:
         """Repeat and give up what is due; ``flush`` sends it."""
         self._sender.handle_deadline(now=now)
+        self._uploader.handle_deadline(now=now)
 
     def flush(self, *, now: float) -> None:
         """Move what the services want sent to the way out, and their answers to who asked."""
@@ -140,6 +159,7 @@ class VehicleRequests:
             outgoing += setpoints
         else:  # in our mode a zero comes before arming
             outgoing = [*setpoints, *outgoing]
+        outgoing += self._uploader.take()
         for item in outgoing:
             if isinstance(item, Packet):
                 self._outlet.inject(item)

@@ -43,6 +43,9 @@ USED = frozenset(
         m.HomePosition.id,
         m.AutopilotVersion.id,
         m.CommandAck.id,
+        m.MissionAck.id,
+        m.MissionRequest.id,
+        m.MissionRequestInt.id,
     }
     | SETPOINTS
 )

@@ -103,6 +103,11 @@ class Autopilot:
         return self._flight.mode
 
     @property
+    def missions(self) -> MissionStorage:
+        """The plans that are stored on board, to be looked at."""
+        return self._missions
+
+    @property
     def parameters(self) -> Parameters:
         """The parameters, to read or to set beforehand."""
         return self._parameters

@@ -60,6 +60,10 @@ class MissionStorage:
     def __repr__(self) -> str:
         return f"MissionStorage({[len(items) for items in self._lists.values()]})"
 
+    def stored(self, mission_type: int) -> tuple[messages.MissionItemInt, ...]:
+        """Give the items of a plan, as they would be downloaded."""
+        return tuple(self._lists[mission_type])
+
     @property
     def item_count(self) -> int:
         """How many items of a mission there are, home not counted."""

@@ -3,11 +3,14 @@
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
 from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
 from tests.kit.mission import Download, Item, Upload, currents
 from tests.kit.world import World, at, is_at
+from tests.scenarios.conftest import MakeWorld
 
 REPOSITION, WAYPOINT, START, RETURN, RELEASE = 192, 16, 300, 20, 54013
 INCLUSION, EXCLUSION, CIRCLE_IN, CIRCLE_OUT, RALLY = 5001, 5002, 5003, 5004, 5100
@@ -152,3 +155,43 @@ def test_a_return_goes_to_the_nearest_rally_point(world: World, how: str) -> Non
         world.client.mode(RTL)
     world.until_state(2, S.COMPLETED)
     assert is_at(world, 2, -1)
+
+
+def on_board(world: World, kind: int = FENCE) -> list[tuple[int, int, int]]:
+    stored = world.rover.autopilot.missions.stored(kind)
+    return [(item.command, item.x, item.y) for item in stored]
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.05])
+def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float) -> None:
+    world = make_world(conditions=Conditions(delay=0.01, loss=loss))
+    assert fenced(world, *YARD) == 0
+    assert on_board(world) == [(item.command, item.x, item.y) for item in YARD]
+    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
+    world.run(1)
+    assert on_board(world) == []
+
+
+def test_rally_points_are_on_board_too(world: World) -> None:
+    points = [Item(RALLY, **at(2, 2)), Item(RALLY, **at(-2, 0))]
+    fenced(world, *points, kind=RALLY_POINTS)
+    assert [command for command, _, _ in on_board(world, RALLY_POINTS)] == [RALLY, RALLY]
+
+
+def test_a_rover_that_does_not_answer_leaves_everything_as_it_was(world: World) -> None:
+    fenced(world, *YARD)
+    world.fault(Faults(deaf=True))
+    assert fenced(world, *box(INCLUSION, -9, -9, 9, 9)) == 1
+    world.run(0.1)
+    assert any("does not answer" in text for text in world.client.texts())
+    world.fault(Faults())
+    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
+
+
+def test_the_answer_comes_in_time_for_who_waits_for_it(world: World) -> None:
+    world.fault(Faults(deaf=True))
+    upload = Upload(world.client, YARD, kind=FENCE)
+    world.until(lambda: len(upload.requests) == 4, within=1)
+    asked = world.now
+    world.until(lambda: upload.result is not None, within=5)
+    assert (upload.result, world.now - asked < 1.5) == (1, True)
