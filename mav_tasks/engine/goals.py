@@ -81,7 +81,7 @@ def wish_of(
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
     goal = goal_of(command, driving)
     if command.command not in OURS:
-        _refuse_infinite(command)
+        refuse_infinite(command)
         return Wish(goal, Terms(priority=priority), marks_of(command, packet))
     marks = marks_of(command, packet, nonce=whole(command, 4, "nonce", high=MAX_TASK_ID))
     after = whole(command, 5, "run after", high=MAX_TASK_ID)
@@ -269,7 +269,7 @@ def _drive(command: Command, driving: Driving) -> SingleGoal:
     return Drive(forward, radians(rate), duration)
 
 
-def _refuse_infinite(command: Command) -> None:
+def refuse_infinite(command: Command) -> None:
     """Also in what is not used: it cannot be meant."""
     for index, value in enumerate(command.params, 1):
         if isinf(value):

@@ -42,7 +42,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import GoTo, Plan, Step
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Task, TaskId, Terms
 
 R = TaskReason
@@ -447,11 +447,11 @@ class MissionDesks:
         if kinds[0] not in STORED:
             self._ack(sender, kind, MavMissionResult.UNSUPPORTED)
             return
-        begun = vehicle.tasks.begun
-        stored = self._plans.stored(vehicle.system_id, MISSION)
-        if MISSION in kinds and begun is not None and begun.id == stored.plan_id:
+        task = self._plans.task(vehicle)
+        if MISSION in kinds and task is not None and task.state in ACTIVE:
             self._ack(sender, kind, MavMissionResult.DENIED)
-            self._tell(sender, vehicle, f"task {begun.id} is being driven", now=now)
+            words = f"task {task.id} has begun: cancel it first"
+            self._tell(sender, vehicle, words, now=now)
             return
         if MISSION in kinds:
             self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)

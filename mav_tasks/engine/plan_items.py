@@ -19,6 +19,7 @@ from mav_tasks.engine.goals import (
     becomes_task,
     goal_of,
     number,
+    refuse_infinite,
     whole,
 )
 from mav_tasks.errors import Rejection
@@ -96,6 +97,7 @@ def step_of(item: Item, seq: int, *, count: int, has_home: bool, driving: Drivin
     if kind is not None:
         return kind(command, count, driving)
     if item.command in PERFORMED:
+        refuse_infinite(command)
         return Perform()
     if item.command in OURS:
         return _own(command, driving)
@@ -120,11 +122,18 @@ def plan_of(items: Sequence[Item], *, has_home: bool, driving: Driving, now: flo
 
 def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
     """Give the command that an item is for the vehicle itself."""
-    first = (item.param1, item.param2, item.param3, item.param4)
+    p1, p2, p3, p4 = map(_given, (item.param1, item.param2, item.param3, item.param4))
+    p7 = _given(item.z)
     if item.frame == MavFrame.MISSION:
-        last = (float(item.x), float(item.y), item.z)
-        return m.CommandLong(*target, item.command, 0, *first, *last)
-    return m.CommandInt(*target, item.frame, item.command, 0, 0, *first, item.x, item.y, item.z)
+        p5, p6 = float(item.x), float(item.y)
+        return m.CommandLong(*target, item.command, 0, p1, p2, p3, p4, p5, p6, p7)
+    x, y = item.x, item.y
+    return m.CommandInt(*target, item.frame, item.command, 0, 0, p1, p2, p3, p4, x, y, p7)
+
+
+def _given(value: float) -> float:
+    """Give a number for the vehicle: never NaN, which aborts some."""
+    return 0.0 if isnan(value) else value
 
 
 def _command_of(item: Item) -> Command:

@@ -82,9 +82,9 @@ class Plans:
         begun = vehicle.tasks.begun
         if begun is not None and isinstance(begun.goal, Plan):
             return begun
-        return self._task(vehicle)
+        return self.task(vehicle)
 
-    def _task(self, vehicle: Vehicle) -> Task | None:
+    def task(self, vehicle: Vehicle) -> Task | None:
         """Give the task that the staged mission is, while it is remembered."""
         return self._book.get(TaskId(self.stored(vehicle.system_id, MISSION).plan_id))
 
@@ -103,9 +103,9 @@ class Plans:
             bounds.rally = rally_of(items)
 
     def forget_mission(self, vehicle: Vehicle, *, actor: str, now: float) -> None:
-        """The staged mission is taken away, or replaced by nothing: it will not be started."""
-        task = self._task(vehicle)
-        if task is not None and waits_for_start(task):
+        """The mission is taken away, or replaced by nothing: if it has not begun, it never will."""
+        task = self.task(vehicle)
+        if task is not None and task.state in WAITING:
             self.end(vehicle, task, R.CLEARED, actor=actor, now=now)
         self.begin_at(vehicle, 0)
 
@@ -143,12 +143,12 @@ class Plans:
         if vehicle.tasks.paused is R.TAKEOVER:  # a person must have said that all is well
             raise Rejection(R.QUEUE_PAUSED, "somebody took the rover over: continue first")
         vehicle.leave_manual(now=now)
-        task = self._task(vehicle)
+        task = self.task(vehicle)
         if task is None or task.state in TERMINAL:
             return self._again(vehicle, stored, submitter, first=first, now=now)
         actor = str(submitter)
         if vehicle.tasks.paused:
-            vehicle.proceed(actor=actor, now=now)
+            vehicle.go_on(actor=actor, now=now)
         if waits_for_start(task):
             first = first or self._first.pop(vehicle.system_id, 0)
             if first:

@@ -238,6 +238,7 @@ class Vehicle:
         if self.tasks.is_stopped:
             return
         self.control.lose()
+        self.requests.end_performing()
         begun = self.tasks.begun
         if begun is None:
             return
@@ -296,6 +297,9 @@ class Vehicle:
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
         """Have the vehicle carry out what an item of a plan orders."""
+        begun = self.tasks.begun
+        if self.tasks.is_stopped or (begun is not None and begun.state not in RUNNING):
+            return  # called off in the very step in which it was ordered
         self.requests.perform(command, now=now)
 
     def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
@@ -371,6 +375,7 @@ class Vehicle:
 
     def _begin_stop(self, *, now: float) -> None:
         self.control.begin_stop(now=now)
+        self.requests.end_performing()
         self._clock.restart(now=now)
         self.requests.flush(now=now)
 
@@ -485,9 +490,13 @@ class Vehicle:
         seen = replace(self.view(now=now), may_arm=self._authority.may_arm_again)
         going_on = self.tasks.proceed(seen, actor=actor, now=now)
         self._authority.restore_arming()
-        if not self._clock.is_running:
-            self.step(now=now)
+        self.wake(now=now)
         return going_on
+
+    def go_on(self, *, actor: str, now: float) -> None:
+        """End a pause, as ``proceed``, but nobody has said that the vehicle may be armed again."""
+        self.tasks.proceed(self.view(now=now), actor=actor, now=now)
+        self.wake(now=now)
 
     def shut_down(self, *, now: float) -> None:
         """The server ends: pause what is begun and stop what we drive; nothing begins any more."""

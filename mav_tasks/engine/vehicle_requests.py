@@ -44,6 +44,7 @@ class VehicleRequests:
         self._sender = CommandSender(source)
         self._answers: list[Answered] = []
         self._uploader = MissionUploader(target)
+        self._performed: set[int] = set()  # commands that plans have ordered
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         self._versions_asked = 0
@@ -98,8 +99,15 @@ class VehicleRequests:
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
         """Send a command that a plan orders, repeated until it is answered or given up."""
+        self._performed.add(command.command)
         self._sender.request(command, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
+
+    def end_performing(self) -> None:
+        """Nothing more of what plans have ordered is sent: STOP, or somebody took the vehicle."""
+        for command in self._performed:
+            self._sender.withdraw(self._target.component_id, command)
+        self._performed.clear()
 
     def write_plan(
         self, mission_type: int, items: tuple[Item, ...], done: Done, *, now: float

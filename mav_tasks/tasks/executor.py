@@ -12,10 +12,10 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.goal import GoTo, Move, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import Move, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, is_over, present_goal, skipped_to
-from mav_tasks.tasks.legs import WAY, distance
+from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited, within_fence
 from mav_tasks.tasks.scheduler import start_blocker
@@ -257,7 +257,7 @@ class Executor:
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course:
-            self._look_on_the_way(task, task.goal, course, elapsed=elapsed, now=now)
+            self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
                 if after is None or not self._go_on(task, after, seen, motion, now=now):
@@ -323,12 +323,19 @@ class Executor:
         self._book.advance(task.id, progress, now=now)
 
     def _look_on_the_way(
-        self, task: Task, plan: Plan, course: Course, *, elapsed: float, now: float
+        self,
+        task: Task,
+        plan: Plan,
+        course: Course,
+        motion: Motion,
+        *,
+        elapsed: float,
+        now: float,
     ) -> None:
         if not course.progress.pending:
             return
-        is_way = isinstance(course.goal, GoTo) and course.progress.leg <= WAY
-        to_place = course.remaining if is_way else None
+        target = course.progress.target
+        to_place = None if target is None else distance(motion.pose, target)
         looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
         course.progress = looked.progress
         for step in looked.done:

@@ -104,6 +104,8 @@ def look_on_the_way(
             case Perform():
                 performed.append(number)
         done.append(number)
+        if performed:  # one at a time: the vehicle answers each
+            break
     if done:
         progress = replace(progress, pending=progress.pending[len(done) :])
     return OnTheWay(progress, tuple(done), tuple(performed))

@@ -548,5 +548,7 @@ class VehicleTasks:
     def _pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
         if self._paused in (reason, R.STOPPED):
             return
+        if self._paused is R.TAKEOVER and reason is R.OPERATOR:
+            return  # a pause does not say that all is well with the vehicle again
         self._paused = reason
         self._book.record(QueuePaused(self.vehicle, reason, actor, now))

@@ -1,6 +1,6 @@
 """Plans: uploaded, looked at, started, driven, cleared."""
 
-from math import nan
+from math import hypot, inf, nan
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -321,3 +321,95 @@ def test_a_script_that_arms_and_starts_is_obeyed_as_by_an_autopilot(
     world.run(0.05)
     start(world)
     world.until_state(1, S.COMPLETED, within=60)
+
+
+def servo(number: int, pwm: float = 1500.0) -> Item:
+    return Item(SERVO, param1=number, param2=pwm, frame=2)
+
+
+def ordered(world: World, since: float = 0.0) -> list[float]:
+    """Give param2 of the servo commands that went to the rover."""
+    return [
+        message.param2
+        for at, message in world.observer.driven
+        if getattr(message, "command", None) == SERVO and at > since
+    ]
+
+
+@pytest.mark.parametrize("what", ["STOP", "disarm"])
+def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: str) -> None:
+    uploaded(world, HOME, place(1, 0), servo(5, 1100), servo(5, 1900), servo(6), place(6, 0))
+    start(world)
+    world.lose_acks()
+    world.until(lambda: ordered(world), within=30)
+    if what == "STOP":
+        world.client.stop()
+    else:
+        world.operator_arm(False)
+    world.run(0.05)
+    at_stop = world.now
+    world.run(3)
+    assert ordered(world, at_stop) == []
+
+
+def test_many_orders_in_a_row_all_reach_the_rover(world: World) -> None:
+    orders = [servo(1 + n % 8, 1000.0 + n) for n in range(25)]
+    uploaded(world, HOME, place(1, 0), *orders, place(3, 0))
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert ordered(world) == [1000.0 + n for n in range(25)]
+
+
+def test_an_order_with_a_number_that_is_none_never_reaches_the_rover(world: World) -> None:
+    assert uploaded(world, HOME, place(1, 0), servo(5, inf)).result == 7
+    uploaded(world, HOME, servo(5, nan), place(0.5, 0))
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert ordered(world) == [0.0]
+
+
+def test_a_distance_is_that_to_the_place_also_while_it_is_faced(world: World) -> None:
+    near = Item(114, param1=3.0, frame=2)
+    uploaded(world, HOME, place(1, 0, hold=0.1), near, servo(5), place(1, 8))
+    start(world)
+    world.until(lambda: ordered(world), within=60)
+    assert 7.0 > hypot(world.truth.north - 1, world.truth.east) > 4.7
+
+
+def test_clearing_ends_a_started_mission_that_still_waits(world: World) -> None:
+    world.client.move(3)
+    world.run(1)
+    uploaded(world)
+    start(world)
+    world.client.send(clear_all())
+    world.run(0.3)
+    assert world.state(2) == (S.CANCELLED, R.CLEARED)
+
+
+def test_a_hold_does_not_make_a_takeover_good(world: World) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.EXECUTING)
+    world.run(1.5)
+    world.operator_mode(Mode.MANUAL)
+    world.run(3)
+    world.client.mode(HOLD)
+    world.run(1.5)
+    assert start(world) == (TEMPORARILY_REJECTED, R.QUEUE_PAUSED)
+
+
+def test_a_start_does_not_allow_what_a_disarm_has_forbidden(world: World) -> None:
+    world.client.arm(True)
+    world.run(0.5)
+    uploaded(world)
+    world.client.mode(HOLD)
+    world.run(1)
+    world.client.move(1)
+    world.run(0.1)
+    world.client.pause()
+    world.run(3)
+    world.operator_arm(False)
+    world.run(2)
+    start(world)
+    world.run(5)
+    assert not world.rover.autopilot.armed
