@@ -10,6 +10,7 @@ from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
 from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_count, leg_of, length_of
 from mav_tasks.tasks.task import Progress
 
+BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
 
 
@@ -65,6 +66,8 @@ class Course:
         before = self.progress.done
         done = guidance.done_so_far(self.leg, anchor, motion.pose, before=before, elapsed=elapsed)
         self.progress = replace(self.progress, done=done)
+        if self.is_passing and self.remaining <= 0.0 and not self.has_passed(motion):
+            self.passing = 0.0  # missed: it stops, and tries again from there
 
     def has_arrived(self, *, stands: bool, driving: Driving) -> bool:
         """Whether to stand here: near the end while moving; anywhere within tolerance at rest."""
@@ -77,8 +80,16 @@ class Course:
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
-        """Begin the next leg where the vehicle stands; False: there is none."""
+        """Begin the next leg where the vehicle stands; False: there is none.
+
+        A place that it stands beside, because its position was corrected meanwhile, is faced again.
+        """
         following = self.progress.leg + 1
+        target = self.progress.target
+        if isinstance(self.goal, GoTo) and self.progress.leg == WAY and target is not None:
+            near_enough = max(self.goal.radius or 0.0, BESIDE)
+            if distance(motion.pose, target) > near_enough:
+                following = 0
         if following >= leg_count(self.goal):
             return False
         anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)

@@ -12,14 +12,14 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.goal import Move, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import Move, Plan, Rotate, SetSpeed, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
-from mav_tasks.tasks.itinerary import following, is_over, present_goal, skipped_to
+from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited, within_fence
 from mav_tasks.tasks.scheduler import start_blocker
-from mav_tasks.tasks.stage import course_of, look_on_the_way, set_out
+from mav_tasks.tasks.stage import course_of, look_on_the_way, may_go_on_rolling, set_out
 from mav_tasks.tasks.stuck import StuckWatch
 from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
@@ -249,8 +249,11 @@ class Executor:
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
-        if self._course is None and not self._go_on(task, task.progress, seen, motion, now=now):
-            return view.HOLD
+        if self._course is None:  # another step is gone on with
+            if not seen.still and not may_go_on_rolling(task.goal, task.progress, seen, motion):
+                return view.STAND
+            if not self._go_on(task, task.progress, seen, motion, now=now):
+                return view.HOLD
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"
         is_held_back = not self._book.is_durable(task.id)
@@ -260,9 +263,11 @@ class Executor:
             self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
-                if after is None or not self._go_on(task, after, seen, motion, now=now):
+                if after is None:
                     return view.HOLD
-                course = self._course
+                self._book.note_progress(task.id, after)
+                self._course = None
+                return Demand(DemandKind.DRIVE, self._last_velocity)
         self._note_progress(task, now)
         stands = seen.still and self._has_asked_to_stand(now)
         if course.has_arrived(stands=stands, driving=self._settings.driving):
@@ -339,6 +344,8 @@ class Executor:
         looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
         course.progress = looked.progress
         for step in looked.done:
+            if isinstance(plan.steps[step], SetSpeed):
+                self.speed = None  # what was asked for last counts
             self._book.reached(task.id, step, performs=step in looked.performed, now=now)
         if looked.done:
             self._book.advance(task.id, course.progress, now=now)
@@ -388,7 +395,8 @@ class Executor:
             self._finish(S.FAILED, R.LINK_TIMEOUT, actor=SERVER, now=now)
             return
         ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD) and seen.armed
-        if not ours or start_blocker(seen, watch=watch, now=now):
+        task = self._begun(S.PAUSED)
+        if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):
             self._lost_until = now
         elif now - self._lost_until >= watch.fresh_before_resume:
             self.resume(seen, actor=SERVER, now=now)

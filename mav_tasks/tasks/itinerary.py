@@ -23,6 +23,7 @@ from mav_tasks.tasks.goal import (
 from mav_tasks.tasks.task import Progress, Task
 
 ON_THE_WAY = (SetSpeed, Perform, Delay, Near)
+SHORT = 1.0  # s; a loop of shorter waits would only keep everybody busy
 END = Wait(0.0)  # past the last step: what is pending is still done
 
 
@@ -83,11 +84,16 @@ def loops_in_vain(plan: Plan) -> int | None:
                 done.add(~step)
             elif step in on_path:
                 return path[-1]
-            elif step not in done and step < len(plan.steps) and _driven(plan, step) is None:
+            elif step not in done and step < len(plan.steps) and _takes_no_time(plan, step):
                 path.append(step)
                 on_path.add(step)
                 waiting += [~step, *_ways_on(plan, step)]
     return None
+
+
+def _takes_no_time(plan: Plan, step: int) -> bool:
+    goal = _driven(plan, step)
+    return goal is None or (isinstance(goal, Wait) and goal.duration < SHORT)
 
 
 def _ways_on(plan: Plan, step: int) -> list[int]:

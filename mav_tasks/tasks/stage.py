@@ -5,7 +5,7 @@ from math import inf
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, Near, Perform, Plan, SetSpeed
+from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, LocalPlace, Near, Perform, Plan, SetSpeed
 from mav_tasks.tasks.guidance import Motion, corner_speed, wrap
 from mav_tasks.tasks.itinerary import begun, goes_on_to_a_place, present_goal
 from mav_tasks.tasks.legs import WAY, anchor_of, bearing, begun_from, distance
@@ -40,11 +40,20 @@ def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -
     target = place_of(single, seen)
     if target is None:
         return None
-    turn = _off(motion.pose, bearing(motion.pose, target))
-    is_going_on = motion.speed > ROLLING and corner_speed(turn, lead=1.0) > 0.0
-    leg = WAY if is_going_on else 0  # it need not be faced first
+    leg = WAY if motion.speed > ROLLING and _bends_gently(motion, target) else 0  # or it is faced
     anchor = anchor_of(single, leg, motion.pose, target)
     return replace(progress, anchor=anchor, frame=seen.frame, target=target, leg=leg, done=0.0)
+
+
+def may_go_on_rolling(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -> bool:
+    """Whether a stage can begin without standing first."""
+    single = present_goal(goal, progress)
+    target = place_of(single, seen) if isinstance(single, GoTo) else None
+    return target is not None and _bends_gently(motion, target)
+
+
+def _bends_gently(motion: Motion, target: LocalPlace) -> bool:
+    return corner_speed(_off(motion.pose, bearing(motion.pose, target)), lead=1.0) > 0.0
 
 
 def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Driving) -> Course:

@@ -540,7 +540,7 @@ class VehicleTasks:
         task = self._book[task_id]
         if task_id == self._urgent:
             self._urgent = None
-        moved = task.progress.anchor is not None
+        moved = task.progress.anchor is not None or task.progress.execution_time > 0.0
         if task.state is S.FAILED and moved and self._settings.on_failure == "pause":
             self._pause_queue(task.reason, actor=SERVER, now=now)
         self._room.ended(task_id, now=now)

@@ -121,6 +121,8 @@ def test_before_the_beginning_the_present_goal_is_the_first() -> None:
         ((A, Jump(2, 1), Jump(1, 1)), 2),
         ((Jump(2, 1), A, Jump(0, 1), B), 2),  # forward over what would be driven
         ((A, Jump(0, 1), Jump(0, 1)), None),
+        ((A, Wait(0.0), Jump(1, -1)), 2),
+        ((A, Wait(1.0), Jump(1, -1)), None),
     ],
 )
 def test_a_loop_in_which_nothing_is_driven_is_found(
