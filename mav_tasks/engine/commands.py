@@ -207,13 +207,24 @@ class Commands:
 
     def _start_plan(self, asked: Asked, *, first: int, now: float) -> None:
         """Start or continue the uploaded mission; one that is over is another task."""
-        submitter = asked.client.submitter(asked.packet.source)
-        started = self._plans.start(asked.vehicle, submitter, first=first, now=now)
+        self._submissions.check_open()
+        vehicle, submitter = asked.vehicle, asked.client.submitter(asked.packet.source)
+        started = self._plans.start(vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
             task = self._submissions.submit_draft(asked, started, now=now)
-            self._plans.restarted(asked.vehicle, task, now=now)
-        else:
+            self._plans.restarted(vehicle, task, now=now)
+            return
+
+        def accept(*, now: float) -> None:
+            del now
             asked.answer(MavResult.ACCEPTED, started.id)
+
+        def give_up(*, now: float) -> None:
+            self._plans.stage_again(vehicle, started, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
+            self._book.record(asked.refuse(refusal, now=now))
+
+        self._submissions.when_durable(accept, give_up, now=now)
 
     def cancel_latest(
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float

@@ -5,7 +5,7 @@ the task server's go as many as one likes, each queued at once. Fence and rally 
 vehicle's, whichever address they were sent to.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
@@ -16,6 +16,7 @@ from mav_tasks.engine.commit_gate import Effect
 from mav_tasks.engine.fence_items import check_fence_item, check_rally_item, fence_of
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.goals import bad
 from mav_tasks.engine.motion_gate import GO_TO
 from mav_tasks.engine.plan_items import plan_of, result_of, step_of
 from mav_tasks.engine.plans import (
@@ -131,6 +132,8 @@ class MissionDesks:
         desk = self._desk(vehicle, component)
         sender = Sender(client.key, packet.source, Address(vehicle.system_id, component))
         match message:
+            case m.MissionCount() if message.mission_type not in STORED:
+                self._ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
             case m.MissionCount():
                 desk.receiver.count(message, sender, now=now)
             case m.MissionItem() | m.MissionItemInt():
@@ -225,14 +228,18 @@ class MissionDesks:
             else:
                 step = step_of(item, seq, count=count, has_home=has_home, driving=driving)
                 if isinstance(step, GoTo):
-                    self._check_fence(vehicle, component, step, seq)
+                    self._check_place(vehicle, component, step, seq)
         except Rejection as refusal:
             self._why = refusal.text
             return result_of(refusal)
         return None
 
-    def _check_fence(self, vehicle: Vehicle, component: int, step: GoTo, seq: int) -> None:
-        """Whether a place, and the straight way from the one before, stay within the fence."""
+    def _check_place(self, vehicle: Vehicle, component: int, step: GoTo, seq: int) -> None:
+        """Whether a place is within reach, and it and the way from the one before in the fence."""
+        far, longest = vehicle.distance_to(step), self._settings.driving.max_distance
+        if far is not None and far > longest:
+            words = f"item {seq} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+            raise bad(words, param=5)
         if not vehicle.is_within_fence(step):
             raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
         items = self._desk(vehicle, component).receiver.items
@@ -358,8 +365,6 @@ class MissionDesks:
     def _replace(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         """Fence and rally points, which the vehicle keeps as well, and the empty mission."""
         if upload.mission_type == MISSION:
-            actor = str(upload.sender.address)
-            self._plans.forget_mission(vehicle, actor=actor, now=now)
             self._store(desk, vehicle, upload, now=now)
             return
         if upload.mission_type == MavMissionType.FENCE:
@@ -399,19 +404,33 @@ class MissionDesks:
 
     def _store(self, desk: _Desk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         sender, kind = upload.sender, upload.mission_type
+        before, task = self._plans.stored(vehicle.system_id, kind), self._plans.task(vehicle)
         plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
-        stored = Stored(plan_id, upload.items)
-        self._plans.keep(vehicle, kind, stored, actor=str(sender.address), now=now)
+        actor, stored = str(sender.address), Stored(plan_id, upload.items)
+        self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
 
         def accept(*, now: float) -> None:
+            if kind == MISSION:
+                self._end(vehicle, task, R.CLEARED, actor, now=now)
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
             self._flush(desk, vehicle, now=now)
 
         def give_up(*, now: float) -> None:
-            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time")
+            self._plans.keep(vehicle, kind, before, actor=actor, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: as it was before")
             self._refuse(desk, vehicle, sender, refusal, now=now)
 
         self._submissions.when_durable(accept, give_up, now=now)
+
+    def _end(
+        self, vehicle: Vehicle, task: Task | None, reason: TaskReason, actor: str, *, now: float
+    ) -> None:
+        """A mission is not the vehicle's any more: if it has not begun, it never will."""
+        self._vehicles.get(vehicle.system_id)
+        current = None if task is None else self._book.get(task.id)
+        if current is not None:
+            self._plans.end(vehicle, current, reason, actor=actor, now=now)
+        self._plans.begin_at(vehicle, 0)
 
     def _refuse(
         self, desk: _Desk, vehicle: Vehicle, sender: Sender, refusal: Rejection, *, now: float
@@ -453,27 +472,41 @@ class MissionDesks:
             words = f"task {task.id} has begun: cancel it first"
             self._tell(sender, vehicle, words, now=now)
             return
-        if MISSION in kinds:
-            self._plans.forget_mission(vehicle, actor=str(sender.address), now=now)
-        self._forget(vehicle, sender, kind, kinds, now=now)
+        stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
+        self._forget(vehicle, sender, kind, stored, {}, now=now)
 
     def _forget(
-        self, vehicle: Vehicle, sender: Sender, asked: int, kinds: Sequence[int], *, now: float
+        self,
+        vehicle: Vehicle,
+        sender: Sender,
+        asked: int,
+        kinds: Sequence[int],
+        before: Mapping[int, Stored],
+        *,
+        now: float,
     ) -> None:
         """One kind after the other, what the vehicle keeps first there; then the answer."""
-        stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
-        if not stored:
-            self._submissions.when_durable(
-                partial(self._answer, sender, asked, MavMissionResult.ACCEPTED),
-                partial(self._answer, sender, asked, MavMissionResult.ERROR),
-                now=now,
-            )
+        actor = str(sender.address)
+        if not kinds:
+            task = self._book.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
+
+            def accept(*, now: float) -> None:
+                self._end(vehicle, task, R.CLEARED, actor, now=now)
+                self._ack(sender, asked, MavMissionResult.ACCEPTED)
+
+            def give_up(*, now: float) -> None:
+                for kind, stored in before.items():
+                    self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
+                self._ack(sender, asked, MavMissionResult.ERROR)
+
+            self._submissions.when_durable(accept, give_up, now=now)
             return
-        first, rest = stored[0], stored[1:]
+        first, rest = kinds[0], kinds[1:]
 
         def go_on(*, now: float) -> None:
-            self._plans.keep(vehicle, first, NOTHING, actor=str(sender.address), now=now)
-            self._forget(vehicle, sender, asked, rest, now=now)
+            so_far = {**before, first: self._plans.stored(vehicle.system_id, first)}
+            self._plans.keep(vehicle, first, NOTHING, actor=actor, now=now)
+            self._forget(vehicle, sender, asked, rest, so_far, now=now)
 
         def refuse(refusal: Rejection, *, now: float) -> None:
             self._ack(sender, asked, result_of(refusal))
@@ -483,10 +516,6 @@ class MissionDesks:
             go_on(now=now)
         else:
             self._write_through(vehicle, first, (), go_on, refuse, now=now)
-
-    def _answer(self, sender: Sender, kind: int, result: MavMissionResult, *, now: float) -> None:
-        del now
-        self._ack(sender, kind, result)
 
     def _set_current(
         self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float

@@ -6,6 +6,7 @@ when it is over, it is another task.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import inf
 
 from mav_tasks.engine.fence_items import fence_of, rally_of
 from mav_tasks.engine.plan_items import plan_of
@@ -16,10 +17,10 @@ from mav_tasks.mavlink.enums import MavCmd, MavMissionType
 from mav_tasks.services.mission_item import Item, packed, unpacked
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import PlanStored
+from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
 R, S = TaskReason, TaskState
@@ -40,13 +41,6 @@ class Stored:
 NOTHING = Stored(0, ())
 
 
-@dataclass(slots=True)
-class _Started:
-    by: Submitter
-    at: float
-    task: Task
-
-
 class Plans:
     """The plans of all vehicles."""
 
@@ -65,7 +59,8 @@ class Plans:
             key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
         }
         self._first: dict[int, int] = {}  # by vehicle: the item with which the next start begins
-        self._started: dict[int, _Started] = {}
+        self._started: dict[int, tuple[Submitter, TaskId]] = {}  # the last start of each vehicle
+        self._started_at = -inf
         for (system_id, kind), stored in self._stored.items():
             self._apply_bounds(system_id, kind, stored.items)
 
@@ -102,17 +97,12 @@ class Plans:
         elif kind == MavMissionType.RALLY:
             bounds.rally = rally_of(items)
 
-    def forget_mission(self, vehicle: Vehicle, *, actor: str, now: float) -> None:
-        """The mission is taken away, or replaced by nothing: if it has not begun, it never will."""
-        task = self.task(vehicle)
-        if task is not None and task.state in WAITING:
-            self.end(vehicle, task, R.CLEARED, actor=actor, now=now)
-        self.begin_at(vehicle, 0)
-
     def end(
         self, vehicle: Vehicle, task: Task, reason: TaskReason, *, actor: str, now: float
     ) -> None:
-        """Call off a mission that waits to be started."""
+        """Call off a mission that has not begun."""
+        if task.state not in WAITING:
+            return
         vehicle.tasks.cancel(task, kill=False, reason=reason, actor=actor, now=now)
 
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
@@ -137,39 +127,65 @@ class Plans:
         if first >= len(stored.items):
             words = f"param1 first item {first}: there are {len(stored.items)}"
             raise Rejection(R.BAD_PARAMETER, words, param=1)
-        started = self._started.get(vehicle.system_id)
-        if started and started.by == submitter and now - started.at <= STARTED_TWICE:
-            return self._book.get(started.task.id) or started.task
-        if vehicle.tasks.paused is R.TAKEOVER:  # a person must have said that all is well
-            raise Rejection(R.QUEUE_PAUSED, "somebody took the rover over: continue first")
-        vehicle.leave_manual(now=now)
+        self._check_queue(vehicle)
         task = self.task(vehicle)
+        started = self._started.get(vehicle.system_id)
+        is_again = started == (submitter, task and task.id) and not vehicle.tasks.paused
+        if task is not None and is_again and now - self._started_at <= STARTED_TWICE:
+            return task
+        vehicle.leave_manual(now=now)
+        first = first or self._first.pop(vehicle.system_id, 0)
         if task is None or task.state in TERMINAL:
             return self._again(vehicle, stored, submitter, first=first, now=now)
-        actor = str(submitter)
-        if vehicle.tasks.paused:
-            vehicle.go_on(actor=actor, now=now)
-        if waits_for_start(task):
-            first = first or self._first.pop(vehicle.system_id, 0)
-            if first:
-                vehicle.tasks.skip_to(task, first, now=now)
-            vehicle.modify(
-                self._book[task.id], replace(task.terms, is_staged=False), actor=actor, now=now
-            )
-            vehicle.wake(now=now)
+        if first:
+            vehicle.tasks.skip_to(task, first, now=now)
+        self._set_going(vehicle, self._book[task.id], actor=str(submitter), now=now)
         self._note_start(vehicle, submitter, task, now=now)
         return task
+
+    def _check_queue(self, vehicle: Vehicle) -> None:
+        """A start ends no more than a pause: of the rest a person must say that all is well."""
+        paused = vehicle.tasks.paused
+        if paused and paused is not R.OPERATOR:
+            words = f"paused, {words_of(paused)}: continue first"
+            raise Rejection(R.QUEUE_PAUSED, words)
+        task = self.task(vehicle)
+        if task is not None and task.state is S.HELD:
+            raise Rejection(R.HELD_AHEAD, f"task {task.id} is held: release it first")
+
+    def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
+        """Of a paused queue the mission alone goes on; what others have paused stays so."""
+        if task.state in ACTIVE:
+            if vehicle.tasks.paused:
+                vehicle.go_on(actor=actor, now=now)
+            return
+        if task.terms.is_staged:
+            terms = replace(task.terms, is_staged=False)
+            vehicle.modify(task, terms, actor=actor, now=now)
+        if vehicle.tasks.paused:
+            vehicle.tasks.give_way_to(task, actor=actor, now=now)
+        vehicle.wake(now=now)
+
+    def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
+        """A start was not stored in time: it is none."""
+        current = self._book.get(task.id)
+        self._started.pop(vehicle.system_id, None)
+        if current is not None and current.state in WAITING:
+            terms = replace(current.terms, is_staged=True)
+            vehicle.modify(current, terms, actor=SERVER, now=now)
 
     def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """The mission was submitted anew: clients know it by that task's id from now on."""
         stored = replace(self.stored(vehicle.system_id, MISSION), plan_id=task.id)
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
+        self._set_going(vehicle, task, actor=str(task.submitter), now=now)
         self._note_start(vehicle, task.submitter, task, now=now)
 
     def _note_start(
         self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
     ) -> None:
-        self._started[vehicle.system_id] = _Started(submitter, now, task)
+        self._started[vehicle.system_id] = submitter, task.id
+        self._started_at = now
 
     def _again(
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
@@ -180,7 +196,6 @@ class Plans:
             driving=self._settings.driving,
             now=now,
         )
-        first = first or self._first.pop(vehicle.system_id, 0)
         plan = replace(wanted.plan, first=first)
         command = MavCmd.MISSION_START
         return Draft(vehicle.system_id, command, plan, submitter, terms=wanted.terms)

@@ -131,6 +131,9 @@ class Submissions:
 
     def when_durable(self, release: Effect, give_up: Effect, *, now: float) -> None:
         """Call ``release`` when all that is recorded by now is durable, or ``give_up``."""
+        if self._book.recorded <= self._book.durable:
+            release(now=now)
+            return
         give_up_at = now + self._settings.watch.commit
         self._gate.hold(
             self._book.recorded, give_up_at=give_up_at, release=release, give_up=give_up

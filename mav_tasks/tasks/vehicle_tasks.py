@@ -228,6 +228,11 @@ class VehicleTasks:
             raise Rejection(R.HELD_AHEAD, "a held task must be released first")
         self._check_start(seen, present_goal(draft.goal, Progress()), now=now)
         task = self._room.submit(draft, now=now)
+        self.give_way_to(task, actor=actor, now=now)
+        return task
+
+    def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
+        """Let a waiting task run at once; what runs and what waits goes on when continued."""
         begun = self.begun
         if begun is not None and begun.id == self._urgent:
             self._executor.cancel(R.REPLACED, actor=actor, now=now)
@@ -238,7 +243,6 @@ class VehicleTasks:
             self._replace_urgent(actor=actor, now=now)
         self._urgent = task.id
         self._pause_queue(R.OPERATOR, actor=actor, now=now)
-        return task
 
     def _replace_urgent(self, *, actor: str, now: float) -> None:
         assert self._urgent is not None
