@@ -13,6 +13,7 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import (
     CHANGE_MODE,
+    bad,
     becomes_task,
     marks_of,
     place_in,
@@ -34,7 +35,7 @@ from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.services.command_sender import Answered
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.goal import GoTo
+from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Submitter
 
@@ -161,6 +162,7 @@ class Commands:
                     return
                 case MavCmd.MISSION_START as number if at_server or self._claims(number):
                     first = whole(asked.command, 1, "first item", high=0xFFFF)
+                    _check_last_item(asked)
                     self._start_plan(asked, first=first, now=now)
                     return
                 case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
@@ -308,7 +310,9 @@ class Commands:
 
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""
+        begun = vehicle.tasks.begun
         has_plan = bool(self._plans.stored(vehicle.system_id, MavMissionType.MISSION).items)
+        has_plan = has_plan or (begun is not None and isinstance(begun.goal, Plan))
         return self._settings.claim and mode == vehicle.persona.mission_mode and has_plan
 
     # STOP, pause, modes
@@ -387,6 +391,12 @@ class Commands:
             return
         vehicle.client_asks_mode(mode, asked.client.key, now=now)
         _relay(asked, now=now)
+
+
+def _check_last_item(asked: Asked) -> None:
+    last = whole(asked.command, 2, "last item", high=0xFFFF)
+    if last:
+        raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)
 
 
 def _return_home(vehicle: Vehicle, submitter: Submitter, marks: Marks) -> Draft:

@@ -179,6 +179,9 @@ def place_in(command: Command) -> Place | None:
         return _global(round(latitude * 1e7), round(longitude * 1e7))
     if x == NOT_GIVEN and y == NOT_GIVEN:
         return None
+    for value, name, param in ((x, "x", 5), (y, "y", 6)):
+        if value == NOT_GIVEN:
+            raise bad(f"{name} is not given", param=param)
     if command.frame == MavFrame.LOCAL_NED:
         return LocalPlace(x / LOCAL_SCALE, y / LOCAL_SCALE)
     if command.frame not in GLOBAL_FRAMES:

@@ -146,8 +146,15 @@ class MissionDesks:
                 self._list(desk, vehicle, sender, message.mission_type, now=now)
             case m.MissionRequest() | m.MissionRequestInt():
                 kind, seq = message.mission_type, message.seq
-                present = self._downloadable(vehicle, component, kind).items
-                self._send(desk.sender.request(sender, kind, seq, present, now=now))
+                self._send(
+                    desk.sender.request(
+                        sender,
+                        kind,
+                        seq,
+                        lambda: self._downloadable(vehicle, component, kind).items,
+                        now=now,
+                    )
+                )
             case m.MissionClearAll():
                 self._clear(vehicle, sender, message.mission_type, now=now)
             case m.MissionSetCurrent():
@@ -280,11 +287,17 @@ class MissionDesks:
             if upload.mission_type != MISSION:
                 self._replace(desk, vehicle, upload, now=now)
             elif self._is_nothing(vehicle, upload):
+                self._check_not_begun(vehicle)
                 self._replace(desk, vehicle, upload._replace(items=()), now=now)
             else:
                 self._take_in(desk, vehicle, upload, now=now)
         except Rejection as refusal:
             self._refuse(desk, vehicle, upload.sender, refusal, now=now)
+
+    def _check_not_begun(self, vehicle: Vehicle) -> None:
+        task = self._plans.task(vehicle)
+        if task is not None and task.state in ACTIVE:
+            raise Rejection(R.NOT_ALLOWED, f"task {task.id} has begun: cancel it first")
 
     def _is_nothing(self, vehicle: Vehicle, upload: Upload) -> bool:
         """Whether a mission is none: not an item, or only the home that comes before all others."""

@@ -11,6 +11,7 @@ from math import inf, isnan
 from typing import NamedTuple
 
 from mav_tasks.engine.goals import (
+    KNOWN_FRAMES,
     MAX_DELAY,
     MAX_WAIT,
     MIN_SPEED,
@@ -93,11 +94,13 @@ def step_of(item: Item, seq: int, *, count: int, has_home: bool, driving: Drivin
     if has_home and seq == 0:
         return Nothing()
     command = _command_of(item)
+    if item.frame not in KNOWN_FRAMES:
+        raise Rejection(R.BAD_FRAME, f"item {seq}: frame {item.frame} is unknown")
+    refuse_infinite(command)
     kind = _STEPS.get(item.command)
     if kind is not None:
         return kind(command, count, driving)
     if item.command in PERFORMED:
-        refuse_infinite(command)
         return Perform()
     if item.command in OURS:
         return _own(command, driving)

@@ -14,7 +14,7 @@ from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
-from mav_tasks.services.mission_item import Item, packed, unpacked
+from mav_tasks.services.mission_item import Item, item_at, packed, unpacked
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, PlanStored
@@ -39,6 +39,7 @@ class Stored:
 
 
 NOTHING = Stored(0, ())
+CALLED_OFF = TERMINAL - {S.COMPLETED}
 
 
 class Plans:
@@ -121,20 +122,26 @@ class Plans:
         """
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        self._check_queue(vehicle)
+        vehicle.check_not_by_hand(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
+        begun, task = vehicle.tasks.begun, self.task(vehicle)
+        is_fresh = task is not None and waits_for_start(task)
+        if begun and begun.id != stored.plan_id and isinstance(begun.goal, Plan) and not is_fresh:
+            self._set_going(vehicle, begun, actor=str(submitter), now=now)
+            return begun
         if not stored.items:
             raise Rejection(R.NOT_FOUND, "no plan is uploaded")
         if first >= len(stored.items):
             words = f"param1 first item {first}: there are {len(stored.items)}"
             raise Rejection(R.BAD_PARAMETER, words, param=1)
-        self._check_queue(vehicle)
-        task = self.task(vehicle)
         started = self._started.get(vehicle.system_id)
         is_again = started == (submitter, task and task.id) and not vehicle.tasks.paused
-        if task is not None and is_again and now - self._started_at <= STARTED_TWICE:
+        is_late = now - self._started_at > STARTED_TWICE
+        if task is not None and is_again and not is_late and task.state not in CALLED_OFF:
             return task
-        vehicle.leave_manual(now=now)
-        first = first or self._first.pop(vehicle.system_id, 0)
+        chosen = self._first.pop(vehicle.system_id, 0)
+        first = first or chosen
         if task is None or task.state in TERMINAL:
             return self._again(vehicle, stored, submitter, first=first, now=now)
         if first:
@@ -155,6 +162,7 @@ class Plans:
 
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
         """Of a paused queue the mission alone goes on; what others have paused stays so."""
+        vehicle.leave_manual(now=now)
         if task.state in ACTIVE:
             if vehicle.tasks.paused:
                 vehicle.go_on(actor=actor, now=now)
@@ -238,7 +246,7 @@ class Plans:
 
     def item_of(self, task: Task, step: int) -> Item:
         """Give an item of a task's plan as it came."""
-        return unpacked(plan_of_task(task).source)[step]
+        return item_at(plan_of_task(task).source, step)
 
 
 def plan_of_task(task: Task) -> Plan:

@@ -14,6 +14,7 @@ from mav_tasks.engine.motion_monitor import MotionMonitor, is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.vehicle_requests import VehicleRequests
+from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
@@ -314,6 +315,16 @@ class Vehicle:
             return
         if self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
+
+    def check_not_by_hand(self, *, now: float) -> None:
+        """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
+        by_hand = self._monitor.custom_mode == self.persona.manual_mode
+        if not (self.armed and by_hand):
+            return
+        if self._authority.since_other(now=now) < self._settings.watch.other_controller:
+            raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
+        if not self._motion.is_still(now=now):
+            raise Rejection(TaskReason.WRONG_MODE, "driven by hand: it must stand first")
 
     def leave_manual(self, *, now: float) -> None:
         """A client starts a mission: as on an autopilot, that ends driving by hand.

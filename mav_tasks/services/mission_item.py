@@ -4,7 +4,6 @@ MAVLink guide, "Mission Protocol", MISSION_ITEM_INT. An item has no number of it
 place in the plan.
 """
 
-from base64 import b64decode, b64encode
 from collections.abc import Iterable
 from math import isfinite, isnan
 from struct import Struct
@@ -88,12 +87,18 @@ def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.Mis
 
 def packed(items: Iterable[Item]) -> str:
     """Give items as a text to be kept; ``unpacked`` gives them back bit by bit."""
-    return b64encode(b"".join(_WIRE.pack(*item) for item in items)).decode()
+    return b"".join(_WIRE.pack(*item) for item in items).hex()
 
 
 def unpacked(text: str) -> tuple[Item, ...]:
     """Give the items that ``packed`` made a text of."""
-    return tuple(Item(*fields) for fields in _WIRE.iter_unpack(b64decode(text)))
+    return tuple(Item(*fields) for fields in _WIRE.iter_unpack(bytes.fromhex(text)))
+
+
+def item_at(text: str, number: int) -> Item:
+    """Give one of these items, without looking at the others."""
+    start = 2 * _WIRE.size * number
+    return Item(*_WIRE.unpack(bytes.fromhex(text[start : start + 2 * _WIRE.size])))
 
 
 def _scale(frame: int) -> float:

@@ -19,7 +19,7 @@ ASK_AGAIN = 0.2  # s, between requests for one item; MAVSDK loses least between 
 GIVE_UP = 2.3  # s without an item; MAVSDK gives up after 2.5
 QUIET = 0.3  # s after an upload was broken off, in which its last items may still arrive
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
-CAPACITY = 10_000  # items of one plan
+CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
 
 #: mission type, number, item, count -> why not, or None
 Check = Callable[[int, int, Item, int], MavMissionResult | None]

@@ -3,6 +3,7 @@
 MAVLink guide, "Mission Protocol", "Download a Mission from the Vehicle".
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from mav_tasks.mavlink import messages as m
@@ -49,7 +50,7 @@ class MissionSender:
         sender: Sender,
         mission_type: int,
         seq: int,
-        present: tuple[Item, ...],
+        present: Callable[[], tuple[Item, ...]],
         *,
         now: float,
     ) -> ToClient:
@@ -57,7 +58,7 @@ class MissionSender:
         download = self._downloads.get((sender, mission_type))
         if download is None:
             self._forget(now=now)
-            download = self._downloads[sender, mission_type] = _Download(present, now)
+            download = self._downloads[sender, mission_type] = _Download(present(), now)
         download.at = now
         if seq < len(download.items):
             item = message_of(download.items[seq], seq, mission_type, to=sender.address)

@@ -75,8 +75,11 @@ class Course:
         remaining = self.remaining
         if self.is_passing:
             return False
-        if isinstance(self.goal, GoTo) and self.goal.radius and self.progress.leg == WAY:
-            return abs(remaining) <= self.goal.radius
+        if isinstance(self.goal, GoTo) and self.progress.leg == WAY:
+            if remaining < -BESIDE:
+                return True  # it stops, and faces the place again from there
+            if self.goal.radius:
+                return abs(remaining) <= self.goal.radius
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
     def advance(self, motion: Motion) -> bool:

@@ -12,7 +12,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.goal import Move, Plan, Rotate, SetSpeed, Wait
+from mav_tasks.tasks.goal import Move, Near, Plan, Rotate, SetSpeed, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import distance
@@ -259,7 +259,7 @@ class Executor:
         is_held_back = not self._book.is_durable(task.id)
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
-        if isinstance(task.goal, Plan) and course is self._course:
+        if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
             self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
@@ -356,7 +356,8 @@ class Executor:
         progress = self._course.progress
         if not is_over(plan, progress):
             self._book.reached(task.id, progress.step, performs=False, now=now)
-        after = following(plan, progress)
+        left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
+        after = following(plan, replace(progress, pending=left))  # nearer than here it will not be
         if after is None:
             self._finish(S.COMPLETED, R.NONE, actor=SERVER, now=now)
         return after

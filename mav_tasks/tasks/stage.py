@@ -61,24 +61,15 @@ def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Dri
     single = present_goal(goal, progress)
     if not (isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes):
         return Course(single, progress)
-    within = single.radius or driving.acceptance_radius
-    passing = _speed_past(goal, within, progress, seen, driving=driving)
-    return Course(single, progress, passing=passing, within=within)
-
-
-def _speed_past(
-    plan: Plan, within: float, progress: Progress, seen: VehicleView, *, driving: Driving
-) -> float:
-    following = goes_on_to_a_place(plan, progress)
-    after = None if following is None else place_of(following, seen)
     target, anchor = progress.target, progress.anchor
+    following = goes_on_to_a_place(goal, progress)
+    after = None if following is None else place_of(following, seen)
     if after is None or target is None or anchor is None:
-        return 0.0
+        return Course(single, progress)
     here = Pose(target.north, target.east, bearing(anchor, target))
-    if distance(here, after) <= within:
-        return 0.0
-    turn = _off(here, bearing(here, after))
-    return min(driving.max_speed, corner_speed(turn, lead=within))
+    within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
+    speed = corner_speed(_off(here, bearing(here, after)), lead=within)
+    return Course(single, progress, passing=min(driving.max_speed, speed), within=within)
 
 
 def _off(pose: Pose, yaw: float) -> float:

@@ -255,6 +255,8 @@ class WaitingRoom:
             self._check_dependency(terms.after)
             self._check_cycle(task, terms.after)
         before = task.terms.after
+        if task.terms.is_staged and not terms.is_staged:
+            self._waiters[task.id].came_at = now  # it has not waited for the others until now
         task = self._book.modify(task.id, terms, actor=actor, now=now)
         self._note_times(task)
         if before != terms.after:

@@ -1,5 +1,6 @@
 """A plan being driven, step after step."""
 
+from dataclasses import replace
 from math import hypot, radians
 
 import pytest
@@ -207,3 +208,34 @@ def test_places_on_earth_wait_for_the_origin() -> None:
     assert rig.state(1) is S.QUEUED
     rover.frame = Frame(470000000, 80000000 - 200, 0.0)
     run_until(rig, rover, lambda: rig.state(1) is S.COMPLETED)
+
+
+def test_points_close_together_are_driven_without_stopping() -> None:
+    drive = Drive(*(to(0.4 * n) for n in range(1, 15)), to(6, passes=False)).until_over()
+    between = [speed for north, _, speed in drive.track if 0.8 < north < 5.0]
+    assert min(between) > 0.2
+
+
+def test_a_place_that_is_missed_is_faced_and_driven_to_again() -> None:
+    drive = Drive(to(3), to(6), to(9, passes=False)).until_at(1)
+    pose = drive.rover.pose
+    drive.rover.pose = replace(pose, east=0.9)  # the position is corrected
+    drive.until_over()
+    assert drive.nearest(6, 0) <= RADIUS
+    assert min(speed for _, _, speed in drive.track) > -0.1
+
+
+def test_a_condition_that_a_place_has_not_met_does_not_wait_for_another() -> None:
+    steps = (to(4), Near(0.1), Perform(), to(8), to(12, passes=False))
+    drive = Drive(*steps).until_over()
+    assert drive.times[2] < drive.times[3] + 0.2
+
+
+def test_skipping_at_speed_stands_before_it_turns() -> None:
+    drive = Drive(SetSpeed(2.0), to(20), to(3, 3, passes=False)).until_at(1)
+    run(drive.rig, drive.rover, seconds=5)
+    assert drive.rover.velocity.forward > 1.5
+    drive.rig.tasks.skip_to(drive.rig.task(1), 2, now=drive.rig.now)
+    demand = drive.rig.step(drive.rover.view)
+    assert demand.velocity.is_zero
+    drive.until_over()
