@@ -26,7 +26,6 @@ from mav_tasks.engine.plans import (
     Plans,
     Stored,
     plan_of_task,
-    waits_for_start,
 )
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
@@ -350,7 +349,7 @@ class MissionDesks:
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
         self._flush(desk, vehicle, now=now)
         replaced = self._book.get(TaskId(before.plan_id))
-        if task.terms.is_staged and replaced is not None and waits_for_start(replaced):
+        if task.terms.is_staged and replaced is not None:
             self._plans.end(vehicle, replaced, R.REPLACED, actor=str(sender.address), now=now)
         if task.terms.is_staged:
             self._plans.begin_at(vehicle, 0)

@@ -159,6 +159,8 @@ class Plans:
         task = self.task(vehicle)
         if task is not None and task.state is S.HELD:
             raise Rejection(R.HELD_AHEAD, f"task {task.id} is held: release it first")
+        if task is not None and task.state is S.CANCELLING:
+            raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
 
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
         """Of a paused queue the mission alone goes on; what others have paused stays so."""

@@ -12,7 +12,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.goal import Move, Near, Plan, Rotate, SetSpeed, Wait
+from mav_tasks.tasks.goal import Move, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import distance
@@ -50,8 +50,6 @@ class Executor:
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
         self._resumes_by_itself = False
         self._is_coming_back = False  # from outside the fence
-        #: m/s, overrides what the task says (DO_CHANGE_SPEED); for this task only
-        self.speed: float | None = None
 
     def __repr__(self) -> str:
         return f"Executor({self.task!r})"
@@ -77,7 +75,6 @@ class Executor:
         self._task_id = task.id
         self._executed_before = task.progress.execution_time
         self._resumes_by_itself = False
-        self.speed = None
 
     def give_up(self) -> None:
         """Let the task go as it is: another takes its place."""
@@ -105,6 +102,18 @@ class Executor:
             # its line is lost, or left for good: what was driven counts, where it began does not
             progress = replace(progress, anchor=None, frame=None, target=None)
         self._change(S.STARTING, R.NONE, actor=actor, now=now, progress=progress)
+
+    def set_speed(self, speed: float | None) -> None:
+        """Let the begun task drive at this speed from now on, m/s; None: as it says itself.
+
+        Of what a plan says and what somebody asks for, the last word counts.
+        """
+        task = self.task
+        if task is None:
+            return
+        self._book.note_progress(task.id, replace(task.progress, speed=speed))
+        if self._course is not None:
+            self._course.progress = replace(self._course.progress, speed=speed)
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Interrupt a task that is being run; does nothing to one that is not."""
@@ -280,7 +289,7 @@ class Executor:
         if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
             self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
             return view.HOLD
-        speed = None if course is self._way_back else self.speed or course.progress.speed
+        speed = None if course is self._way_back else course.progress.speed
         wish = course.steer(motion, driving=self._settings.driving, speed=speed)
         velocity = self._within_fence(course, wish, motion, seen)
         if velocity is None:
@@ -344,8 +353,6 @@ class Executor:
         looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
         course.progress = looked.progress
         for step in looked.done:
-            if isinstance(plan.steps[step], SetSpeed):
-                self.speed = None  # what was asked for last counts
             self._book.reached(task.id, step, performs=step in looked.performed, now=now)
         if looked.done:
             self._book.advance(task.id, course.progress, now=now)

@@ -127,7 +127,7 @@ class Progress:
     Of a plan, ``step`` is the one that is being driven (-1: not begun) and legs are its legs;
     ``jumps`` are pairs of a jump's step and how often it was made, ``pending`` the steps on the way
     that are still to be done, the first of them waiting for ``pending_for`` seconds; ``speed`` is
-    what the plan has set, m/s.
+    what the plan, or somebody meanwhile, has set, m/s.
     """
 
     anchor: Pose | None = None

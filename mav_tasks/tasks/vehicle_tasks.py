@@ -338,7 +338,7 @@ class VehicleTasks:
         """Set the speed of the task that runs, and of those to come that name none."""
         self._speed = speed
         self._apply_driving()
-        self._executor.speed = speed
+        self._executor.set_speed(speed)
         self._book.record(VehicleSpeedSet(self.vehicle, speed, actor, now))
         return None if self.begun is None else self.begun.id
 

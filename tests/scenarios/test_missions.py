@@ -9,8 +9,9 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
-from tests.kit.client import ACCEPTED, AUTO, DENIED, HOLD, TEMPORARILY_REJECTED, set_mode
+from tests.kit.client import ACCEPTED, AUTO, DENIED, HOLD, TEMPORARILY_REJECTED, set_mode, sticks
 from tests.kit.mission import Download, Item, Upload, acks, currents, reached
+from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -413,3 +414,108 @@ def test_a_start_does_not_allow_what_a_disarm_has_forbidden(world: World) -> Non
     start(world)
     world.run(5)
     assert not world.rover.autopilot.armed
+
+
+def test_another_plan_also_replaces_one_that_was_started_and_waits(world: World) -> None:
+    world.client.move(3)
+    world.run(1)
+    uploaded(world)
+    start(world)
+    uploaded(world, HOME, place(0.5, 0))
+    world.run(0.2)
+    assert world.state(2) == (S.CANCELLED, R.REPLACED)
+
+
+def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
+    world: World,
+) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+    world.client.command(54010, 1)
+    assert start(world) == (TEMPORARILY_REJECTED, R.QUEUE_PAUSED)
+    world.until_state(1, S.CANCELLED)
+    assert start(world) == (ACCEPTED, 2)
+
+
+def test_in_a_paused_queue_a_started_mission_runs_alone(world: World) -> None:
+    world.client.pause()
+    world.client.move(5)
+    uploaded(world, HOME, place(0.5, 0.5))
+    start(world)
+    world.until_state(2, S.COMPLETED)
+    world.run(5)
+    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.OPERATOR)
+
+
+def test_auto_goes_on_with_a_mission_of_the_task_server_too(world: World) -> None:
+    uploaded(world, place(3, 0), target=(1, 191))
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    world.client.mode(HOLD)
+    world.run(3)
+    sent = world.client.mode(AUTO)
+    world.until_state(1, S.COMPLETED)
+    assert sent.answer == (ACCEPTED, 1)
+    assert "mode10" not in world.observer.sent_since(0)
+
+
+@pytest.mark.parametrize("how", ["moving", "sticks"])
+def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> None:
+    uploaded(world)
+    world.operator_arm(True)
+    world.operator_mode(Mode.MANUAL)
+    world.run(1.5)
+    if how == "moving":
+        world.rover.autopilot.operator_sticks(0.5, 0.0)
+    else:
+        world.add_client("pilot").stream(sticks(300), rate=10)
+    world.run(1.5)
+    at_start = world.now
+    answer = start(world)
+    assert answer is not None
+    assert answer[0] == TEMPORARILY_REJECTED
+    assert world.observer.sent_since(at_start) in ([], ["MANUAL_CONTROL"])
+
+
+@pytest.mark.parametrize("what", ["clear", "empty upload", "fence"])
+def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: str) -> None:
+    store = LateStore(delay=0.0)
+    world = make_world(store=store)
+    uploaded(world)
+    store.delay = 5.0
+    if what == "clear":
+        world.client.send(clear_all())
+    elif what == "empty upload":
+        Upload(world.client, ())
+    else:
+        yard = [Item(5003, **at(0, 0), param1=0.5, param4=0, frame=0)]
+        Upload(world.client, yard, kind=1)
+    world.run(3)
+    store.delay = 0.0
+    world.run(6)
+    assert acks(world.client)[-1].result not in (0, None)
+    assert start(world) == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED, within=60)
+
+
+def test_a_start_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:
+    store = LateStore(delay=0.0)
+    world = make_world(store=store)
+    uploaded(world)
+    store.delay = 5.0
+    sent = world.client.command(START, target=(1, 1))
+    world.run(1)
+    assert sent.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
+    assert world.state(1)[0] is S.BLOCKED
+    store.delay = 0.0
+    world.run(6)
+    assert start(world) == (ACCEPTED, 1)
+
+
+@pytest.mark.parametrize("kind", [3, 77, 255])
+def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
+    upload = Upload(world.client, (), kind=kind)
+    world.until(lambda: upload.result is not None, within=3)
+    assert upload.result == 3
