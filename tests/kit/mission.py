@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 COUNT, ITEM_INT, REQUEST, REQUEST_INT, MISSION_ACK, CURRENT, REACHED = 44, 73, 40, 51, 47, 42, 46
 RETRY = 0.5  # s
-TRIES = 5
-PATIENCE = 2.5  # s without a request
-MOST_REPEATS = 5  # requests for one item again
+TRIES = 5  # of an upload: sends of one message, and waits for the next request, together
 TIMEOUT = -1  # instead of a MAV_MISSION_RESULT
 
 
@@ -114,29 +112,29 @@ class Upload:
     result: int | None = None
     opaque_id: int = 0
     requests: list[int] = field(default_factory=list)
+    #: requests for items beyond the next one: MAVSDK only warns, but sends its count no more
+    ahead: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._tries = 0
         self._is_asked = False
-        now = self.client.net.now
-        self._next_at, self._heard_at = now, now
+        self._next = 0
+        self._next_at = self.client.net.now
         self.client.roles.append(self)
-        self.turn(now=now)
+        self.turn(now=self._next_at)
 
     def next_deadline(self) -> float | None:
-        if self.result is not None:
-            return None
-        give_up = self._heard_at + PATIENCE
-        return give_up if self._is_asked else min(give_up, self._next_at)
+        return None if self.result is not None else self._next_at
 
     def turn(self, *, now: float) -> None:
-        if self.result is not None:
+        if self.result is not None or now < self._next_at:
             return
-        if now >= self._heard_at + PATIENCE:
+        if self._tries >= TRIES:
             self._end(TIMEOUT)
-        elif not self._is_asked and now >= self._next_at and self._tries < TRIES:
-            self._tries += 1
-            self._next_at = now + RETRY
+            return
+        self._tries += 1
+        self._next_at = now + RETRY
+        if not self._is_asked:
             message = common.MAVLink_mission_count_message(*self.target, len(self.items), self.kind)
             self.client.send(message)
 
@@ -145,23 +143,40 @@ class Upload:
             return
         if packet.message_id == REQUEST_INT:
             seq, _, _, kind = struct.unpack("<HBBB", packet.payload.ljust(5, b"\0")[:5])
-            if kind != self.kind:
-                return
-            self._is_asked = True
-            self._heard_at = now
-            self.requests.append(seq)
-            if self.requests.count(seq) > 1 + MOST_REPEATS or seq >= len(self.items):
-                self._end(TIMEOUT)
-                return
-            self.client.send(self.items[seq].message(seq, self.kind, self.target))
+            if kind == self.kind:
+                self._take_request(seq, now=now)
         elif packet.message_id == MISSION_ACK:
             ack = Ack.of(packet.payload)
             if ack.kind != self.kind:
                 self._end(1)  # MAVSDK breaks off
                 return
-            is_early = ack.result == 0 and self.items and len(self.items) - 1 not in self.requests
+            is_early = ack.result == 0 and self._next != len(self.items)
             self.opaque_id = ack.opaque_id
             self._end(1 if is_early else ack.result)
+
+    def cancel(self) -> None:
+        """Give up, and say so."""
+        self.client.send(common.MAVLink_mission_ack_message(*self.target, 15, self.kind))
+        self._end(15)
+
+    def vanish(self) -> None:
+        """Give up without a word."""
+        self._end(TIMEOUT)
+
+    def _take_request(self, seq: int, *, now: float) -> None:
+        self._is_asked = True
+        self.requests.append(seq)
+        if seq > self._next:
+            self.ahead.append(seq)
+            return
+        if seq < self._next and self._tries >= TRIES:
+            self._end(TIMEOUT)
+            return
+        self._tries = 1 if seq == self._next else self._tries + 1
+        self._next_at = now + RETRY
+        if seq < len(self.items):
+            self._next = seq + 1
+            self.client.send(self.items[seq].message(seq, self.kind, self.target))
 
     def _end(self, result: int) -> None:
         self.result = result
