@@ -17,7 +17,8 @@ from mav_tasks.services.mission_item import Item, item_of
 
 ASK_AGAIN = 0.2  # s, between requests for one item; MAVSDK loses least between 0.1 and 0.2
 GIVE_UP = 2.3  # s without an item; MAVSDK gives up after 2.5
-QUIET = 0.3  # s after an upload was broken off, in which its last items may still arrive
+QUIET = 0.3  # s that a packet is on its way at the most
+LATE = 2 * QUIET  # s after an upload has ended, in which items may still come that it asked for
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
 CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
 
@@ -55,6 +56,7 @@ class _Session:
     count: int
     ask_at: float
     give_up_at: float
+    quiet_until: float  # until then come items of the upload before
     items: list[Item] = field(default_factory=list)
     is_whole: bool = False
 
@@ -75,7 +77,7 @@ class MissionReceiver:
         self._check = check
         self._session: _Session | None = None
         self._answered: _Answered | None = None
-        self._broken_off_at: float | None = None
+        self._ended: dict[tuple[Sender, int], float] = {}  # by mission type: when the last one did
         self._outgoing: list[ToClient] = []
         self._uploads: list[Upload] = []
 
@@ -107,19 +109,13 @@ class MissionReceiver:
             self._session = None
             self._send_ack(sender, kind, MavMissionResult.NO_SPACE)
             return
-        is_same = session is not None and (session.mission_type, session.count) == (
-            kind,
-            message.count,
-        )
-        if is_same and session is not None and not session.items:
-            session.ask_at = max(now, self._quiet_until(now))
-            session.give_up_at = now + GIVE_UP
-        else:  # never items of one upload with those of another
-            if session is not None and session.items:
-                self._broken_off_at = now
-            self._session = _Session(
-                sender, kind, message.count, self._quiet_until(now), now + GIVE_UP
-            )
+        # Also a count that only seems to come again may be of another plan of that length: never
+        # items of one upload with those of another.
+        if session is not None:
+            self._note_end(session, now=now)
+        quiet_until = self._quiet_until(sender, kind, now=now)
+        give_up_at = now + GIVE_UP
+        self._session = _Session(sender, kind, message.count, quiet_until, give_up_at, quiet_until)
         self._answered = None
         self._advance(now=now)
 
@@ -131,8 +127,10 @@ class MissionReceiver:
         if session is None or session.sender != sender:
             return self._repeat_answer(message, sender, now=now)
         is_next = message.seq == len(session.items) and message.mission_type == session.mission_type
-        if not is_next or session.is_whole or now < self._quiet_until(now):
-            return True  # one that was asked for twice, or is left from before
+        if session.is_whole or now < session.quiet_until:
+            return True  # left from before
+        if not is_next:
+            return True  # one that was asked for twice
         item = item_of(message)
         refusal: MavMissionResult | None = MavMissionResult.INVALID_PARAM5_X
         if item is not None:
@@ -152,7 +150,7 @@ class MissionReceiver:
             return
         if (session.sender, session.mission_type) == (sender, message.mission_type):
             self._session = None
-            self._broken_off_at = now
+            self._note_end(session, now=now)
 
     def finish(self, result: MavMissionResult, *, opaque_id: int, now: float) -> None:
         """A whole plan has been decided about: tell the client."""
@@ -175,7 +173,6 @@ class MissionReceiver:
         if session is None or session.is_whole:
             return
         if now >= session.give_up_at:
-            self._broken_off_at = now
             self._end(MavMissionResult.OPERATION_CANCELLED, None, now=now)
         else:
             self._advance(now=now)
@@ -193,8 +190,14 @@ class MissionReceiver:
             request = m.MissionRequestInt(*sender.address, len(session.items), session.mission_type)
             self._outgoing.append(ToClient(sender, request))
 
-    def _quiet_until(self, now: float) -> float:
-        return now if self._broken_off_at is None else max(now, self._broken_off_at + QUIET)
+    def _note_end(self, session: _Session, *, now: float) -> None:
+        self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}
+        self._ended[session.sender, session.mission_type] = now
+
+    def _quiet_until(self, sender: Sender, kind: int, *, now: float) -> float:
+        """Give until when items may come that were sent before the count that came now."""
+        ended_at = self._ended.get((sender, kind))
+        return now if ended_at is None else max(now, min(now + QUIET, ended_at + LATE))
 
     def _end(
         self, result: MavMissionResult, last: Item | None, *, opaque_id: int = 0, now: float
@@ -202,6 +205,7 @@ class MissionReceiver:
         session = self._session
         assert session is not None, "an upload is under way"
         self._session = None
+        self._note_end(session, now=now)
         ack = self._send_ack(session.sender, session.mission_type, result, opaque_id=opaque_id)
         self._answered = _Answered(
             session.sender, session.mission_type, last, len(session.items), ack, now

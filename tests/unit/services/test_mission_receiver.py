@@ -162,11 +162,26 @@ def test_another_client_is_denied_also_while_it_is_being_decided() -> None:
     assert rig.said() == [("alice", "ack", Result.ACCEPTED)]
 
 
-def test_the_same_count_before_any_item_is_a_repeat() -> None:
+def test_the_same_count_again_may_be_of_another_plan() -> None:
     rig = Rig().count(2)
     rig.run(0.5)
     rig.count(2)
-    assert rig.said() == [("alice", "request", 0)]
+    rig.item(0, north=1)  # on its way since before the count
+    assert rig.run(0.5 + QUIET) == [(0.5 + QUIET, "request", 0)]
+    rig.item(0, north=2)
+    rig.item(1, north=3)
+    rig.said()
+    assert [i.x - 470000000 for i in rig.uploads[0].items] == [2, 3]
+
+
+def test_an_upload_right_after_another_takes_no_item_of_it() -> None:
+    rig = Rig().uploaded(2)
+    rig.receiver.finish(Result.ACCEPTED, opaque_id=7, now=0.0)
+    rig.said()
+    rig.now = 0.1
+    rig.count(2)
+    rig.item(0)  # one that was doubled on the way
+    assert rig.run(0.1 + QUIET) == [(0.1 + QUIET, "request", 0)]
 
 
 def test_an_upload_begun_again_takes_no_item_of_the_one_before() -> None:
@@ -205,7 +220,7 @@ def test_another_type_from_the_same_client_is_another_upload() -> None:
     rig.item(0)
     rig.said()
     rig.count(1, kind=FENCE)
-    assert rig.run(QUIET) == [(QUIET, "request", 0)]
+    assert rig.said() == [("alice", "request", 0)]
     rig.item(0)  # of the mission
     assert rig.said() == []
     rig.item(0, kind=FENCE)
