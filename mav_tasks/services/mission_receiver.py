@@ -144,9 +144,9 @@ class MissionReceiver:
         return True
 
     def cancelled(self, message: m.MissionAck, sender: Sender, *, now: float) -> None:
-        """A client's own ack: it gives its upload up."""
+        """A client's own ack: it gives its upload up, or has all of a download."""
         session = self._session
-        if session is None or session.is_whole:
+        if session is None or session.is_whole or message.type == MavMissionResult.ACCEPTED:
             return
         if (session.sender, session.mission_type) == (sender, message.mission_type):
             self._session = None

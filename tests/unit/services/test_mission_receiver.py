@@ -208,6 +208,14 @@ def test_after_a_client_has_given_up_nothing_more_is_asked() -> None:
     assert rig.said() == [("bob", "request", 0)]
 
 
+def test_the_end_of_a_download_cancels_no_upload() -> None:
+    rig = Rig().count(2)
+    rig.said()
+    rig.receiver.cancelled(m.MissionAck(1, 1, Result.ACCEPTED, MISSION), ALICE, now=0.0)
+    rig.item(0)
+    assert rig.said() == [("alice", "request", 1)]
+
+
 def test_somebody_elses_ack_cancels_nothing() -> None:
     rig = Rig().count(2)
     rig.cancel(BOB)
