@@ -17,6 +17,7 @@ from mav_tasks.services.mission_item import Item, item_of
 
 ASK_AGAIN = 0.2  # s, between requests for one item; MAVSDK loses least between 0.1 and 0.2
 GIVE_UP = 2.3  # s without an item; MAVSDK gives up after 2.5
+STEP_BACK = 3  # from so many requests for an item on each second one is for an earlier one
 QUIET = 0.3  # s that a packet is on its way at the most
 LATE = 2 * QUIET  # s after an upload has ended, in which items may still come that it asked for
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
@@ -58,6 +59,7 @@ class _Session:
     give_up_at: float
     quiet_until: float  # until then come items of the upload before
     items: list[Item] = field(default_factory=list)
+    asked: int = 0  # times, for the next item
     is_whole: bool = False
 
 
@@ -129,8 +131,11 @@ class MissionReceiver:
         is_next = message.seq == len(session.items) and message.mission_type == session.mission_type
         if session.is_whole or now < session.quiet_until:
             return True  # left from before
-        if not is_next:
-            return True  # one that was asked for twice
+        if not is_next:  # one that was asked for twice
+            if session.asked >= STEP_BACK and message.seq < len(session.items):
+                session.ask_at = now + ASK_AGAIN
+                self._request(session, message.seq + 1)
+            return True
         item = item_of(message)
         refusal: MavMissionResult | None = MavMissionResult.INVALID_PARAM5_X
         if item is not None:
@@ -139,7 +144,7 @@ class MissionReceiver:
             self._end(refusal or MavMissionResult.ERROR, item, now=now)
             return True
         session.items.append(item)
-        session.ask_at, session.give_up_at = now, now + GIVE_UP
+        session.asked, session.ask_at, session.give_up_at = 0, now, now + GIVE_UP
         self._advance(now=now)
         return True
 
@@ -186,9 +191,17 @@ class MissionReceiver:
             self._uploads.append(Upload(session.sender, session.mission_type, items))
         elif now >= session.ask_at:
             session.ask_at = now + ASK_AGAIN
-            sender = session.sender
-            request = m.MissionRequestInt(*sender.address, len(session.items), session.mission_type)
-            self._outgoing.append(ToClient(sender, request))
+            session.asked += 1
+            seq = len(session.items)
+            # A late request takes MAVSDK back to that item, and then it answers none but the next.
+            if session.asked >= STEP_BACK and session.asked % 2:
+                seq = max(0, seq - session.asked // 2)
+            self._request(session, seq)
+
+    def _request(self, session: _Session, seq: int) -> None:
+        sender = session.sender
+        request = m.MissionRequestInt(*sender.address, seq, session.mission_type)
+        self._outgoing.append(ToClient(sender, request))
 
     def _note_end(self, session: _Session, *, now: float) -> None:
         self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}

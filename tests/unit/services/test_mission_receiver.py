@@ -112,12 +112,27 @@ def test_what_does_not_come_is_asked_for_again_until_it_is_given_up() -> None:
     rig.item(0)
     rig.said()
     seen = rig.run(5.0)
-    times = [round(ASK_AGAIN * n, 6) for n in range(1, 12)]
+    asked = [1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1]
     assert seen == [
-        *[(t, "request", 1) for t in times],
+        *[(round(ASK_AGAIN * n, 6), "request", seq) for n, seq in enumerate(asked, start=1)],
         (GIVE_UP, "ack", Result.OPERATION_CANCELLED),
     ]
     assert rig.receiver.next_deadline() is None
+
+
+def test_a_client_that_a_late_request_has_taken_back_is_led_on_again() -> None:
+    rig = Rig().count(6)
+    for seq in range(5):
+        rig.item(seq)
+    rig.said()
+    seen = [seq for _, _, seq in rig.run(0.85)]
+    assert seen == [5, 4, 5, 3]
+    answered = []
+    for seq in (3, 4, 5):  # it goes on where it was taken back to
+        rig.item(seq)
+        answered += rig.said()
+    assert answered == [("alice", "request", 4), ("alice", "request", 5)]
+    assert [len(upload.items) for upload in rig.uploads] == [6]
 
 
 def test_an_item_that_comes_twice_or_too_early_changes_nothing() -> None:
