@@ -316,7 +316,10 @@ class MissionDesks:
             raise Rejection(R.OUTSIDE_FENCE, words)
         terms = replace(wanted.terms, is_staged=is_staged)
         draft = self._draft(vehicle, wanted.plan, terms, sender)
-        known = None if is_staged else self._submissions.known_plan(draft, now=now)
+        # a long plan may take longer to come again than it is remembered
+        known = None
+        if not is_staged:
+            known = self._submissions.known_plan(draft, begun_at=upload.begun_at)
         if known is not None:
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
             self._flush(desk, vehicle, now=now)

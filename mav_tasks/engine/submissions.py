@@ -117,9 +117,9 @@ class Submissions:
         self._await_commit(asked, task, now=now)
         return task
 
-    def known_plan(self, draft: Draft, *, now: float) -> TaskId | None:
-        """Give the task that a plan is already, uploaded a moment ago: its ack may be lost."""
-        known = self._recollection.known(draft, confirmation=1, origin=None, now=now)
+    def known_plan(self, draft: Draft, *, begun_at: float) -> TaskId | None:
+        """Give the task that a plan is already, uploaded a moment before: its ack may be lost."""
+        known = self._recollection.known(draft, confirmation=1, origin=None, now=begun_at)
         return None if known is None else known.task_id
 
     def submit_plan(self, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:

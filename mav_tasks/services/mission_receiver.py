@@ -41,6 +41,7 @@ class Upload(NamedTuple):
     sender: Sender
     mission_type: int
     items: tuple[Item, ...]
+    begun_at: float
 
 
 class ToClient(NamedTuple):
@@ -55,6 +56,7 @@ class _Session:
     sender: Sender
     mission_type: int
     count: int
+    begun_at: float
     ask_at: float
     give_up_at: float
     quiet_until: float  # until then come items of the upload before
@@ -117,7 +119,9 @@ class MissionReceiver:
             self._note_end(session, now=now)
         quiet_until = self._quiet_until(sender, kind, now=now)
         give_up_at = now + GIVE_UP
-        self._session = _Session(sender, kind, message.count, quiet_until, give_up_at, quiet_until)
+        self._session = _Session(
+            sender, kind, message.count, now, quiet_until, give_up_at, quiet_until
+        )
         self._answered = None
         self._advance(now=now)
 
@@ -188,7 +192,8 @@ class MissionReceiver:
         if len(session.items) == session.count:
             session.is_whole = True
             items = tuple(session.items)
-            self._uploads.append(Upload(session.sender, session.mission_type, items))
+            upload = Upload(session.sender, session.mission_type, items, session.begun_at)
+            self._uploads.append(upload)
         elif now >= session.ask_at:
             session.ask_at = now + ASK_AGAIN
             session.asked += 1

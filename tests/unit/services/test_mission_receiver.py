@@ -104,7 +104,7 @@ def test_each_item_is_asked_for_and_the_whole_is_acknowledged_when_it_is_decided
 
 def test_an_empty_plan_is_whole_at_once() -> None:
     rig = Rig().count(0)
-    assert (rig.said(), rig.uploads) == ([], [Upload(ALICE, MISSION, ())])
+    assert (rig.said(), rig.uploads) == ([], [Upload(ALICE, MISSION, (), begun_at=0.0)])
 
 
 def test_what_does_not_come_is_asked_for_again_until_it_is_given_up() -> None:
