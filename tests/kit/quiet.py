@@ -1,0 +1,105 @@
+"""A world in which a rover says nothing but that it is there: for what passes between clients and
+the server alone, many seeds of it.
+"""
+
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
+from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.store import MemoryStore
+from mav_tasks.tasks.task import Task
+from rover_sim.virtual import VirtualWorld
+from tests.kit.client import FakeClient
+from tests.kit.mission import COUNT, MISSION_ACK, REQUEST_INT, Ack
+
+ROVER = "rover1"
+
+
+class QuietWorld(VirtualWorld):
+    """A server, a rover that only beats, and clients; the net between is as bad as told."""
+
+    def __init__(self, *, seed: int) -> None:
+        self.seed = seed
+        self.wire = Wire(seed=seed, conditions=Conditions())
+        super().__init__(self.wire)
+        self.store = MemoryStore()
+        self.join(Beacon(self.wire))
+        self.server = InMemoryServer(self.net, vehicles=(ROVER,), store=self.store)
+        self.join(self.server)
+        self.client = self.add_client("client")
+        self.until(lambda: self.server.engine.snapshot(now=self.now).vehicles, within=5)
+
+    def add_client(self, name: str) -> FakeClient:
+        """Let another client take part."""
+        client = FakeClient(self.net, name)
+        self.join(client)
+        return client
+
+    def tasks(self) -> tuple[Task, ...]:
+        """Give every task of the server."""
+        return self.server.engine.snapshot(now=self.now).tasks
+
+    def until(self, condition: Callable[[], object], *, within: float) -> None:
+        """Let time pass until the condition holds; AssertionError if it does not."""
+        came = self.run_until(lambda: bool(condition()), within=within)
+        assert came, f"not within {within} s (seed {self.seed}, t={self.now:.2f})"
+
+
+class Wire(MemoryNet):
+    """A net that notes what passes about uploads: what the server heard, and what it said."""
+
+    def __init__(self, *, seed: int, conditions: Conditions) -> None:
+        super().__init__(seed=seed, conditions=conditions)
+        #: (client, item) that the server asked for; item None: a count of the client's arrived
+        self.asked: list[tuple[str, int | None]] = []
+        #: (client, ack) that the server sent, whether it arrived or not
+        self.acks: list[tuple[str, Ack]] = []
+        self._newest: dict[str, int] = {}
+
+    def send(self, source: str, target: str, data: bytes) -> None:
+        """Note what the server says."""
+        if source == CLIENT_LINK and _is(data, REQUEST_INT):
+            self.asked.append((target, int.from_bytes(_payload(data)[:2], "little")))
+        elif source == CLIENT_LINK and _is(data, MISSION_ACK):
+            self.acks.append((target, Ack.of(_payload(data))))
+        super().send(source, target, data)
+
+    def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
+        """Note a count that is newer than all that came before."""
+        if link.name == CLIENT_LINK:
+            newest = self._newest.get(source)
+            if newest is None or (data[4] - newest) % 256 < 128:
+                self._newest[source] = data[4]
+                if _is(data, COUNT):
+                    self.asked.append((source, None))
+        super().arrive(link, source, data)
+
+
+def _is(data: bytes, message_id: int) -> bool:
+    return int.from_bytes(data[7:10], "little") == message_id
+
+
+def _payload(data: bytes) -> bytes:
+    return data[10 : 10 + data[1]].ljust(9, b"\0")
+
+
+class Beacon:
+    """A rover's heartbeats."""
+
+    def __init__(self, net: MemoryNet) -> None:
+        self._link = net.link(ROVER)
+        self._mav = common.MAVLink(None, 1, 1)
+        self._next_at = net.now
+
+    def next_deadline(self) -> float:
+        return self._next_at
+
+    def turn(self, *, now: float) -> None:
+        self._link.arrived.clear()
+        if now >= self._next_at:
+            self._next_at = now + 1.0
+            beat = common.MAVLink_heartbeat_message(10, 3, 1, 0, 4, 3)
+            self._link.send(VEHICLE_LINK, beat.pack(self._mav))
+            self._mav.seq = (self._mav.seq + 1) % 256
