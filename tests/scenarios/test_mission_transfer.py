@@ -295,3 +295,19 @@ def test_plans_are_never_mixed() -> None:
         length = random.choice([2, 2, 3, 8, 0])
         stories.append(story(seed, length=length, conditions=conditions))
     print(f"seeds 0 to 199: {count_of(stories)}")
+
+
+def test_a_download_goes_on_with_the_plan_with_which_it_began() -> None:
+    world = QuietWorld(seed=1)
+    other = world.add_client("other")
+    random = Random(1)
+    before, after = survey(random, 200), survey(random, 20, number=1)
+    assert uploaded(world, before, AUTOPILOT).result == 0
+    download = Download(other)
+    world.until(lambda: len(download.items) >= 5, within=5)
+    assert uploaded(world, after, AUTOPILOT).result == 0
+    assert not download.is_done
+    world.until(lambda: download.is_done, within=10)
+    mav = common.MAVLink(None, 1, 1)
+    assert [payload(message, mav) for message in download.items] == payloads(before)
+    assert downloaded(world) == payloads(after)
