@@ -1,4 +1,4 @@
-"""MAVSDK's mission plugins, unmodified, through the server: each script a process of its own, which
+"""MAVSDK's plugins, unmodified, through the server: each script a process of its own, which
 must not crash.
 """
 
@@ -42,3 +42,12 @@ def test_missions_are_driven_as_tasks(tmp_path: Path) -> None:
             assert f"task {task} completed" in log
         for task in (3, 4):  # the go-to, and the return that interrupts it
             assert f"task {task} executing" in log
+
+
+def test_fence_parameters_and_own_setpoints_work_as_without_a_server(tmp_path: Path) -> None:
+    with stand(tmp_path) as running:
+        said = run("plugins.py", running)
+        lines = ["fence uploaded", "fence cleared", "set 3.0 1", "all True True", "moves", "stands"]
+        assert [line for line in said.splitlines() if line in lines] == lines
+        assert said.rstrip().endswith("done")
+        assert "task 1" not in running.server.text, "none of it is a task"
