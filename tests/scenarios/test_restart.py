@@ -1,5 +1,6 @@
 """A server ends, well or not, and another one goes on from what it had stored."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from shutil import copy
 
@@ -239,15 +240,21 @@ def test_a_place_on_earth_is_driven_to_after_a_restart(world: World, path: Path)
     assert world.pose()[0] == pytest.approx(1.51, abs=0.04)
 
 
+def upload(
+    world: World, items: Sequence[Item], *, kind: int = 0, target: tuple[int, int] = (1, 1)
+) -> None:
+    under_way = Upload(world.client, items, kind=kind, target=target)
+    world.until(lambda: under_way.result == 0, within=5)
+
+
 def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
     plan = (Item(16, frame=0, current=1), Item(16, **at(1, 0)), Item(16, **at(1, 1)))
     yard = [
         Item(5001, **at(*corner), param1=4, param4=0, frame=0)
         for corner in ((-3, -3), (3, -3), (3, 3), (-3, 3))
     ]
-    for kind, items in ((0, plan), (1, yard)):
-        upload = Upload(world.client, items, kind=kind)
-        world.until(lambda upload=upload: upload.result == 0, within=5)  # type: ignore[misc]
+    upload(world, plan)
+    upload(world, yard, kind=1)
     restart(world, path, well=True)
     world.run(1)
     world.client.command_int(192, -1, 0, 0, 0, **at(5, 0), frame=0)
@@ -263,8 +270,7 @@ def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
 
 def test_a_plan_goes_on_with_the_item_that_was_driven(world: World, path: Path) -> None:
     items = [Item(16, **at(*p)) for p in ((1, 0), (3, 0), (3, 2))]
-    upload = Upload(world.client, items, target=(1, 191))
-    world.until(lambda: upload.result == 0, within=5)
+    upload(world, items, target=(1, 191))
     world.until(lambda: reached(world.client) == [0], within=20)
     world.run(1)
     restart(world, path)
