@@ -6,7 +6,7 @@ when it is over, it is another task.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import inf
+from typing import NamedTuple
 
 from mav_tasks.engine.fence_items import fence_of, rally_of
 from mav_tasks.engine.plan_items import plan_of
@@ -42,6 +42,12 @@ NOTHING = Stored(0, ())
 CALLED_OFF = TERMINAL - {S.COMPLETED}
 
 
+class _Started(NamedTuple):
+    by: Submitter
+    task_id: TaskId
+    at: float
+
+
 class Plans:
     """The plans of all vehicles."""
 
@@ -60,8 +66,7 @@ class Plans:
             key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
         }
         self._first: dict[int, int] = {}  # by vehicle: the item with which the next start begins
-        self._started: dict[int, tuple[Submitter, TaskId]] = {}  # the last start of each vehicle
-        self._started_at = -inf
+        self._started: dict[int, _Started] = {}  # the last start of each vehicle
         for (system_id, kind), stored in self._stored.items():
             self._apply_bounds(system_id, kind, stored.items)
 
@@ -135,10 +140,7 @@ class Plans:
         if first >= len(stored.items):
             words = f"param1 first item {first}: there are {len(stored.items)}"
             raise Rejection(R.BAD_PARAMETER, words, param=1)
-        started = self._started.get(vehicle.system_id)
-        is_again = started == (submitter, task and task.id) and not vehicle.tasks.paused
-        is_late = now - self._started_at > STARTED_TWICE
-        if task is not None and is_again and not is_late and task.state not in CALLED_OFF:
+        if task is not None and self._is_started_again(vehicle, submitter, task, now=now):
             return task
         chosen = self._first.pop(vehicle.system_id, 0)
         first = first or chosen
@@ -194,8 +196,17 @@ class Plans:
     def _note_start(
         self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
     ) -> None:
-        self._started[vehicle.system_id] = submitter, task.id
-        self._started_at = now
+        self._started[vehicle.system_id] = _Started(submitter, task.id, now)
+
+    def _is_started_again(
+        self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
+    ) -> bool:
+        """Whether a client means the start that it has just asked for in another way."""
+        started = self._started.get(vehicle.system_id)
+        if started is None or now - started.at > STARTED_TWICE:
+            return False
+        is_same = (started.by, started.task_id) == (submitter, task.id)
+        return is_same and task.state not in CALLED_OFF and not vehicle.tasks.paused
 
     def _again(
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float

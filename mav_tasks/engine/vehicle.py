@@ -451,9 +451,9 @@ class Vehicle:
     @property
     def home(self) -> GlobalPlace | None:
         """Where the vehicle returns to: the nearest rally point, else the home that it has said."""
-        motion = self._motion.latest()
-        bounds, origin = self.tasks.bounds, self._frame.origin
-        rally = bounds.refuge(motion.pose, origin) if motion is not None else None
+        bounds = self.tasks.bounds
+        motion = self._motion.latest() if bounds.rally else None
+        rally = None if motion is None else bounds.refuge(motion.pose, self._frame.origin)
         return rally or self._frame.home
 
     def distance_to(self, goal: GoTo) -> float | None:

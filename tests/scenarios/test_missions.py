@@ -519,3 +519,18 @@ def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
     upload = Upload(world.client, (), kind=kind)
     world.until(lambda: upload.result is not None, within=3)
     assert upload.result == 3
+
+
+def test_a_start_of_another_rover_does_not_make_one_meant_again(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    uploaded(world, HOME, place(0.3, 0))
+    other = Upload(world.client, (HOME, place(0.5, 4)), target=(2, 1))
+    world.until(lambda: other.result == 0, within=5)
+    assert start(world) == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED)
+    world.run(3)
+    world.client.command(START, target=(2, 1))
+    world.run(1)
+    answer = start(world)
+    assert answer is not None
+    assert answer[1] > 2, "the mission that is over is another task"

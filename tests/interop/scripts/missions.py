@@ -25,7 +25,15 @@ def wait_for(condition: Callable[[], Any], what: str) -> None:
         time.sleep(0.05)
 
 
-def raw_mission(system: Any, home: Any) -> None:
+def wait_for_motion(telemetry: Any, *, moves: bool) -> None:
+    def speed() -> float:
+        velocity = telemetry.velocity_ned()
+        return float(abs(velocity.north_m_s) + abs(velocity.east_m_s))
+
+    wait_for(lambda: (speed() > 0.2) is moves, "motion" if moves else "standstill")
+
+
+def raw_mission(system: Any, telemetry: Any, home: Any) -> None:
     raw = MissionRaw(system)
     latitude, longitude = round(home.latitude_deg * 1e7), round(home.longitude_deg * 1e7)
     items = [
@@ -40,7 +48,7 @@ def raw_mission(system: Any, home: Any) -> None:
     raw.start_mission()
     wait_for(lambda: seen and seen[-1][0] >= 2, "an item")
     raw.pause_mission()
-    time.sleep(1.5)
+    wait_for_motion(telemetry, moves=False)
     raw.set_current_mission_item(3)
     raw.start_mission()
     wait_for(raw.is_mission_finished, "the end of the raw mission")
@@ -83,13 +91,14 @@ def main(url: str) -> None:
         telemetry.subscribe_home(lambda home, _: homes.append(home))
         wait_for(lambda: homes, "home")
         action.arm()
-        raw_mission(system, homes[0])
+        raw_mission(system, telemetry, homes[0])
         mission(system, homes[0])
         action.goto_location(homes[0].latitude_deg + 1 / METRES, homes[0].longitude_deg, 0.0, NAN)
-        time.sleep(1.5)
+        wait_for_motion(telemetry, moves=True)
         action.hold()
+        wait_for_motion(telemetry, moves=False)
         action.return_to_launch()
-        time.sleep(3.0)
+        wait_for_motion(telemetry, moves=True)
     print("done")
 
 
