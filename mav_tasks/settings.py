@@ -106,6 +106,9 @@ class Settings:
     retention: Retention = field(default_factory=Retention)
     #: who arms: "server", "operator", or "auto" = server where the vehicle link is loopback
     arming: str = "auto"
+    #: whether PX4 and generic rovers turn at a yaw rate: "honoured", or "ignored"; then they are
+    #: steered by course, and neither turn on the spot nor reverse
+    yaw_rate: str = "ignored"
     #: whether standard commands and modes addressed to the autopilot become tasks, too
     claim: bool = True
     #: what a "go to" that changes the mode does: "queue", or run at once, "now"

@@ -73,7 +73,7 @@ class Authority:
             return ModeKind.HOLD
         if mode == self._persona.control_mode and self._mode_is_ours:
             return ModeKind.OURS
-        return ModeKind.MANUAL if mode == self._persona.manual_mode else ModeKind.OTHER
+        return ModeKind.MANUAL if mode in self._persona.manual_modes else ModeKind.OTHER
 
     def has_granted(self, client: Hashable) -> bool:
         """Whether this client has asked for our mode since the last task or STOP."""

@@ -368,10 +368,10 @@ class Commands:
 
     def _set_mode(self, asked: Asked, *, now: float) -> None:
         vehicle = asked.vehicle
-        value = asked.command.params[1]
-        if not (0 <= value <= 0xFFFFFFFF and value == int(value)):
-            raise Rejection(R.BAD_PARAMETER, f"param2 mode {value:g} is no mode number")
-        mode = int(value)
+        main, sub = asked.command.params[1:3]
+        mode = vehicle.persona.mode_in(main, sub)
+        if mode is None:
+            raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
         if mode == vehicle.persona.hold_mode:
             self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
             paused = vehicle.hold(actor=asked.actor, now=now)

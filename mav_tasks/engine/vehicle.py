@@ -21,6 +21,7 @@ from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.offboard import Phase, Refused
+from mav_tasks.services.orders import Speeds
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -106,6 +107,10 @@ class Vehicle:
         return self._monitor.armed
 
     @property
+    def _is_by_hand(self) -> bool:
+        return self._monitor.custom_mode in self.persona.manual_modes
+
+    @property
     def heard_at(self) -> float:
         """When its last heartbeat came."""
         return self._monitor.heard_at
@@ -181,9 +186,9 @@ class Vehicle:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
             self._disarmed(now=now)
-        by_hand = self.persona.manual_mode in (was_mode, mode)
+        by_hand = not self.persona.manual_modes.isdisjoint((was_mode, mode))
         by_client = self._authority.armed_by_client(now=now)
-        if armed and by_hand and not by_client and self.control.phase is Phase.ASKING_MODE:
+        if armed and by_hand and not by_client and self.control.is_asking_mode:
             self._take_over("armed to be driven by hand", now=now)
         if not self._clock.is_running:
             self.step(now=now)
@@ -249,7 +254,7 @@ class Vehicle:
 
     def _zero_what_is_kept(self) -> None:
         """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
-        if self.control.phase in (Phase.ASKING_ARM, Phase.CONTROL):
+        if self.control.is_streaming:
             self.requests.send_zero()
 
     def _note_component(self, component_id: int, *, now: float) -> None:
@@ -313,13 +318,12 @@ class Vehicle:
         self._authority.client_asks(mode, client, present_mode=present_mode, now=now)
         if mode == self.persona.control_mode:
             return
-        if self.control.phase in (Phase.ASKING_MODE, Phase.ASKING_ARM):
+        if self.control.is_taking:
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
-        by_hand = self._monitor.custom_mode == self.persona.manual_mode
-        if not (self.armed and by_hand):
+        if not (self.armed and self._is_by_hand):
             return
         if self._authority.since_other(now=now) < self._settings.watch.other_controller:
             raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
@@ -331,8 +335,7 @@ class Vehicle:
 
         By way of HOLD, from which tasks take the vehicle.
         """
-        by_hand = self._monitor.custom_mode == self.persona.manual_mode
-        if self.armed and by_hand and not self.control.is_engaged:
+        if self.armed and self._is_by_hand and not self.control.is_engaged:
             self.control.begin_release(now=now)
             self.requests.flush(now=now)
             self._clock.restart(now=now)
@@ -588,6 +591,7 @@ class Vehicle:
             frame=self._frame.frame(),
             home=self.home,
             is_fence_unknown=self.tasks.bounds.is_unknown(self._frame.origin),
+            turns_on_spot=self.persona.turns_on_spot,
         )
 
     def apply(self, settings: Settings) -> None:
@@ -599,7 +603,8 @@ class Vehicle:
             case DemandKind.TAKE:
                 self.control.take(may_arm=seen.may_arm, now=now)
             case DemandKind.DRIVE:
-                self.control.drive(demand.velocity.forward, demand.velocity.yaw_rate)
+                wanted = demand.velocity
+                self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 self.control.release(still=seen.still, disarm=False, now=now)
             case DemandKind.HAND_BACK:

@@ -246,7 +246,8 @@ class VehicleSide:
             return None
         if packet.system_id in (0, self._our_address.system_id):
             return None  # 0 would address every vehicle, and our own id is no vehicle's
-        persona = persona_of(heartbeat)
+        honours = self._settings.yaw_rate == "honoured"
+        persona = persona_of(heartbeat, honours_yaw_rate=honours)
         if persona is None:
             self._note_once(
                 packet.system_id,

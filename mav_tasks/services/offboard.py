@@ -2,18 +2,26 @@
 
 MAVLink guide, "Offboard Control Interface". Steps for ArduPilot: its GUIDED mode, one zero setpoint
 (it keeps a setpoint from before and would drive off when armed: observed), arm, zeros until seen
-armed, and only then motion. A mode or arm request is believed when a HEARTBEAT shows it, not when
-it is acknowledged. The caller calls one of ``take``, ``drive``, ``release`` or ``stop`` at each
-setpoint period; each does the next thing that is due.
+armed, and only then motion. For PX4: HOLD, asked for even where it is shown (one that shows it
+because the setpoints were lost would drive again by itself when they return), arm, a second of
+zeros, OFFBOARD, motion. A mode or arm request is believed when a HEARTBEAT shows it, not when it is
+acknowledged. The caller calls one of ``take``, ``drive``, ``release`` or ``stop`` at each setpoint
+period; each does the next thing that is due.
 """
 
 from enum import Enum, auto
-from math import inf, isfinite
+from math import inf
 
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavCmd, MavModeFlag, MavResult
-from mav_tasks.mavlink.messages import CommandLong, Message, SetPositionTargetLocalNed
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.messages import (
+    CommandInt,
+    CommandLong,
+    Message,
+    SetPositionTargetLocalNed,
+)
 from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.orders import STANDING, Orders, Speeds
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Watch
 
@@ -27,6 +35,8 @@ RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show H
 LATE = 0.3
 UNANSWERED = 0.3  # s after which a request without an answer was heard, or lost
 AWAITED = 1.5  # s, the longest until a 1 Hz heartbeat shows what a disarming has done
+LEAD_IN = 1.0  # s of zeros before a mode that is entered only while setpoints stream
+UNSTOPPED = 1.0  # s after which a STOP may depend on HOLD no more, where HOLD is not to be trusted
 
 
 class Phase(Enum):
@@ -34,10 +44,14 @@ class Phase(Enum):
 
     #: it is not ours; nothing is sent
     IDLE = auto()
+    #: HOLD is asked for, to arm in it
+    ASKING_HOLD = auto()
+    #: arming is asked for, zeros are streamed
+    ASKING_ARM = auto()
+    #: armed in HOLD; zeros are streamed
+    LEADING_IN = auto()
     #: our mode is asked for
     ASKING_MODE = auto()
-    #: in our mode; arming is asked for, zeros are streamed
-    ASKING_ARM = auto()
     #: in our mode and seen armed: setpoints move it
     CONTROL = auto()
     #: standing, HOLD is asked for
@@ -46,6 +60,11 @@ class Phase(Enum):
     DISARMING = auto()
     #: STOP: zeros and HOLD until confirmed
     STOPPING = auto()
+
+
+#: control is being taken
+TAKING = frozenset({Phase.ASKING_HOLD, Phase.ASKING_ARM, Phase.LEADING_IN, Phase.ASKING_MODE})
+STREAMING = frozenset({Phase.ASKING_ARM, Phase.LEADING_IN, Phase.CONTROL})
 
 
 class Refused(Enum):
@@ -63,6 +82,7 @@ class OffboardControl:
     ) -> None:
         self._target = target
         self._persona = persona
+        self._orders = Orders(target, persona)
         self._sender = sender
         self._watch = watch
         self._armed = False
@@ -76,6 +96,8 @@ class OffboardControl:
         self._ask_again_at: float | None = None  # a refused request is repeated then
         self._next_hold_at = 0.0
         self._release_until: float | None = None  # zeros only, until then at the longest
+        self._lead_until = 0.0  # zeros only, before our mode is asked for
+        self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
         self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
         self.phase = Phase.IDLE
         self.refused: Refused | None = None
@@ -93,6 +115,25 @@ class OffboardControl:
     def is_engaged(self) -> bool:
         """Whether we are doing anything to the vehicle."""
         return self.phase is not Phase.IDLE
+
+    @property
+    def is_taking(self) -> bool:
+        """Whether modes or arming are asked for, so as to get into control."""
+        return self.phase in TAKING
+
+    @property
+    def is_asking_mode(self) -> bool:
+        """Whether a mode is asked for, so as to get into control."""
+        return self.phase in (Phase.ASKING_HOLD, Phase.ASKING_MODE)
+
+    @property
+    def is_streaming(self) -> bool:
+        """Whether setpoints are being sent, of which the vehicle may keep the last."""
+        return self.phase in STREAMING
+
+    @property
+    def _may_arm_here(self) -> bool:
+        return self._in_hold if self._persona.arms_in_hold else self._in_our_mode
 
     @property
     def _in_our_mode(self) -> bool:
@@ -139,8 +180,11 @@ class OffboardControl:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
         if answer.ack is not None and answer.ack.result == MavResult.ACCEPTED:
             self._settles_at = min(self._settles_at, now)
+            if self.phase is Phase.ASKING_HOLD and self._mode == self._persona.hold_mode:
+                self._is_settled = True  # shown before, and heard that it is meant
             return
         asked = {
+            Phase.ASKING_HOLD: MavCmd.DO_SET_MODE,
             Phase.ASKING_MODE: MavCmd.DO_SET_MODE,
             Phase.ASKING_ARM: MavCmd.COMPONENT_ARM_DISARM,
         }
@@ -171,28 +215,54 @@ class OffboardControl:
             case Phase.DISARMING:  # seen through first: it could come true while we arm
                 if not self._armed:
                     self.phase = Phase.IDLE
-            case Phase.ASKING_MODE if not self._in_our_mode:
+            case Phase.ASKING_HOLD if not self._in_hold:
                 self._insist(Refused.MODE, now=now)
-            case Phase.ASKING_ARM if self._in_our_mode and not self._armed:
-                self._send_setpoint(0.0, 0.0)
+            case Phase.ASKING_MODE if not self._in_our_mode:
+                if self._persona.arms_in_hold:
+                    self._send_setpoint(STANDING)
+                self._insist(Refused.MODE, now=now)
+            case Phase.ASKING_ARM if self._may_arm_here and not self._armed:
+                self._send_setpoint(STANDING)
                 self._insist(Refused.ARM, now=now)
-            case Phase.ASKING_ARM if self._in_our_mode:
-                self._send_setpoint(0.0, 0.0)
-                self.phase = Phase.CONTROL
+            case Phase.LEADING_IN if self._in_hold and self._armed and now < self._lead_until:
+                self._send_setpoint(STANDING)
             case Phase.CONTROL if self.in_control:
-                self._send_setpoint(0.0, 0.0)
+                self._send_setpoint(STANDING)
+            case _ if self._persona.arms_in_hold:
+                self._next_by_way_of_hold(may_arm=may_arm, now=now)
+            case Phase.ASKING_ARM if self._in_our_mode:
+                self._send_setpoint(STANDING)
+                self.phase = Phase.CONTROL
             case _ if self._in_our_mode:
                 self._begin_arming(may_arm=may_arm, now=now)
             case _:
                 self._begin_asking(Phase.ASKING_MODE, now=now)
                 self._ask_mode(now=now)
 
-    def drive(self, forward: float, yaw_rate: float) -> None:
-        """Send a velocity setpoint, m/s and rad/s; zeros unless ``in_control``."""
-        if self.phase in (Phase.ASKING_ARM, Phase.CONTROL):
+    def _next_by_way_of_hold(self, *, may_arm: bool, now: float) -> None:
+        """The next step of HOLD, arm, zeros, our mode; zeros at each, which do no harm."""
+        if self._armed and self._in_our_mode:
+            self._send_setpoint(STANDING)
+            self.phase = Phase.CONTROL
+        elif self.phase is Phase.ASKING_HOLD and not self._armed:
+            self._begin_arming(may_arm=may_arm, now=now)
+        elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._in_hold:
+            self._begin_asking(Phase.LEADING_IN, now=now)
+            self._lead_until = now + LEAD_IN
+            self._send_setpoint(STANDING)
+        elif self.phase is Phase.LEADING_IN and self._in_hold and self._armed:
+            self._begin_asking(Phase.ASKING_MODE, now=now)
+            self._send_setpoint(STANDING)
+            self._ask_mode(now=now)
+        else:
+            self._begin_asking(Phase.ASKING_HOLD, now=now)
+            self._ask_hold(now=now)
+
+    def drive(self, wanted: Speeds) -> None:
+        """Send a velocity setpoint; zeros unless ``in_control``."""
+        if self.is_streaming:
             self._release_until = None
-            moving = self.in_control and isfinite(forward) and isfinite(yaw_rate)
-            self._send_setpoint(*((forward, yaw_rate) if moving else (0.0, 0.0)))
+            self._send_setpoint(wanted if self.in_control and wanted.is_finite else STANDING)
 
     def release(self, *, still: bool, disarm: bool, now: float) -> None:
         """Zeros until the vehicle stands, then HOLD until seen, then nothing more.
@@ -203,10 +273,10 @@ class OffboardControl:
         self._note_requests(now)
         self.refused = None
         match self.phase:
-            case Phase.ASKING_MODE:
+            case Phase.ASKING_HOLD | Phase.ASKING_MODE:
                 self.begin_release(now=now)
-            case Phase.ASKING_ARM | Phase.CONTROL:
-                self._send_setpoint(0.0, 0.0)
+            case Phase.ASKING_ARM | Phase.LEADING_IN | Phase.CONTROL:
+                self._send_setpoint(STANDING)
                 self._withdraw(MavCmd.COMPONENT_ARM_DISARM)
                 if self._release_until is None:
                     self._release_until = now + STAND_UNSEEN
@@ -221,7 +291,7 @@ class OffboardControl:
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self.phase = Phase.IDLE
             case Phase.RELEASING:
-                self._send_setpoint(0.0, 0.0)
+                self._send_setpoint(STANDING)
                 if now >= self._next_hold_at:
                     self._request_hold(now=now, again_after=RELEASE_REPEAT)
             case Phase.DISARMING if not self._armed:
@@ -234,7 +304,7 @@ class OffboardControl:
         self.refused = None
         self._ask_until = now + RELEASE_LIMIT
         self._unsettle(now)
-        self._send_setpoint(0.0, 0.0)
+        self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
     def begin_stop(self, *, now: float) -> None:
@@ -243,8 +313,9 @@ class OffboardControl:
             self._sender.cancel(self._target.component_id, command, now=now)
         self.phase = Phase.STOPPING
         self.refused = None
+        self._disarm_by = now + UNSTOPPED if self._persona.stop_disarms else inf
         self._unsettle(now)
-        self._send_setpoint(0.0, 0.0)
+        self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=STOP_REPEAT)
 
     def stop(self, *, still: bool, heard: bool, now: float) -> None:
@@ -256,30 +327,32 @@ class OffboardControl:
         self._note_requests(now)
         if self.phase is not Phase.STOPPING:
             return
-        if heard and still and self._in_hold:
+        if heard and still and (self._in_hold or self._is_disarmed_by_stop):
             self._withdraw_requests()
             self.phase = Phase.IDLE
             return
         if now >= self._next_hold_at:
             self._request_hold(now=now, again_after=STOP_REPEAT)
+            if self._is_hold_in_vain(now):
+                self._request_disarming(now=now)
         elif not heard:
             return
-        self._send_setpoint(0.0, 0.0)
+        self._send_setpoint(STANDING)
 
     def zero_setpoint(self) -> SetPositionTargetLocalNed:
         """Give the setpoint that asks the vehicle to stand."""
-        return self._setpoint(0.0, 0.0)
+        return self._orders.velocity(STANDING)
 
     def hold_request(self) -> CommandLong:
         """Give the command that asks for HOLD."""
-        return self._mode_request(self._persona.hold_mode)
+        return self._orders.hold()
 
     def _note_requests(self, now: float) -> None:
         """Remember until when what we ask for was still being asked for."""
         match self.phase:
             case Phase.ASKING_MODE:
                 self._control_at = now
-            case Phase.RELEASING | Phase.STOPPING:
+            case Phase.ASKING_HOLD | Phase.RELEASING | Phase.STOPPING:
                 self._hold_at = now
             case Phase.DISARMING:
                 self._disarm_at = now
@@ -292,9 +365,9 @@ class OffboardControl:
         self._ask_again_at = None
 
     def _begin_arming(self, *, may_arm: bool, now: float) -> None:
-        """In our mode: clear what setpoint there was, then see to arming."""
+        """In the mode for it: clear what setpoint there was, then see to arming."""
         self._begin_asking(Phase.ASKING_ARM, now=now)
-        self._send_setpoint(0.0, 0.0)
+        self._send_setpoint(STANDING)
         if not self._armed and may_arm:
             self.we_armed = True
             self._ask_arming(now=now)
@@ -308,29 +381,31 @@ class OffboardControl:
             self.we_armed = False
         elif now >= self._ask_again_at:
             self._ask_again_at = None
-            if what is Refused.MODE:
-                self._ask_mode(now=now)
-            else:
+            if what is Refused.ARM:
                 self._ask_arming(now=now)
+            elif self.phase is Phase.ASKING_HOLD:
+                self._ask_hold(now=now)
+            else:
+                self._ask_mode(now=now)
 
     def _ask_mode(self, *, now: float) -> None:
         self._control_at = now
         self._unsettle(now)
-        self._request(
-            self._mode_request(self._persona.control_mode), until=self._ask_until, now=now
-        )
+        self._request(self._orders.our_mode(), until=self._ask_until, now=now)
+
+    def _ask_hold(self, *, now: float) -> None:
+        self._hold_at = now
+        self._unsettle(now)
+        self._request(self._orders.hold(), until=self._ask_until, now=now)
 
     def _ask_arming(self, *, now: float) -> None:
-        arming = self._command(MavCmd.COMPONENT_ARM_DISARM, 1.0)
-        self._request(arming, until=self._ask_until, now=now)
+        self._request(self._orders.arming(arm=True), until=self._ask_until, now=now)
 
     def _end_release(self, *, disarm: bool, now: float) -> None:
         if disarm and self.we_armed and self._armed:
             self.phase = Phase.DISARMING
-            self._disarm_at = now
             self._unsettle(now)
-            disarming = self._command(MavCmd.COMPONENT_ARM_DISARM, 0.0)
-            self._request(disarming, until=now + self._watch.ask_vehicle, now=now, urgent=True)
+            self._request_disarming(now=now)
         else:
             self.phase = Phase.IDLE
 
@@ -339,6 +414,24 @@ class OffboardControl:
         self._next_hold_at = now + again_after
         until = now + self._watch.ask_vehicle
         self._request(self.hold_request(), until=until, now=now, urgent=True)
+        if self._persona.drives_in_hold and self._mode == self._persona.hold_mode:
+            self._request(self._orders.staying(), until=until, now=now, urgent=True)
+
+    def _request_disarming(self, *, now: float) -> None:
+        self._disarm_at = now
+        until = now + self._watch.ask_vehicle
+        self._request(self._orders.arming(arm=False), until=until, now=now, urgent=True)
+
+    def _is_hold_in_vain(self, now: float) -> bool:
+        """Whether a vehicle whose HOLD is not to be trusted has not shown it in time."""
+        if now < self._disarm_by or not self._armed or self._in_hold:
+            return False
+        # a heartbeat each second may be a little late, and show that all is well
+        return self._is_settled or now >= self._disarm_by + AWAITED - UNSTOPPED
+
+    @property
+    def _is_disarmed_by_stop(self) -> bool:
+        return self._persona.stop_disarms and self._is_settled and not self._armed
 
     def _unsettle(self, now: float) -> None:
         """What the next heartbeats say may be from before the request that leaves now."""
@@ -346,7 +439,12 @@ class OffboardControl:
         self._settles_at = now + UNANSWERED
 
     def _request(
-        self, command: CommandLong, *, until: float, now: float, urgent: bool = False
+        self,
+        command: CommandLong | CommandInt,
+        *,
+        until: float,
+        now: float,
+        urgent: bool = False,
     ) -> None:
         self._sender.request(command, now=now, give_up_after=until - now, urgent=urgent)
 
@@ -357,36 +455,8 @@ class OffboardControl:
     def _withdraw(self, command: MavCmd) -> None:
         self._sender.withdraw(self._target.component_id, command)
 
-    def _mode_request(self, mode: int) -> CommandLong:
-        return self._command(MavCmd.DO_SET_MODE, float(MavModeFlag.CUSTOM_MODE_ENABLED), mode)
-
-    def _command(self, command: MavCmd, param1: float, param2: float = 0.0) -> CommandLong:
-        system, component = self._target
-        return CommandLong(system, component, command, 0, param1, param2, 0, 0, 0, 0, 0)
-
-    def _send_setpoint(self, forward: float, yaw_rate: float) -> None:
-        self._outgoing.append(self._setpoint(forward, yaw_rate))
-
-    def _setpoint(self, forward: float, yaw_rate: float) -> SetPositionTargetLocalNed:
-        system, component = self._target
-        return SetPositionTargetLocalNed(
-            time_boot_ms=0,
-            target_system=system,
-            target_component=component,
-            coordinate_frame=self._persona.setpoint_frame,
-            type_mask=self._persona.setpoint_mask,
-            x=0.0,
-            y=0.0,
-            z=0.0,
-            vx=forward,
-            vy=0.0,
-            vz=0.0,
-            afx=0.0,
-            afy=0.0,
-            afz=0.0,
-            yaw=0.0,
-            yaw_rate=yaw_rate,
-        )
+    def _send_setpoint(self, wanted: Speeds) -> None:
+        self._outgoing.append(self._orders.velocity(wanted))
 
 
 def is_request_of(answer: Answered) -> bool:

@@ -1,12 +1,20 @@
-"""How an autopilot wants to be spoken to: modes, setpoint masks. Recognised from its HEARTBEAT."""
+"""How an autopilot wants to be spoken to: modes, order, setpoints. Recognised from its HEARTBEAT.
+
+What a family of autopilots does otherwise than another is a field here; nothing asks for its name.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import isnan
 
-from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, PositionTargetTypemask
+from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, MavModeFlag, PositionTargetTypemask
 from mav_tasks.mavlink.messages import Heartbeat
 
 T = PositionTargetTypemask
+
+NO_MODE = -1
+MAIN_BITS, SUB_BITS = 16, 24  # where PX4's custom_mode has its main and its sub mode
+VELOCITY_ONLY = int(T.X_IGNORE | T.Y_IGNORE | T.Z_IGNORE | T.AX_IGNORE | T.AY_IGNORE | T.AZ_IGNORE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,18 +24,51 @@ class Persona:
     name: str
     control_mode: int  # custom_mode in which setpoints are followed
     hold_mode: int  # custom_mode in which the vehicle stands
-    manual_mode: int
+    manual_modes: frozenset[int]  # a person drives
     return_mode: int  # drives back to where it was armed
     mission_mode: int  # drives the uploaded mission
-    booting_mode: int  # left without anybody's doing
+    booting_mode: int  # left without anybody's doing; NO_MODE: it shows none
+    mode_names: Mapping[int, str]
+    has_main_modes: bool  # a mode has two parts, which a command names apart
     has_home_item: bool  # the first item of a mission is home
+    #: it is armed in HOLD and enters our mode only while setpoints stream; else it is armed in our
+    #: mode
+    arms_in_hold: bool
+    #: it may be driving to a place in HOLD, which asking for HOLD again does not end
+    drives_in_hold: bool
+    #: STOP may not depend on its HOLD: where that is not seen soon, it is disarmed
+    stop_disarms: bool
+    #: some clients ask for HOLD before each "go to", which nobody has wished for
+    is_held_before_places: bool
+    #: it turns at a rate, also on the spot, and reverses; else it is steered by where to go
+    turns_on_spot: bool
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
-    mode_names: Mapping[int, str]
+
+    def __repr__(self) -> str:
+        return f"Persona({self.name})"
 
     def mode_name(self, mode: int) -> str:
         """Give a custom_mode in words, as ground stations show it."""
         return self.mode_names.get(mode, f"mode {mode}")
+
+    def mode_params(self, mode: int) -> tuple[float, float, float]:
+        """Give param1 to param3 of the DO_SET_MODE that asks for a custom_mode."""
+        enabled = float(MavModeFlag.CUSTOM_MODE_ENABLED)
+        if self.has_main_modes:
+            return enabled, float(mode >> MAIN_BITS & 0xFF), float(mode >> SUB_BITS & 0xFF)
+        return enabled, float(mode), 0.0
+
+    def mode_in(self, param2: float, param3: float) -> int | None:
+        """Give the custom_mode that a DO_SET_MODE names; None: these are no mode numbers."""
+        if not self.has_main_modes:
+            return _whole(param2, high=0xFFFFFFFF)
+        main, sub = _whole(param2, high=0xFF), _whole(0.0 if isnan(param3) else param3, high=0xFF)
+        return None if main is None or sub is None else main << MAIN_BITS | sub << SUB_BITS
+
+
+def _whole(value: float, *, high: int) -> int | None:
+    return int(value) if 0 <= value <= high and value == int(value) else None
 
 
 #: ArduPilot Rover. With the yaw rate unmasked it turns on the spot, and vx < 0 reverses; a pure
@@ -36,21 +77,10 @@ ARDUPILOT = Persona(
     name="ardupilot",
     control_mode=15,  # GUIDED
     hold_mode=4,
-    manual_mode=0,
+    manual_modes=frozenset({0}),
     return_mode=11,  # RTL
     mission_mode=10,  # AUTO
     booting_mode=16,  # INITIALISING
-    has_home_item=True,
-    setpoint_mask=int(
-        T.X_IGNORE
-        | T.Y_IGNORE
-        | T.Z_IGNORE
-        | T.AX_IGNORE
-        | T.AY_IGNORE
-        | T.AZ_IGNORE
-        | T.YAW_IGNORE
-    ),
-    setpoint_frame=MavFrame.BODY_NED,
     mode_names={
         0: "MANUAL",
         1: "ACRO",
@@ -67,11 +97,79 @@ ARDUPILOT = Persona(
         15: "GUIDED",
         16: "INITIALISING",
     },
+    has_main_modes=False,
+    has_home_item=True,
+    arms_in_hold=False,
+    drives_in_hold=False,
+    stop_disarms=False,
+    is_held_before_places=False,
+    turns_on_spot=True,
+    setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
+    setpoint_frame=MavFrame.BODY_NED,
 )
 
 
-def persona_of(heartbeat: Heartbeat) -> Persona | None:
-    """Give the persona that a vehicle's heartbeat shows, or None if it is none that we drive."""
-    if heartbeat.autopilot == MavAutopilot.ARDUPILOTMEGA:
-        return ARDUPILOT
-    return None
+def _px4(main: int, sub: int = 0) -> int:
+    return main << MAIN_BITS | sub << SUB_BITS
+
+
+#: A PX4 rover, 1.15. Its velocity is a vector over ground, in the direction of which it turns by
+#: itself; yaw and yaw rate are passed over. Mask 0x0DC7.
+PX4 = Persona(
+    name="px4",
+    control_mode=_px4(6),  # OFFBOARD
+    hold_mode=_px4(4, 3),
+    manual_modes=frozenset(map(_px4, (1, 2, 3, 5, 7, 8, 9))),
+    return_mode=_px4(4, 5),
+    mission_mode=_px4(4, 4),
+    booting_mode=NO_MODE,
+    mode_names={
+        _px4(1): "Manual",
+        _px4(2): "Altitude",
+        _px4(3): "Position",
+        _px4(4, 1): "Ready",
+        _px4(4, 2): "Takeoff",
+        _px4(4, 3): "Hold",
+        _px4(4, 4): "Mission",
+        _px4(4, 5): "Return",
+        _px4(4, 6): "Land",
+        _px4(4, 8): "Follow",
+        _px4(5): "Acro",
+        _px4(6): "Offboard",
+        _px4(7): "Stabilized",
+    },
+    has_main_modes=True,
+    has_home_item=False,
+    arms_in_hold=True,
+    drives_in_hold=True,
+    stop_disarms=False,
+    is_held_before_places=True,
+    turns_on_spot=False,
+    setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
+    setpoint_frame=MavFrame.LOCAL_NED,
+)
+
+#: speaks as PX4 does; what else is in it nobody knows
+GENERIC = replace(PX4, name="generic", stop_disarms=True, is_held_before_places=False)
+
+PERSONAS: Mapping[int, Persona] = {
+    MavAutopilot.ARDUPILOTMEGA: ARDUPILOT,
+    MavAutopilot.PX4: PX4,
+    MavAutopilot.GENERIC: GENERIC,
+}
+
+
+def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Persona | None:
+    """Give the persona that a vehicle's heartbeat shows, or None if it is none that we drive.
+
+    ``honours_yaw_rate``: one that need not, turns at a yaw rate all the same.
+    """
+    persona = PERSONAS.get(heartbeat.autopilot)
+    if persona is None or persona.turns_on_spot or not honours_yaw_rate:
+        return persona
+    return replace(
+        persona,
+        turns_on_spot=True,
+        setpoint_mask=ARDUPILOT.setpoint_mask,
+        setpoint_frame=ARDUPILOT.setpoint_frame,
+    )

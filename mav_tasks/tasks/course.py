@@ -7,7 +7,7 @@ from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
 from mav_tasks.tasks.goal import GoTo, Head, Move, SingleGoal, Wait
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
-from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_count, leg_of, length_of
+from mav_tasks.tasks.legs import FACE, WAY, anchor_of, distance, leg_count, leg_of, length_of
 from mav_tasks.tasks.task import Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
@@ -24,9 +24,12 @@ class Course:
         *,
         passing: float = 0.0,
         within: float = 0.0,
+        by_course: bool = False,
     ) -> None:
         self.goal = goal
         self.progress = progress
+        #: whether the vehicle neither turns on the spot nor reverses
+        self.by_course = by_course
         #: m/s, of a way that goes on at its end to another place
         self.passing = passing
         #: m from that end, where it does
@@ -80,6 +83,8 @@ class Course:
                 return True  # it stops, and faces the place again from there
             if self.goal.radius:
                 return abs(remaining) <= self.goal.radius
+        if self.by_course and isinstance(self.leg, Move):
+            remaining = max(remaining, 0.0)  # what it drove too far it cannot drive back
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
@@ -92,7 +97,7 @@ class Course:
         if isinstance(self.goal, GoTo) and self.progress.leg == WAY and target is not None:
             near_enough = max(self.goal.radius or 0.0, BESIDE)
             if distance(motion.pose, target) > near_enough:
-                following = 0
+                following = WAY if self.by_course else FACE
         if following >= leg_count(self.goal):
             return False
         anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
@@ -120,4 +125,5 @@ class Course:
             remaining=remaining,
             driving=driving,
             passing=self.passing if self.is_passing else 0.0,
+            by_course=self.by_course,
         )

@@ -23,6 +23,9 @@ CROSS_TRACK_GAIN = 1.2  # 1/m, sideways error -> approach angle
 MAX_APPROACH_ANGLE = pi / 6  # rad, towards the line
 MAX_STEER_RATE = 0.5  # rad/s, of corrections while moving
 PIVOT_ERROR = pi / 4  # rad, pointing further off than this it turns on the spot before it moves
+#: m/s, at the most, while a vehicle that is steered by course points further off than that: it may
+#: turn on the spot by itself, or in a bow
+BOW_SPEED = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +50,15 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Velocity:
-    """A setpoint in the body frame: m/s forward, rad/s clockwise."""
+    """A setpoint in the body frame: m/s forward, rad/s clockwise.
+
+    ``course``: the direction in which to drive, rad from north, for a vehicle that does not turn
+    on the spot; the yaw rate is 0 then, and ``forward`` not negative.
+    """
 
     forward: float
     yaw_rate: float
+    course: float | None = None
 
     @property
     def is_zero(self) -> bool:
@@ -114,11 +122,13 @@ def steer(
     remaining: float,
     driving: Driving,
     passing: float = 0.0,
+    by_course: bool = False,
 ) -> Velocity:
     """Give the velocity that brings the vehicle nearer to the leg's end.
 
     ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
-    ``passing`` is the speed that a move has at its end, m/s, when another follows.
+    ``passing`` is the speed that a move has at its end, m/s, when another follows. ``by_course``:
+    the vehicle neither turns on the spot nor reverses.
     """
     match leg:
         case Move(distance=distance, speed=speed):
@@ -131,7 +141,8 @@ def steer(
                 at_end=passing,
             )
             forward = copysign(towards_end, distance * remaining)
-            return _towards(_heading_error(anchor, pose, forward=forward), forward)
+            error = _heading_error(anchor, pose, forward=forward)
+            return _towards(error, forward, pose=pose, by_course=by_course)
         case Rotate(angle=angle, rate=rate):
             towards_end = _approach(
                 remaining,
@@ -142,17 +153,25 @@ def steer(
             )
             return Velocity(0.0, copysign(towards_end, angle * remaining))
         case Drive(forward=forward, yaw_rate=yaw_rate):
-            return Velocity(forward, yaw_rate)
+            return Velocity(forward, yaw_rate, anchor.yaw if by_course else None)
         case Head(yaw=yaw, forward=forward):
-            return _towards(wrap(yaw - pose.yaw), forward)
+            return _towards(wrap(yaw - pose.yaw), forward, pose=pose, by_course=by_course)
         case Wait():
             return ZERO
 
 
-def _towards(heading_error: float, forward: float) -> Velocity:
-    """Drive while pointing about right, and turn on the spot until then."""
+def _towards(heading_error: float, forward: float, *, pose: Pose, by_course: bool) -> Velocity:
+    """Drive while pointing about right, and turn on the spot until then; or drive there slowly."""
+    if by_course:
+        slow = min(forward, BOW_SPEED) if is_far_off(heading_error) else forward
+        return Velocity(max(slow, 0.0), 0.0, wrap(pose.yaw + heading_error))
     rate = max(-MAX_STEER_RATE, min(MAX_STEER_RATE, HEADING_GAIN * heading_error))
-    return Velocity(0.0 if abs(heading_error) > PIVOT_ERROR else forward, rate)
+    return Velocity(0.0 if is_far_off(heading_error) else forward, rate)
+
+
+def is_far_off(heading_error: float) -> bool:
+    """Whether a vehicle has to turn before it can drive on."""
+    return abs(heading_error) > PIVOT_ERROR
 
 
 def corner_speed(turn: float, *, lead: float) -> float:

@@ -21,7 +21,7 @@ def within_fence(
 ) -> Velocity | None:
     """Give what may be asked for so that the vehicle can stop before the fence; None: stop now.
 
-    It goes by the room straight ahead, or behind for one that reverses.
+    It goes by the room straight ahead, or behind for one that reverses, and in its course.
     """
     if fence is None or wish.forward == 0.0:
         return wish
@@ -29,6 +29,9 @@ def within_fence(
     speed, braking = abs(wish.forward), driving.acceleration
     needed = speed * LATENCY + speed * speed / (2 * braking) + MARGIN
     room = fence.room(pose, forward=ahead, limit=needed) - MARGIN
+    if wish.course is not None:  # it turns there meanwhile
+        turned = replace(pose, yaw=wish.course)
+        room = min(room, fence.room(turned, forward=True, limit=needed) - MARGIN)
     if room >= needed - MARGIN:
         return wish
     lag = braking * LATENCY
@@ -44,6 +47,8 @@ def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float)
     """
     if wish.is_zero or not (isfinite(wish.forward) and isfinite(wish.yaw_rate)):
         return ZERO
+    if wish.course is not None and not isfinite(wish.course):
+        return ZERO
     return Velocity(
         _ramped(
             wish.forward,
@@ -57,6 +62,7 @@ def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float)
             top=driving.max_turn_rate,
             step=driving.turn_acceleration * elapsed,
         ),
+        wish.course,
     )
 
 

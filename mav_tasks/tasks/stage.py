@@ -8,7 +8,7 @@ from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, LocalPlace, Near, Perform, Plan, SetSpeed
 from mav_tasks.tasks.guidance import Motion, corner_speed, wrap
 from mav_tasks.tasks.itinerary import begun, goes_on_to_a_place, present_goal
-from mav_tasks.tasks.legs import WAY, anchor_of, bearing, begun_from, distance
+from mav_tasks.tasks.legs import FACE, WAY, anchor_of, bearing, begun_from, distance
 from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
 from mav_tasks.tasks.view import VehicleView
@@ -32,7 +32,7 @@ def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -
         progress = begun(goal, progress)
     single = present_goal(goal, progress)
     if progress.anchor is not None:
-        return resumed(single, progress, motion)
+        return resumed(single, progress, motion, turns_on_spot=seen.turns_on_spot)
     if not isinstance(single, GoTo):
         done = 0.0 if isinstance(single, Face) else progress.done  # it means a heading, not a way
         anchor = begun_from(single, anchor_of(single, 0, motion.pose, None), done)
@@ -40,7 +40,8 @@ def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -
     target = place_of(single, seen)
     if target is None:
         return None
-    leg = WAY if motion.speed > ROLLING and _bends_gently(motion, target) else 0  # or it is faced
+    is_rolling = motion.speed > ROLLING and _bends_gently(motion, target)
+    leg = WAY if is_rolling or not seen.turns_on_spot else FACE
     anchor = anchor_of(single, leg, motion.pose, target)
     return replace(progress, anchor=anchor, frame=seen.frame, target=target, leg=leg, done=0.0)
 
@@ -60,16 +61,22 @@ def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Dri
     """Give the course of the present stage, which may lead on to the next place."""
     single = present_goal(goal, progress)
     if not (isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes):
-        return Course(single, progress)
+        return Course(single, progress, by_course=not seen.turns_on_spot)
     target, anchor = progress.target, progress.anchor
     following = goes_on_to_a_place(goal, progress)
     after = None if following is None else place_of(following, seen)
     if after is None or target is None or anchor is None:
-        return Course(single, progress)
+        return Course(single, progress, by_course=not seen.turns_on_spot)
     here = Pose(target.north, target.east, bearing(anchor, target))
     within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
     speed = corner_speed(_off(here, bearing(here, after)), lead=within)
-    return Course(single, progress, passing=min(driving.max_speed, speed), within=within)
+    return Course(
+        single,
+        progress,
+        passing=min(driving.max_speed, speed),
+        within=within,
+        by_course=not seen.turns_on_spot,
+    )
 
 
 def _off(pose: Pose, yaw: float) -> float:

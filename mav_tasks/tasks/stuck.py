@@ -8,7 +8,7 @@ from math import inf
 
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Move, Rotate
-from mav_tasks.tasks.guidance import Velocity
+from mav_tasks.tasks.guidance import Velocity, is_far_off, wrap
 from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
@@ -23,6 +23,7 @@ class StuckWatch:
         self._progress_at = 0.0
         self._commanded = 0.0  # m or rad, since the last progress
         self._last = (0.0, 0.0)
+        self._course: float | None = None  # that it was told to drive in, if it was
 
     def begin(self, *, now: float) -> None:
         """Begin anew: another leg, or nothing has been asked for yet."""
@@ -34,11 +35,14 @@ class StuckWatch:
     def commanded(self, velocity: Velocity, *, seconds: float) -> None:
         """Take in what is asked of the vehicle for the next ``seconds``."""
         self._last = (abs(velocity.forward) * seconds, abs(velocity.yaw_rate) * seconds)
+        self._course = velocity.course
 
     def is_stuck(self, course: Course, seen: VehicleView, *, limit: float, now: float) -> bool:
         """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
         leg = course.leg
         forward, turned = self._last
+        if self._turns_by_itself(seen) and not seen.still:
+            self._progressed(now)
         if isinstance(leg, Move | Rotate):
             self._commanded += forward if isinstance(leg, Move) else turned
             left = abs(course.remaining)
@@ -48,6 +52,12 @@ class StuckWatch:
         elif not seen.still or not (forward or turned):
             self._progressed(now)
         return now - self._progress_at > limit or self._commanded > BLIND
+
+    def _turns_by_itself(self, seen: VehicleView) -> bool:
+        """Whether it was told to drive where it does not point yet."""
+        if self._course is None or seen.motion is None:
+            return False
+        return is_far_off(wrap(self._course - seen.motion.pose.yaw))
 
     def _progressed(self, now: float) -> None:
         self._progress_at = now

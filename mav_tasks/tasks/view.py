@@ -38,6 +38,7 @@ class VehicleView:
     frame: Frame | None = None  # that positions are in, where it is known
     home: GlobalPlace | None = None  # where it returns to
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
+    turns_on_spot: bool = True  # and reverses; else it is steered by course
 
     @property
     def origin(self) -> GlobalPlace | None:

@@ -11,7 +11,7 @@ from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate, SingleGoal
 from mav_tasks.tasks.guidance import Motion, cross_track, done_so_far, wrap
 from mav_tasks.tasks.itinerary import goal_of
-from mav_tasks.tasks.legs import WAY, anchor_of, distance, leg_of, length_of
+from mav_tasks.tasks.legs import FACE, WAY, anchor_of, distance, leg_of, length_of
 from mav_tasks.tasks.task import Pose, Progress, Task
 
 ON_SPOT = 0.02  # m from where it was: as good as there
@@ -40,7 +40,9 @@ def is_off_line(task: Task, pose: Pose) -> bool:
             return False
 
 
-def resumed(goal: SingleGoal, progress: Progress, motion: Motion) -> Progress:
+def resumed(
+    goal: SingleGoal, progress: Progress, motion: Motion, *, turns_on_spot: bool
+) -> Progress:
     """Give the progress with which to go on from here.
 
     A way to a place that was left far behind is simply begun again from here.
@@ -57,8 +59,9 @@ def resumed(goal: SingleGoal, progress: Progress, motion: Motion) -> Progress:
         is_near = progress.leg > WAY and distance(pose, progress.target) <= near_enough
     if is_near:
         return progress
-    again = anchor_of(goal, 0, pose, progress.target)
-    return replace(progress, leg=0, anchor=again, done=0.0)
+    leg_again = FACE if turns_on_spot else WAY
+    again = anchor_of(goal, leg_again, pose, progress.target)
+    return replace(progress, leg=leg_again, anchor=again, done=0.0)
 
 
 def way_back(goal: SingleGoal, progress: Progress, motion: Motion) -> Course | None:

@@ -5,8 +5,9 @@ then: a bad net is not its fault. protocol.md, sections 6 and 7:
 
 - a setpoint is finite; one that moves, whoever sent it, goes only to a rover seen armed; ours only
   in our mode, after a zero in that mode, on position and attitude not older than 0.3 s
-- order: mode, zero, arm, motion; no arming in any other mode
-- our mode is taken only from HOLD, from itself, or from MANUAL while disarmed
+- order, ArduPilot: mode, zero, arm, motion; no arming in any other mode. PX4: HOLD, arm, a second
+  of zeros, mode, motion; no arming but in HOLD
+- control is taken only from HOLD, from our mode, or from MANUAL while disarmed
 - motion comes at 20 Hz: no gap without a zero, no burst
 - after STOP zero and HOLD leave in the same step; then nothing that could move the rover passes
   until somebody continues
@@ -26,7 +27,6 @@ from typing import Any, NamedTuple
 from pymavlink.dialects.v20 import common
 
 SERVER = (250, 191)
-GUIDED, HOLD, MANUAL, INITIALISING = 15, 4, 0, 16
 
 FRESH = 0.3  # s
 GAP = 0.12  # s between setpoints while driving: 20 Hz, one tick missed
@@ -43,10 +43,37 @@ MOTION = (*SETPOINTS, "SET_ATTITUDE_TARGET", "SET_ACTUATOR_CONTROL_TARGET", "FOL
 BY_HAND = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE")
 MOVING_COMMANDS = (16, 17, 18, 19, 20, 21, 22, 34, 115, 192, 209, 213, 300)
 STOP, PAUSE_CONTINUE, SET_MODE, ARM = 54003, 193, 176, 400
+REPOSITION = 192
 ACK, ACCEPTED = 77, 0
+NO_PLACE = 0x7FFFFFFF
+LEAD_IN = 0.95  # s of zeros before PX4's OFFBOARD
 
 #: the ids that any rule looks at; telemetry beyond these is not decoded
 WATCHED = {0, 11, 30, 32, 69, 70, 75, 76, 82, 84, 86, 139, 144}
+
+
+class Ways(NamedTuple):
+    """What tells one make of rover from another."""
+
+    ours: int  # custom_mode
+    hold: int
+    manual: frozenset[int]
+    arms_in_hold: bool
+    sub_modes: bool  # DO_SET_MODE names main and sub mode
+
+    def mode_of(self, message: Any) -> int:
+        """Give the mode that a DO_SET_MODE asks for, -1 for nonsense."""
+        if not (0 <= message.param2 < 2**32 and 0 <= message.param3 < 2**32):
+            return -1
+        if not self.sub_modes:
+            return int(message.param2)
+        return int(message.param2) << 16 | int(message.param3) << 24
+
+
+ARDUPILOT_WAYS = Ways(15, 4, frozenset({0}), arms_in_hold=False, sub_modes=False)
+PX4_WAYS = Ways(
+    6 << 16, 4 << 16 | 3 << 24, frozenset({1 << 16, 3 << 16}), arms_in_hold=True, sub_modes=True
+)
 
 
 class Reached(NamedTuple):
@@ -62,6 +89,7 @@ class Observer:
     """Sees what passes by one rover; ``check`` raises what was wrong."""
 
     system_id: int = 1
+    ways: Ways = ARDUPILOT_WAYS
     #: a test that stops the server's clock expects a gap
     expects_gaps: bool = False
     #: whether the rover is really armed and in our mode
@@ -84,6 +112,7 @@ class Observer:
     _position_at: float = -1e9
     _attitude_at: float = -1e9
     _setpoint_at: float = -1e9
+    _zeros_since: float = 1e9
     _hold_at: float = -1e9
     _disarm_at: float = -1e9
     _moved_last: bool = False
@@ -109,7 +138,7 @@ class Observer:
             self._asked.append((peer, data))
         if kind in COMMANDS:
             self._see_command_of_client(now, message)
-        elif kind == "SET_MODE" and message.custom_mode == HOLD:
+        elif kind == "SET_MODE" and message.custom_mode == self.ways.hold:
             self.taken_over = False
         elif kind in BY_HAND and _off_centre(message):
             self._take_over(now, zeros=1)
@@ -198,7 +227,7 @@ class Observer:
 
     def sent_since(self, at: float) -> list[str]:
         """Give what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ..."""
-        return [_name(message) for t, message in self.driven if t >= at]
+        return [self._name(message) for t, message in self.driven if t >= at]
 
     # rules
 
@@ -211,7 +240,7 @@ class Observer:
             self._check_stop(now)
             self._before_continue = self.stopped, self.taken_over
             self.stopped = self.taken_over = False
-        elif message.command == SET_MODE and message.param2 == HOLD:
+        elif message.command == SET_MODE and self.ways.mode_of(message) == self.ways.hold:
             self.taken_over = False
 
     def _see_heartbeat(self, now: float, message: Any) -> None:
@@ -220,12 +249,12 @@ class Observer:
             self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
         if mode != self.mode:
             self._zero_in_mode = False
-            asked = mode == HOLD and now - self._hold_at < OWN_REQUEST
+            asked = mode == self.ways.hold and now - self._hold_at < OWN_REQUEST
             by_us = asked and not self._moved_last  # driving on, we had not asked for this one
-            if self.mode == GUIDED and not by_us:
+            if self.mode == self.ways.ours and not by_us:
                 self._take_over(now, zeros=0)
         self.armed, self.mode = armed, mode
-        if armed and mode == GUIDED:
+        if armed and mode == self.ways.ours:
             self._unready_since = None
         elif self._unready_since is None:
             self._unready_since = now
@@ -255,12 +284,14 @@ class Observer:
             return
         if self.taken_over:
             if moves or self._zeros_left == 0:
-                self._violation(now, f"setpoint after a takeover: {_name(message)}")
+                self._violation(now, f"setpoint after a takeover: {self._name(message)}")
             self._zeros_left -= 1
         self._check_rate(now, moves=moves)
         if moves:
             self._check_motion(now)
         else:
+            if self._moved_last or now - self._setpoint_at > GAP:
+                self._zeros_since = now
             self._zero_in_mode = True
             if self._stop_due is not None:
                 self._stop_due[1].discard("zero")
@@ -268,7 +299,7 @@ class Observer:
         self._moved_last = moves
 
     def _check_motion(self, now: float) -> None:
-        if self.mode != GUIDED:
+        if self.mode != self.ways.ours:
             self._violation(now, f"moving setpoint in mode {self.mode}")
         elif not self._zero_in_mode:
             self._violation(now, "moving setpoint before a zero in this mode")
@@ -292,19 +323,34 @@ class Observer:
         if message.command == ARM:
             if message.param1 == 0.0:
                 self._disarm_at = now
-            elif self.mode != GUIDED or not self._zero_in_mode:
+            elif self.ways.arms_in_hold and self.mode != self.ways.hold:
+                self._violation(now, f"arming in mode {self.mode}")
+            elif not self.ways.arms_in_hold and (
+                self.mode != self.ways.ours or not self._zero_in_mode
+            ):
                 self._violation(now, f"arming in mode {self.mode}, before a zero in our mode")
             elif self.taken_over:
                 self._violation(now, "arming after a takeover")
         elif message.command == SET_MODE:
-            if message.param2 == HOLD:
-                self._hold_at = now
-                if self._stop_due is not None:
-                    self._stop_due[1].discard("HOLD")
-            elif self.taken_over:
-                self._violation(now, "our mode asked for after a takeover")
-            elif self.mode not in (HOLD, GUIDED) and (self.armed or self.mode != MANUAL):
-                self._violation(now, f"our mode taken from mode {self.mode}")
+            self._see_mode_asked(now, self.ways.mode_of(message))
+
+    def _see_mode_asked(self, now: float, wanted: int) -> None:
+        ways = self.ways
+        if wanted == ways.hold:
+            self._hold_at = now
+            if self._stop_due is not None:
+                self._stop_due[1].discard("HOLD")
+        elif self.taken_over:
+            self._violation(now, "our mode asked for after a takeover")
+        elif ways.arms_in_hold:
+            if not self.armed or self.mode not in (ways.hold, ways.ours):
+                self._violation(now, f"our mode taken from mode {self.mode}, armed={self.armed}")
+            elif now - self._zeros_since < LEAD_IN or now - self._setpoint_at > GAP:
+                self._violation(now, "our mode asked for before a second of zeros")
+        elif self.mode not in (ways.hold, ways.ours) and (
+            self.armed or self.mode not in ways.manual
+        ):
+            self._violation(now, f"our mode taken from mode {self.mode}")
 
     def _check_stopped(self, now: float, message: Any) -> None:
         """While STOP is latched nothing passes that could move the rover."""
@@ -313,13 +359,13 @@ class Observer:
         if kind in COMMANDS:
             moves = (
                 (message.command == ARM and message.param1 != 0.0)
-                or (message.command == SET_MODE and message.param2 != HOLD)
-                or message.command in MOVING_COMMANDS
+                or (message.command == SET_MODE and self.ways.mode_of(message) != self.ways.hold)
+                or (message.command in MOVING_COMMANDS and not _is_to_stay(message))
             )
         elif kind == "SET_MODE":
-            moves = message.custom_mode != HOLD
+            moves = message.custom_mode != self.ways.hold
         if moves:
-            self._violation(now, f"passed in spite of STOP: {_name(message)}")
+            self._violation(now, f"passed in spite of STOP: {self._name(message)}")
 
     def _check_stop(self, now: float) -> None:
         """Zero and HOLD left in the step in which STOP came."""
@@ -341,6 +387,20 @@ class Observer:
         except common.MAVError:
             return None  # garbage that a test sends
 
+    def _name(self, message: Any) -> str:
+        """Give a packet to the rover in one word."""
+        kind = message.get_type()
+        if kind in SETPOINTS:
+            return "move" if _moves(message) else "zero"
+        if kind not in COMMANDS:
+            return str(kind)
+        if message.command == SET_MODE:
+            mode = self.ways.mode_of(message)
+            return {self.ways.hold: "HOLD", self.ways.ours: "GUIDED"}.get(mode, f"mode{mode}")
+        if message.command == ARM:
+            return "arm" if message.param1 else "disarm"
+        return "stay" if _is_to_stay(message) else str(message.command)
+
     def _violation(self, now: float, text: str) -> None:
         self.violations.append(f"{now:.3f}: {text}")
 
@@ -358,15 +418,10 @@ def _off_centre(message: Any) -> bool:
     return any(abs(c - 1500) > STICKS for c in channels if c not in (0, 65535))
 
 
-def _name(message: Any) -> str:
-    """Give a packet to the rover in one word."""
-    kind = message.get_type()
-    if kind in SETPOINTS:
-        return "move" if _moves(message) else "zero"
-    if kind not in COMMANDS:
-        return str(kind)
-    if message.command == SET_MODE:
-        return {HOLD: "HOLD", GUIDED: "GUIDED"}.get(int(message.param2), f"mode{message.param2:g}")
-    if message.command == ARM:
-        return "arm" if message.param1 else "disarm"
-    return str(message.command)
+def _is_to_stay(message: Any) -> bool:
+    """Whether it is a "go to" without a place."""
+    return (
+        message.command == REPOSITION
+        and message.get_type() == "COMMAND_INT"
+        and (message.x, message.y) == (NO_PLACE, NO_PLACE)
+    )

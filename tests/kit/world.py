@@ -22,7 +22,7 @@ from rover_sim.personas import ARDUPILOT, Mode, Persona
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.client import ACK, FakeClient
-from tests.kit.observer import Observer
+from tests.kit.observer import ARDUPILOT_WAYS, PX4_WAYS, Observer
 from tests.kit.store import LateStore
 
 E = TypeVar("E")
@@ -77,8 +77,9 @@ class World(VirtualWorld):
             start = Pose(east=3.0 * (number - 1))
             vehicle = make_vehicle(body(start), system_id=number, now=0.0, persona=persona)
             link = self.net.link(f"rover{number}")
+            ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
             observer = self.watched.observers[link.name] = Observer(
-                number, is_ready=partial(is_ready_to_be_driven, vehicle)
+                number, ways, is_ready=partial(is_ready_to_be_driven, vehicle)
             )
             self.rovers.append(vehicle)
             self.observers.append(observer)

@@ -85,6 +85,7 @@ def test_every_setting_is_known_by_name() -> None:
             "clients",
             "retention",
             "arming",
+            "yaw_rate",
             "claim",
             "guided",
             "operator_lost",

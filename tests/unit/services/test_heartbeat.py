@@ -6,7 +6,6 @@ from mav_tasks.services.heartbeat import (
     component_heartbeat,
     gcs_heartbeat,
 )
-from mav_tasks.services.persona import ARDUPILOT, persona_of
 
 
 def heartbeat(*, armed: bool = False, mode: int = 4, autopilot: int = 3) -> Heartbeat:
@@ -58,12 +57,3 @@ def test_the_component_says_neither_mode_nor_autopilot() -> None:
         0,
     )
     assert message.system_status == MavState.ACTIVE
-
-
-def test_a_persona_is_known_by_the_autopilot_in_the_heartbeat() -> None:
-    autopilots = (MavAutopilot.ARDUPILOTMEGA, MavAutopilot.PX4, MavAutopilot.INVALID)
-    assert [persona_of(heartbeat(autopilot=a)) for a in autopilots] == [ARDUPILOT, None, None]
-
-
-def test_the_ardupilot_persona_asks_for_velocity_and_yaw_rate() -> None:
-    assert (ARDUPILOT.setpoint_mask, ARDUPILOT.setpoint_frame) == (0x05C7, 8)

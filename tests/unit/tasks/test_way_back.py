@@ -18,6 +18,10 @@ DRIVING = Driving()
 TICK = 0.05
 
 
+def go_on(goal: SingleGoal, progress: Progress, pose: Pose) -> Progress:
+    return resumed(goal, progress, motion(pose, at=0.0), turns_on_spot=True)
+
+
 def beside(along: float, across: float, *, turned: float = 0.0) -> Pose:
     """A pose by its metres along the anchor's heading and to the right of it."""
     forward, right = (cos(ANCHOR.yaw), sin(ANCHOR.yaw)), (-sin(ANCHOR.yaw), cos(ANCHOR.yaw))
@@ -171,23 +175,23 @@ class TestAWay:
 
     def test_near_its_line_goes_on(self) -> None:
         progress = self.progress(1, Pose(0.0, 0.0, 0.0), 2.0)
-        assert resumed(self.GOAL, progress, motion(Pose(2.0, 0.9, 1.0), at=0.0)) == progress
+        assert go_on(self.GOAL, progress, Pose(2.0, 0.9, 1.0)) == progress
 
     @pytest.mark.parametrize("pose", [Pose(2.0, 1.1, 0.0), Pose(-0.1, 0.0, 0.0), Pose(5.1, 0, 0)])
     def test_off_its_line_it_is_begun_again_from_here_with_the_same_place(self, pose: Pose) -> None:
         progress = self.progress(1, Pose(0.0, 0.0, 0.0), 2.0)
-        again = resumed(self.GOAL, progress, motion(pose, at=0.0))
+        again = go_on(self.GOAL, progress, pose)
         assert (again.leg, again.done, again.anchor, again.target) == (0, 0.0, pose, self.TARGET)
 
     def test_at_the_place_the_wait_goes_on_and_away_from_it_the_way_is_driven_again(self) -> None:
         progress = self.progress(3, Pose(5.0, 0.0, 1.0), 2.0)
-        assert resumed(self.GOAL, progress, motion(Pose(5.03, 0.0, 1.0), at=0.0)) == progress
-        assert resumed(self.GOAL, progress, motion(Pose(5.1, 0.0, 1.0), at=0.0)).leg == 0
+        assert go_on(self.GOAL, progress, Pose(5.03, 0.0, 1.0)) == progress
+        assert go_on(self.GOAL, progress, Pose(5.1, 0.0, 1.0)).leg == 0
 
     def test_off_the_place_by_less_than_its_radius_is_there(self) -> None:
         goal = GoTo(self.TARGET, radius=0.5, wait=3.0)
         progress = self.progress(2, Pose(4.6, 0.0, 0.0), 2.0)
-        assert resumed(goal, progress, motion(Pose(4.6, 0.0, 1.0), at=0.0)) == progress
+        assert go_on(goal, progress, Pose(4.6, 0.0, 1.0)) == progress
 
     def test_its_line_is_what_a_takeover_is_measured_by(self) -> None:
         progress = self.progress(1, Pose(0.0, 0.0, 0.0), 2.0)

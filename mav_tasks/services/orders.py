@@ -1,0 +1,108 @@
+"""What is said to one vehicle so that it does what we want, in the way of its persona. Pure."""
+
+from math import cos, isfinite, sin
+from typing import NamedTuple
+
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, SetPositionTargetLocalNed
+from mav_tasks.services.mission_item import NOT_GIVEN
+from mav_tasks.services.persona import Persona
+
+CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
+DEFAULT_SPEED = -1.0
+
+
+class Speeds(NamedTuple):
+    """What is asked for: m/s ``forward``, rad/s clockwise.
+
+    ``course`` is the direction in which to drive, rad from north, for a vehicle that is steered by
+    it; that one drives forwards only, and the yaw rate does not count.
+    """
+
+    forward: float
+    yaw_rate: float = 0.0
+    course: float | None = None
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether there is a number in each."""
+        return all(isfinite(value) for value in self if value is not None)
+
+
+STANDING = Speeds(0.0)
+
+
+class Orders:
+    """The messages for one vehicle."""
+
+    def __init__(self, target: Address, persona: Persona) -> None:
+        self._target = target
+        self._persona = persona
+
+    def __repr__(self) -> str:
+        return f"Orders({self._target}, {self._persona.name})"
+
+    def velocity(self, wanted: Speeds) -> SetPositionTargetLocalNed:
+        """Give a setpoint; zeros for what such a vehicle cannot do."""
+        vx, vy, yaw_rate = wanted.forward, 0.0, wanted.yaw_rate
+        if not self._persona.turns_on_spot:
+            speed = 0.0 if wanted.course is None else max(wanted.forward, 0.0)
+            course = wanted.course or 0.0
+            vx, vy, yaw_rate = speed * cos(course), speed * sin(course), 0.0
+        return SetPositionTargetLocalNed(
+            time_boot_ms=0,
+            target_system=self._target.system_id,
+            target_component=self._target.component_id,
+            coordinate_frame=self._persona.setpoint_frame,
+            type_mask=self._persona.setpoint_mask,
+            x=0.0,
+            y=0.0,
+            z=0.0,
+            vx=vx,
+            vy=vy,
+            vz=0.0,
+            afx=0.0,
+            afy=0.0,
+            afz=0.0,
+            yaw=0.0,
+            yaw_rate=yaw_rate,
+        )
+
+    def mode(self, mode: int) -> CommandLong:
+        """Give the command that asks for a custom_mode."""
+        return self._command(MavCmd.DO_SET_MODE, *self._persona.mode_params(mode))
+
+    def hold(self) -> CommandLong:
+        """Give the command that asks for HOLD."""
+        return self.mode(self._persona.hold_mode)
+
+    def our_mode(self) -> CommandLong:
+        """Give the command that asks for the mode in which setpoints are followed."""
+        return self.mode(self._persona.control_mode)
+
+    def arming(self, *, arm: bool) -> CommandLong:
+        """Give the command to arm or disarm."""
+        return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
+
+    def staying(self) -> CommandInt:
+        """Give the "go to" without a place: what was being driven to in HOLD is so no more."""
+        return CommandInt(
+            *self._target,
+            frame=MavFrame.GLOBAL,
+            command=MavCmd.DO_REPOSITION,
+            current=0,
+            autocontinue=0,
+            param1=DEFAULT_SPEED,
+            param2=CHANGE_MODE,
+            param3=0.0,
+            param4=0.0,
+            x=NOT_GIVEN,
+            y=NOT_GIVEN,
+            z=0.0,
+        )
+
+    def _command(
+        self, command: MavCmd, param1: float, param2: float = 0.0, param3: float = 0.0
+    ) -> CommandLong:
+        return CommandLong(*self._target, command, 0, param1, param2, param3, 0, 0, 0, 0)
