@@ -49,9 +49,16 @@ class Asked:
         self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
         self.client.answer(self.pending.answer, self.packet.source)
 
-    def refuse(self, refusal: Rejection, *, now: float) -> SubmissionRefused:
-        """Answer with the reason's code and say it in words; gives it for the audit log."""
-        self.answer(translate.result_of(refusal.reason), refusal.reason)
+    def refuse(
+        self, refusal: Rejection, *, result: MavResult | None = None, now: float
+    ) -> SubmissionRefused:
+        """Answer with the reason's code and say it in words; gives it for the audit log.
+
+        ``result``: None is what follows from the reason.
+        """
+        if result is None:
+            result = translate.result_of(refusal.reason)
+        self.answer(result, refusal.reason)
         self.tell(refusal.text, MavSeverity.WARNING, now=now)
         reason = TaskReason(refusal.reason)
         return SubmissionRefused(

@@ -37,7 +37,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Marks, Submitter
+from mav_tasks.tasks.task import Draft, Marks, Submitter, TaskId
 
 R = TaskReason
 
@@ -186,7 +186,10 @@ class Commands:
                     return
                 case number if number in OUR_COMMANDS:
                     words = f"command {number}: not supported in this version"
-                    raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+                    unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+                    refused = asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now)
+                    self._book.record(refused)
+                    return
         if at_server:
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif asked.command.command == MavCmd.DO_SET_MODE:
@@ -202,8 +205,8 @@ class Commands:
     def _take_in(self, asked: Asked, *, now: float) -> None:
         """A command that asks for a task; or, without a place, for a pause."""
         is_reposition = asked.command.command == MavCmd.DO_REPOSITION
-        if is_reposition and asked.command.frame is None and place_in(asked.command) is None:
-            asked.answer(MavResult.ACCEPTED, asked.vehicle.pause(actor=asked.actor, now=now) or 0)
+        if is_reposition and place_in(asked.command) is None:
+            asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
         else:
             self._submissions.submit(asked, now=now)
 
@@ -351,12 +354,7 @@ class Commands:
         vehicle = asked.vehicle
         match asked.command.params[0]:
             case 0.0:
-                self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
-                paused = vehicle.pause(actor=asked.actor, now=now)
-                if not vehicle.is_heard(now=now):  # paused all the same
-                    words = f"paused, but vehicle {vehicle.system_id} is silent"
-                    raise Rejection(R.VEHICLE_SILENT, words)
-                return paused
+                return self._pause(asked, now=now)
             case 1.0:
                 if vehicle.tasks.is_stopped and asked.receiver.older_copy(
                     asked.command, before=vehicle.stopped_at, now=now
@@ -365,6 +363,15 @@ class Commands:
                 return vehicle.proceed(actor=asked.actor, now=now)
             case value:
                 raise Rejection(R.BAD_PARAMETER, f"param1 {value:g}: 0 pauses, 1 continues")
+
+    def _pause(self, asked: Asked, *, now: float) -> TaskId | None:
+        vehicle = asked.vehicle
+        self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
+        paused = vehicle.pause(actor=asked.actor, now=now)
+        if not vehicle.is_heard(now=now):  # paused all the same
+            words = f"paused, but vehicle {vehicle.system_id} is silent"
+            raise Rejection(R.VEHICLE_SILENT, words)
+        return paused
 
     def _set_mode(self, asked: Asked, *, now: float) -> None:
         vehicle = asked.vehicle

@@ -17,7 +17,6 @@ from mav_tasks.tasks.goal import (
     Drive,
     Face,
     GlobalPlace,
-    Goal,
     GoTo,
     Head,
     LocalPlace,
@@ -60,7 +59,7 @@ _MARK = Struct("<BBHh7d")
 class Wish(NamedTuple):
     """What a command asks for: a goal, and on what terms."""
 
-    goal: Goal
+    goal: SingleGoal
     terms: Terms
     marks: Marks
 

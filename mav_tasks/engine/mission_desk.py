@@ -224,15 +224,14 @@ class MissionDesks:
         """Whether an item can be part of a plan; keeps why not in words."""
         if kind not in STORED:
             return MavMissionResult.UNSUPPORTED
-        has_home = vehicle.persona.has_home_item and component == AUTOPILOT
-        driving = self._settings.driving
+        manner = self._plans.manner(vehicle, is_staged=component == AUTOPILOT)
         try:
             if kind == MavMissionType.FENCE:
                 check_fence_item(item, seq, count=count)
             elif kind == MavMissionType.RALLY:
                 check_rally_item(item, seq)
             else:
-                step = step_of(item, seq, count=count, has_home=has_home, driving=driving)
+                step = step_of(item, seq, count=count, manner=manner)
                 if isinstance(step, GoTo):
                     self._check_place(vehicle, component, step, seq)
         except Rejection as refusal:
@@ -250,12 +249,9 @@ class MissionDesks:
             raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
         items = self._desk(vehicle, component).receiver.items
         steps: list[Step] = [step]
+        manner = self._plans.manner(vehicle, is_staged=component == AUTOPILOT)
         for number in range(len(items) - 1, -1, -1):  # as far as the last place
-            has_home = vehicle.persona.has_home_item and component == AUTOPILOT
-            driving = self._settings.driving
-            steps.insert(
-                0, step_of(items[number], number, count=seq, has_home=has_home, driving=driving)
-            )
+            steps.insert(0, step_of(items[number], number, count=seq, manner=manner))
             if isinstance(steps[0], GoTo):
                 break
         if vehicle.leg_over_fence(steps) is not None:
@@ -307,9 +303,8 @@ class MissionDesks:
         """A mission: a task that waits to be started, or is queued."""
         sender = upload.sender
         is_staged = sender.addressed.component_id == AUTOPILOT
-        has_home = vehicle.persona.has_home_item and is_staged
-        driving = self._settings.driving
-        wanted = plan_of(upload.items, has_home=has_home, driving=driving, now=now)
+        manner = self._plans.manner(vehicle, is_staged=is_staged)
+        wanted = plan_of(upload.items, manner=manner, now=now)
         forbidden = vehicle.leg_over_fence(wanted.plan.steps)
         if forbidden is not None:
             words = f"item {forbidden}: a jump there leads over the fence"

@@ -10,6 +10,7 @@ from dataclasses import replace
 from math import inf, isnan
 from typing import NamedTuple
 
+from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.goals import (
     KNOWN_FRAMES,
     MAX_DELAY,
@@ -39,6 +40,7 @@ from mav_tasks.tasks.goal import (
     Perform,
     Plan,
     SetSpeed,
+    SingleGoal,
     Step,
     Wait,
 )
@@ -75,6 +77,14 @@ RESULT_OF: dict[int, MavMissionResult] = {
 }
 
 
+class Manner(NamedTuple):
+    """By what items are read: the ways of a vehicle, and the server's limits."""
+
+    has_home: bool  # the first one is home, as ArduPilot has it
+    turns_on_spot: bool
+    driving: Driving
+
+
 class Wanted(NamedTuple):
     """What a plan asks for: its steps, and the terms that it names for itself."""
 
@@ -89,10 +99,17 @@ def result_of(refusal: Rejection) -> MavMissionResult:
     return RESULT_OF.get(refusal.reason, MavMissionResult.DENIED)
 
 
-def step_of(item: Item, seq: int, *, count: int, has_home: bool, driving: Driving) -> Step:
-    """Give what an item asks for; ``has_home``: the first one is home, as ArduPilot has it."""
-    if has_home and seq == 0:
+def step_of(item: Item, seq: int, *, count: int, manner: Manner) -> Step:
+    """Give what an item asks for."""
+    if manner.has_home and seq == 0:
         return Nothing()
+    step = _step_of(item, seq, count=count, driving=manner.driving)
+    if isinstance(step, SingleGoal):
+        return as_driven(step, turns_on_spot=manner.turns_on_spot)
+    return step
+
+
+def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
     command = _command_of(item)
     if item.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"item {seq}: frame {item.frame} is unknown")
@@ -110,11 +127,10 @@ def step_of(item: Item, seq: int, *, count: int, has_home: bool, driving: Drivin
     raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
 
 
-def plan_of(items: Sequence[Item], *, has_home: bool, driving: Driving, now: float) -> Wanted:
+def plan_of(items: Sequence[Item], *, manner: Manner, now: float) -> Wanted:
     """Give the plan of items of which each was found good; Rejection when they make none."""
     steps = tuple(
-        step_of(item, seq, count=len(items), has_home=has_home, driving=driving)
-        for seq, item in enumerate(items)
+        step_of(item, seq, count=len(items), manner=manner) for seq, item in enumerate(items)
     )
     plan = Plan(steps, packed(items))
     loop = loops_in_vain(plan)

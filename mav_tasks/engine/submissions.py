@@ -2,6 +2,7 @@
 
 from functools import partial
 
+from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_side import GcsSide
@@ -73,10 +74,9 @@ class Submissions:
             now=now,
             priority=self._priority_of(submitter),
         )
-        self._check_reach(vehicle, wish.goal)
-        draft = Draft(
-            vehicle.system_id, command.command, wish.goal, submitter, wish.terms, wish.marks
-        )
+        goal = as_driven(wish.goal, turns_on_spot=vehicle.persona.turns_on_spot)
+        self._check_reach(vehicle, goal)
+        draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)
         known = self._recollection.known(
             draft, confirmation=command.confirmation, origin=vehicle.origin, now=now
         )

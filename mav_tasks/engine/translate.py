@@ -44,7 +44,6 @@ RESULT_OF: dict[int, MavResult] = {
     R.NO_POSITION: MavResult.TEMPORARILY_REJECTED,
     R.DISARMED: MavResult.TEMPORARILY_REJECTED,
     R.VEHICLE_SILENT: MavResult.FAILED,
-    R.NOT_SUPPORTED_BY_VEHICLE: MavResult.UNSUPPORTED,
 }
 
 #: what the person who reads that a task waits may do about it

@@ -215,10 +215,10 @@ class Executor:
         progress = self._set_out(task, task.progress, seen, motion, now=now)
         if progress is None:
             return view.HOLD
-        # one that is steered by course comes back to its line by itself, as far as it can
-        back = task.progress.anchor is not None and seen.turns_on_spot
-        goal = present_goal(task.goal, progress)
-        self._way_back = way_back(goal, progress, motion) if back else None
+        self._way_back = None
+        if task.progress.anchor is not None:
+            goal, turns = present_goal(task.goal, progress), seen.turns_on_spot
+            self._way_back = way_back(goal, progress, motion, turns_on_spot=turns)
         self._change(S.EXECUTING, R.NONE, actor=SERVER, now=now, progress=progress)
         return view.STAND
 

@@ -64,14 +64,21 @@ def resumed(
     return replace(progress, leg=leg_again, anchor=again, done=0.0)
 
 
-def way_back(goal: SingleGoal, progress: Progress, motion: Motion) -> Course | None:
-    """Give the way to where the task can go on exactly, or None if that is here."""
+def way_back(
+    goal: SingleGoal, progress: Progress, motion: Motion, *, turns_on_spot: bool
+) -> Course | None:
+    """Give the way to where the task can go on exactly, or None if that is here.
+
+    One that does not turn on the spot finds its heading while it drives on.
+    """
     anchor, pose = progress.anchor, motion.pose
     assert anchor is not None, "what has begun has an anchor"
     leg = leg_of(goal, progress)
     match leg:
         case Move():
             place = _entry(anchor, pose, leg, progress.done)
+            if not turns_on_spot:
+                return None if place is None else _course_there(place, pose)
             if place is None and abs(wrap(anchor.yaw - pose.yaw)) > ALIGNED:
                 place = LocalPlace(pose.north, pose.east)  # turn here, or it would leave the line
             return None if place is None else _course(place, anchor.yaw, pose)
@@ -101,6 +108,12 @@ def _entry(anchor: Pose, pose: Pose, leg: Move, done: float) -> LocalPlace | Non
     return LocalPlace(
         anchor.north + signed * cos(anchor.yaw), anchor.east + signed * sin(anchor.yaw)
     )
+
+
+def _course_there(place: LocalPlace, pose: Pose) -> Course:
+    goal = GoTo(place)
+    begun = Progress(anchor=anchor_of(goal, WAY, pose, place), target=place, leg=WAY)
+    return Course(goal, begun, by_course=True)
 
 
 def _course(place: LocalPlace, yaw: float, pose: Pose) -> Course:

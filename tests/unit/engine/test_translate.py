@@ -31,7 +31,7 @@ def test_no_refusal_is_answered_with_a_result_that_crashes_clients(reason: TaskR
         (R.BAD_PARAMETER, MavResult.DENIED),
         (R.NOT_FOUND, MavResult.DENIED),
         (R.NONCE_REUSED, MavResult.DENIED),
-        (R.NOT_SUPPORTED_BY_VEHICLE, MavResult.UNSUPPORTED),
+        (R.NOT_SUPPORTED_BY_VEHICLE, MavResult.DENIED),
         (R.VEHICLE_SILENT, MavResult.FAILED),
     ],
 )

@@ -33,7 +33,9 @@ def beside(along: float, across: float, *, turned: float = 0.0) -> Pose:
 
 
 def back(goal: SingleGoal, done: float, pose: Pose) -> Course | None:
-    return way_back(goal, Progress(anchor=ANCHOR, done=done), motion(pose, at=0.0))
+    return way_back(
+        goal, Progress(anchor=ANCHOR, done=done), motion(pose, at=0.0), turns_on_spot=True
+    )
 
 
 def driven(course: Course, pose: Pose) -> Pose:

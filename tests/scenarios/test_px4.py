@@ -1,0 +1,243 @@
+"""PX4 and generic rovers: armed in HOLD, driven by velocities over ground; what they cannot do."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import GENERIC, PX4, Mode, Persona
+from tests.kit.client import ACCEPTED, DENIED
+from tests.kit.mission import Item, Upload, reached
+from tests.kit.world import MODE_COMMAND, World, at, is_at, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+MOVE, ROTATE, DRIVE = 54000, 54001, 54002
+WAYPOINT, YAW, REPOSITION, YAW_SPEED, START, SET_MODE = 16, 115, 192, 213, 300, 176
+NO_PLACE = 0x7FFFFFFF
+
+#: show each change at once, so that the times are those of the server alone
+PROMPT_PX4, PROMPT_GENERIC = (replace(each, announces_changes=True) for each in (PX4, GENERIC))
+ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
+
+every = pytest.mark.parametrize("persona", ALL, ids=lambda p: f"{p.name}-{p.announces_changes}")
+each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
+
+
+@pytest.fixture
+def world(make_world: MakeWorld) -> World:
+    return make_world(persona=PROMPT_PX4)
+
+
+def go_to(world: World, north: float, east: float, *, yaw: float = nan) -> int:
+    sent = world.client.command_int(
+        REPOSITION, -1, 1, 0, yaw, **at(north, east), frame=6, target=(1, 1)
+    )
+    world.run(0.2)
+    return sent.task_id
+
+
+class TestDriving:
+    @every
+    def test_tasks_are_driven_and_the_rover_is_handed_back(
+        self, make_world: MakeWorld, persona: Persona
+    ) -> None:
+        world = make_world(persona=persona)
+        begun = world.now
+        world.client.move(2.0)
+        world.run(0.05)
+        go_to(world, -1.0, 2.0)
+        world.client.command(DRIVE, 0.5, 0, 2.0)
+        world.until_idle(tasks=3, within=90)
+        assert [task.state for task in world.tasks()] == [S.COMPLETED] * 3
+        story = [what for what in world.observer.sent_since(begun) if what not in ("511", "512")]
+        order = list(dict.fromkeys(story))
+        assert order == ["HOLD", "zero", "arm", "GUIDED", "move", "disarm"]
+        assert not world.rover.autopilot.armed
+        assert world.rover.autopilot.mode is Mode.HOLD
+
+    def test_a_move_ends_where_it_was_to_end(self, world: World) -> None:
+        world.client.move(2.0)
+        world.until_idle(tasks=1)
+        assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=2)
+
+    @pytest.mark.parametrize(("north", "east"), [(2, 0), (-2, 0), (0, 1.5), (-1, -1), (0.3, 0)])
+    def test_a_place_is_driven_to_without_turning_on_the_spot_first(
+        self, world: World, north: float, east: float
+    ) -> None:
+        go_to(world, north, east)
+        world.until_idle(tasks=1)
+        assert is_at(world, north, east)
+
+    def test_a_heading_at_the_end_is_left_out(self, world: World) -> None:
+        go_to(world, 2.0, 0.0, yaw=1.5)
+        world.until_idle(tasks=1)
+        assert world.state(1)[0] is S.COMPLETED
+        assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=5)
+
+    @every
+    def test_a_plan_is_driven(self, make_world: MakeWorld, persona: Persona) -> None:
+        world = make_world(persona=persona)
+        plan = [Item(WAYPOINT, **at(*p)) for p in ((1.5, 0), (1.5, 1.5), (0, 1.5), (0, 0))]
+        upload = Upload(world.client, plan)
+        world.until(lambda: upload.result is not None, within=5)
+        assert upload.result == 0
+        world.client.command(START, target=(1, 1))
+        world.run(0.2)
+        world.until_state(1, S.COMPLETED, within=90)
+        assert reached(world.client) == [0, 1, 2, 3], "no item is home"
+        assert is_at(world, 0.0, 0.0)
+
+    def test_on_a_task_that_is_paused_it_goes_on_exactly(self, world: World) -> None:
+        world.client.move(3.0)
+        world.until(lambda: world.truth.north > 1.0, within=20)
+        world.client.pause()
+        world.run(3)
+        assert world.stands()
+        assert world.rover.autopilot.mode is Mode.HOLD
+        world.client.proceed()
+        world.until_idle(tasks=1)
+        assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=2)
+
+    def test_one_that_was_pre_empted_comes_back_to_its_line(self, make_world: MakeWorld) -> None:
+        queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
+        world = make_world(persona=PROMPT_PX4, settings=Settings(queueing=queueing))
+        world.client.move(3.0, priority=1)
+        world.until(lambda: world.truth.north > 1.0, within=20)
+        world.client.command_int(WAYPOINT, **at(1.0, 2.0), frame=6)
+        world.until_idle(tasks=2)
+        assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+        assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.05, angle=3)
+
+    def test_one_that_turns_at_a_rate_does_what_others_do(self, make_world: MakeWorld) -> None:
+        persona = replace(PROMPT_PX4, honours_yaw_rate=True)
+        world = make_world(persona=persona, settings=Settings(yaw_rate="honoured"))
+        world.client.move(-1.0)
+        world.run(0.05)
+        world.client.rotate(90)
+        world.until_idle(tasks=2)
+        assert near_pose(world.pose(), (-1.0, 0.0, 90.0), metres=0.04, angle=1)
+
+
+class TestWhatItCannotDo:
+    @pytest.mark.parametrize(
+        ("command", "params", "words"),
+        [
+            (MOVE, (-1.0,), "reverse"),
+            (ROTATE, (90.0,), "turn on the spot"),
+            (DRIVE, (-0.5, 0.0, 2.0), "reverse"),
+            (DRIVE, (0.5, 10.0, 2.0), "yaw rate"),
+            (YAW, (90.0,), "turn on the spot"),
+            (YAW, (90.0, 0.0, 1.0, 1.0), "turn on the spot"),
+            (YAW_SPEED, (90.0, 0.0), "speed 0"),
+            (YAW_SPEED, (90.0, -0.5), "reverse"),
+        ],
+    )
+    def test_is_refused_with_what_is_wrong(
+        self, world: World, command: int, params: tuple[float, ...], words: str
+    ) -> None:
+        sent = world.client.command(command, *params)
+        world.run(0.2)
+        assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+        assert any(words in text for text in world.client.texts())
+        assert world.tasks() == ()
+
+    @pytest.mark.parametrize(
+        ("item", "result"),
+        [
+            (Item(MOVE, param1=-1.0, frame=2, param4=0.0), 6),  # INVALID_PARAM1
+            (Item(ROTATE, param1=90.0, frame=2, param4=0.0), 3),  # UNSUPPORTED
+            (Item(YAW, param1=90.0, frame=2, param4=0.0), 3),
+        ],
+    )
+    def test_is_refused_in_a_plan_at_its_item(self, world: World, item: Item, result: int) -> None:
+        upload = Upload(
+            world.client, [Item(WAYPOINT, **at(1, 0)), item, Item(WAYPOINT, **at(2, 0))]
+        )
+        world.until(lambda: upload.result is not None, within=5)
+        assert (upload.result, upload.requests) == (result, [0, 1])
+
+    def test_of_a_waypoint_only_the_heading_is_left_out(self, world: World) -> None:
+        upload = Upload(world.client, [Item(WAYPOINT, **at(1, 0), param4=90.0)])
+        world.until(lambda: upload.result is not None, within=5)
+        assert upload.result == 0
+
+
+class TestStop:
+    @every
+    def test_ends_a_drive(self, make_world: MakeWorld, persona: Persona) -> None:
+        world = make_world(persona=persona)
+        world.client.move(20, speed=1.0)
+        world.until(lambda: world.truth.forward_speed > 0.8, within=20)
+        sent = world.client.stop()
+        world.run(4)
+        assert sent.answer == (ACCEPTED, 1)
+        assert world.stands()
+        assert world.rover.autopilot.mode is Mode.HOLD
+        assert world.control() == "IDLE"
+
+    @each
+    def test_ends_what_another_station_sent_it_to_in_hold(
+        self, make_world: MakeWorld, persona: Persona
+    ) -> None:
+        world = make_world(persona=persona)
+        world.rover.autopilot.parameters["RD_MAX_SPEED"] = 1.0
+        world.operator_arm(True)
+        other = world.net.link("other station")
+        place = common.MAVLink_command_int_message(
+            1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, nan, *at(30.0, 0.0).values(), 0
+        )
+        other.send("rover1", place.pack(common.MAVLink(None, 255, 190)))
+        world.run(3)
+        assert not world.stands()
+        world.client.stop()
+        world.run(4)
+        assert world.stands()
+
+    def test_disarms_a_generic_rover_that_does_not_hear_of_hold(
+        self, make_world: MakeWorld
+    ) -> None:
+        world = make_world(persona=PROMPT_GENERIC)
+        world.client.move(20, speed=1.0)
+        world.until(lambda: world.truth.forward_speed > 0.8, within=20)
+
+        def loses(source: str, target: str, data: bytes) -> bool:
+            is_mode = data[7] == MODE_COMMAND and data[10 + 28 : 10 + 30] == SET_MODE.to_bytes(
+                2, "little"
+            )
+            return target == "rover1" and is_mode
+
+        world.watched.loses = loses
+        world.client.stop()
+        world.run(1.0)
+        assert world.rover.autopilot.armed
+        world.run(5)
+        assert not world.rover.autopilot.armed
+        assert world.stands()
+        assert world.control() == "IDLE"
+
+
+class TestPausing:
+    @pytest.mark.parametrize(
+        "pause",
+        [
+            lambda w: w.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1)),
+            lambda w: w.client.command_int(
+                REPOSITION, -1, 1, 0, nan, x=NO_PLACE, y=NO_PLACE, frame=6, target=(1, 1)
+            ),
+        ],
+        ids=["COMMAND_LONG", "COMMAND_INT"],
+    )
+    def test_a_go_to_without_a_place_is_one(
+        self, world: World, pause: Callable[[World], object]
+    ) -> None:
+        world.client.move(3)
+        world.until_state(1, S.EXECUTING)
+        pause(world)
+        world.run(0.1)
+        assert world.client.acks_of(REPOSITION) == [(ACCEPTED, 1)]
+        assert world.state(1) == (S.PAUSED, R.OPERATOR)
