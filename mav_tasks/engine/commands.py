@@ -209,6 +209,8 @@ class Commands:
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
         else:
             self._submissions.submit(asked, now=now)
+            if is_reposition:
+                asked.vehicle.go_to_follows(asked.client.key, actor=asked.actor, now=now)
 
     def _start_plan(self, asked: Asked, *, first: int, now: float) -> None:
         """Start or continue the uploaded mission; one that is over is another task."""
@@ -274,7 +276,7 @@ class Commands:
         mode = int(message.custom_mode)
         if mode == vehicle.persona.hold_mode:
             self._submissions.held(vehicle, client.submitter(packet.source))
-            vehicle.hold(actor=actor, now=now)
+            vehicle.hold(client=client.key, actor=actor, now=now)
         elif vehicle.tasks.is_stopped:
             words = "STOP is latched: continue first"
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
@@ -381,7 +383,7 @@ class Commands:
             raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
         if mode == vehicle.persona.hold_mode:
             self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
-            paused = vehicle.hold(actor=asked.actor, now=now)
+            paused = vehicle.hold(client=asked.client.key, actor=asked.actor, now=now)
             if not vehicle.is_heard(now=now):
                 raise Rejection(R.VEHICLE_SILENT, f"vehicle {vehicle.system_id} is silent")
             asked.answer(MavResult.ACCEPTED, paused or 0)

@@ -10,6 +10,7 @@ from math import inf
 
 from mav_tasks.engine.authority import Authority
 from mav_tasks.engine.frame_monitor import FrameMonitor, Seen
+from mav_tasks.engine.hold_before import HoldBefore
 from mav_tasks.engine.motion_monitor import MotionMonitor, is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
@@ -89,6 +90,7 @@ class Vehicle:
         self._was_heard = True
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
+        self._hold_before = HoldBefore()
         self._own_components: set[int] = set()
         #: the task server's address inside this vehicle's system
         self.server_address = self._free_address()
@@ -243,6 +245,7 @@ class Vehicle:
         """Somebody else has the vehicle: let go, and let the queue stand if a task has begun."""
         if self.tasks.is_stopped:
             return
+        self._hold_before.forget()
         self.control.lose()
         self.requests.end_performing()
         begun = self.tasks.begun
@@ -379,8 +382,20 @@ class Vehicle:
         if self.tasks.begun is not None or self.control.is_engaged:
             self._take_over(f"second controller {who}", now=now)
 
+    def go_to_follows(self, client: Hashable, *, actor: str, now: float) -> None:
+        """A client's "go to" was taken in: a HOLD of it just before was none."""
+        if not self._hold_before.is_undone_by(client, now=now):
+            return
+        if self.tasks.paused is not TaskReason.OPERATOR:
+            return
+        try:
+            self.go_on(actor=actor, now=now)
+        except Rejection as refusal:
+            self._note(f"stays paused: {refusal.text}", now=now)
+
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: zero and HOLD leave in this very step."""
+        self._hold_before.forget()
         self._authority.revoke()
         self.stopped_at = now
         killed = self.tasks.stop(clear=clear, actor=actor, now=now)
@@ -393,15 +408,23 @@ class Vehicle:
         self._clock.restart(now=now)
         self.requests.flush(now=now)
 
-    def hold(self, *, actor: str, now: float) -> TaskId | None:
-        """A client wants HOLD: zeros and the mode at once; a task and its queue pause."""
+    def hold(self, *, client: Hashable, actor: str, now: float) -> TaskId | None:
+        """A client wants HOLD: zeros and the mode at once; a task and its queue pause.
+
+        Where it may belong to a "go to" that follows, zeros at once, and the mode a little later.
+        """
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
             return None
         self._authority.revoke()  # a stream that goes on must not drive when the mode comes back
-        paused = None
+        was_paused, paused = self.tasks.paused, None
         if not self.tasks.is_empty:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
+        if self.persona.is_held_before_places and self.control.phase is Phase.CONTROL:
+            self._hold_before.note(client, has_paused=not was_paused, now=now)
+            self.step(now=now)
+            return paused
+        self._hold_before.forget()
         self.control.begin_release(now=now)
         self.requests.flush(now=now)
         self._clock.restart(now=now)
@@ -409,6 +432,7 @@ class Vehicle:
 
     def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
         """Call a task off; if it is the begun one, zeros leave in this very step."""
+        self._hold_before.forget()
         begun = self.tasks.begun
         is_begun = begun is not None and begun.id == task.id
         self.tasks.cancel(task, kill=kill, reason=TaskReason.CANCELLED, actor=actor, now=now)
@@ -418,6 +442,7 @@ class Vehicle:
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
         """Call off what waits, or everything."""
+        self._hold_before.forget()
         self.tasks.clear(begun_too=begun_too, actor=actor, now=now)
         if begun_too:
             self._authority.revoke()
@@ -442,6 +467,7 @@ class Vehicle:
 
     def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
         """Take a task in that runs at once, before what runs and what waits."""
+        self._hold_before.forget()
         task = self.tasks.run_now(draft, self.view(now=now), actor=actor, now=now)
         self.step(now=now)
         return task
@@ -490,8 +516,9 @@ class Vehicle:
 
         A vehicle that moves without a task is stopped as by HOLD.
         """
+        self._hold_before.forget()
         if self.tasks.begun is None and self.armed and not self.control.is_engaged:
-            return self.hold(actor=actor, now=now)
+            return self.hold(client=None, actor=actor, now=now)
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.step(now=now)
         return paused
@@ -501,6 +528,7 @@ class Vehicle:
 
         Raises Rejection, and changes nothing, while the begun task could not take the vehicle.
         """
+        self._hold_before.forget()
         seen = replace(self.view(now=now), may_arm=self._authority.may_arm_again)
         going_on = self.tasks.proceed(seen, actor=actor, now=now)
         self._authority.restore_arming()
@@ -606,7 +634,8 @@ class Vehicle:
                 wanted = demand.velocity
                 self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
-                self.control.release(still=seen.still, disarm=False, now=now)
+                still = seen.still and not self._hold_before.is_open(now=now)
+                self.control.release(still=still, disarm=False, now=now)
             case DemandKind.HAND_BACK:
                 self.control.release(still=seen.still, disarm=True, now=now)
             case DemandKind.HALT if self.control.phase is not Phase.STOPPING:

@@ -13,15 +13,14 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
+from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
 from tests.kit.world import MODE_COMMAND, World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 MOVE, ROTATE, DRIVE = 54000, 54001, 54002
-WAYPOINT, YAW, REPOSITION, YAW_SPEED, START, SET_MODE = 16, 115, 192, 213, 300, 176
+WAYPOINT, YAW, YAW_SPEED, START = 16, 115, 213, 300
 NO_PLACE = 0x7FFFFFFF
 
-#: show each change at once, so that the times are those of the server alone
-PROMPT_PX4, PROMPT_GENERIC = (replace(each, announces_changes=True) for each in (PX4, GENERIC))
 ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
 
 every = pytest.mark.parametrize("persona", ALL, ids=lambda p: f"{p.name}-{p.announces_changes}")
@@ -31,14 +30,6 @@ each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lamb
 @pytest.fixture
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=PROMPT_PX4)
-
-
-def go_to(world: World, north: float, east: float, *, yaw: float = nan) -> int:
-    sent = world.client.command_int(
-        REPOSITION, -1, 1, 0, yaw, **at(north, east), frame=6, target=(1, 1)
-    )
-    world.run(0.2)
-    return sent.task_id
 
 
 class TestDriving:

@@ -1,0 +1,46 @@
+"""A HOLD that may be nobody's wish: some clients send one before each "go to", unseen.
+
+Towards a PX4 MAVSDK does, whenever the mode is another one. The vehicle stands at once all the
+same; but its mode is left alone for a while, and a "go to" in that time undoes the pause.
+"""
+
+from collections.abc import Hashable
+from math import inf
+
+WAITS = 1.0  # s for the "go to"
+
+
+class HoldBefore:
+    """The last HOLD of a client while we drove, for as long as it may be such a one."""
+
+    def __init__(self) -> None:
+        self._client: Hashable = None
+        self._until = -inf
+        self._has_paused = False
+
+    def __repr__(self) -> str:
+        return f"HoldBefore({self._client}, until={self._until:.2f})"
+
+    def note(self, client: Hashable, *, has_paused: bool, now: float) -> None:
+        """A client asks for HOLD; ``has_paused``: what was running is paused by this one.
+
+        Repeated by the same client it is one and the same.
+        """
+        if client == self._client and self.is_open(now=now):
+            has_paused = has_paused or self._has_paused
+        self._client, self._has_paused, self._until = client, has_paused, now + WAITS
+
+    def is_open(self, *, now: float) -> bool:
+        """Whether its "go to" may still come."""
+        return now < self._until
+
+    def forget(self) -> None:
+        """Something else has been wished for since."""
+        self._until = -inf
+
+    def is_undone_by(self, client: Hashable, *, now: float) -> bool:
+        """Whether a "go to" of this client shows that the pause was not meant; asked once."""
+        undone = self._has_paused and client == self._client and self.is_open(now=now)
+        if client == self._client:
+            self.forget()
+        return undone
