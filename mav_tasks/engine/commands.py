@@ -15,12 +15,12 @@ from mav_tasks.engine.goals import (
     CHANGE_MODE,
     bad,
     becomes_task,
-    marks_of,
     place_in,
     reposition_flags,
     whole,
 )
 from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.mode_requests import ModeRequests
 from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
@@ -29,15 +29,14 @@ from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavMissionType, MavResult, MavSeverity
+from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.services.command_sender import Answered
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Marks, Submitter, TaskId
+from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
 
@@ -97,6 +96,7 @@ class Commands:
         book: TaskBook,
         submissions: Submissions,
         plans: Plans,
+        modes: ModeRequests,
         control: TaskControl,
         displays: Displays,
         settings: Settings,
@@ -107,6 +107,7 @@ class Commands:
         self._book = book
         self._submissions = submissions
         self._plans = plans
+        self._modes = modes
         self._control = control
         self._displays = displays
 
@@ -114,6 +115,7 @@ class Commands:
         """Take new settings."""
         self._settings = settings
         self._submissions.apply(settings)
+        self._modes.apply(settings)
         self._control.apply(settings)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
@@ -163,7 +165,7 @@ class Commands:
                 case MavCmd.MISSION_START as number if at_server or self._claims(number):
                     first = whole(asked.command, 1, "first item", high=0xFFFF)
                     _check_last_item(asked)
-                    self._start_plan(asked, first=first, now=now)
+                    self._modes.start_plan(asked, first=first, now=now)
                     return
                 case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
                     seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
@@ -192,8 +194,8 @@ class Commands:
                     return
         if at_server:
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
-        elif asked.command.command == MavCmd.DO_SET_MODE:
-            self._set_mode(asked, now=now)
+        elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
+            return
         else:  # also to a component never heard of: an autopilot does what that is told
             _check_relay(asked, now=now)
             _relay(asked, now=now)
@@ -211,27 +213,6 @@ class Commands:
             self._submissions.submit(asked, now=now)
             if is_reposition:
                 asked.vehicle.go_to_follows(asked.client.key, actor=asked.actor, now=now)
-
-    def _start_plan(self, asked: Asked, *, first: int, now: float) -> None:
-        """Start or continue the uploaded mission; one that is over is another task."""
-        self._submissions.check_open()
-        vehicle, submitter = asked.vehicle, asked.client.submitter(asked.packet.source)
-        started = self._plans.start(vehicle, submitter, first=first, now=now)
-        if isinstance(started, Draft):
-            task = self._submissions.submit_draft(asked, started, now=now)
-            self._plans.restarted(vehicle, task, now=now)
-            return
-
-        def accept(*, now: float) -> None:
-            del now
-            asked.answer(MavResult.ACCEPTED, started.id)
-
-        def give_up(*, now: float) -> None:
-            self._plans.stage_again(vehicle, started, now=now)
-            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
-            self._book.record(asked.refuse(refusal, now=now))
-
-        self._submissions.when_durable(accept, give_up, now=now)
 
     def cancel_latest(
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
@@ -264,61 +245,6 @@ class Commands:
             words = f"command {command}: no answer from vehicle {vehicle.system_id}"
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
         client.answer(answer, asker.source)
-
-    def set_mode(
-        self, client: GcsClient, packet: Packet, message: m.SetMode, *, now: float
-    ) -> None:
-        """See to the message SET_MODE, which nothing acknowledges."""
-        vehicle = self._vehicles.get(message.target_system)
-        if vehicle is None:
-            return
-        actor = str(client.submitter(packet.source))
-        mode = int(message.custom_mode)
-        if mode == vehicle.persona.hold_mode:
-            self._submissions.held(vehicle, client.submitter(packet.source))
-            vehicle.hold(client=client.key, actor=actor, now=now)
-        elif vehicle.tasks.is_stopped:
-            words = "STOP is latched: continue first"
-            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-        elif self._is_mission(vehicle, mode):
-            self._start_unasked(vehicle, client, packet, now=now)
-        elif self._is_return(vehicle, mode):
-            draft = _return_home(vehicle, client.submitter(packet.source), Marks())
-            try:
-                self._submissions.run_unasked(vehicle, draft, actor=actor, now=now)
-            except Rejection as refusal:
-                client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
-        else:
-            vehicle.client_asks_mode(mode, client.key, now=now)
-            vehicle.requests.forward(packet)
-
-    def _start_unasked(
-        self, vehicle: Vehicle, client: GcsClient, packet: Packet, *, now: float
-    ) -> None:
-        try:
-            submitter = client.submitter(packet.source)
-            started = self._plans.start(vehicle, submitter, first=0, now=now)
-            if isinstance(started, Draft):
-                self._submissions.check_open()
-                task = vehicle.tasks.submit(started, now=now)
-                self._plans.restarted(vehicle, task, now=now)
-        except Rejection as refusal:
-            client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
-
-    def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
-        """Whether a mode is the return that we drive ourselves: towards a home that is known."""
-        return (
-            self._settings.claim
-            and mode == vehicle.persona.return_mode
-            and vehicle.home is not None
-        )
-
-    def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
-        """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""
-        begun = vehicle.tasks.begun
-        has_plan = bool(self._plans.stored(vehicle.system_id, MavMissionType.MISSION).items)
-        has_plan = has_plan or (begun is not None and isinstance(begun.goal, Plan))
-        return self._settings.claim and mode == vehicle.persona.mission_mode and has_plan
 
     # STOP, pause, modes
 
@@ -375,43 +301,11 @@ class Commands:
             raise Rejection(R.VEHICLE_SILENT, words)
         return paused
 
-    def _set_mode(self, asked: Asked, *, now: float) -> None:
-        vehicle = asked.vehicle
-        main, sub = asked.command.params[1:3]
-        mode = vehicle.persona.mode_in(main, sub)
-        if mode is None:
-            raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
-        if mode == vehicle.persona.hold_mode:
-            self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
-            paused = vehicle.hold(client=asked.client.key, actor=asked.actor, now=now)
-            if not vehicle.is_heard(now=now):
-                raise Rejection(R.VEHICLE_SILENT, f"vehicle {vehicle.system_id} is silent")
-            asked.answer(MavResult.ACCEPTED, paused or 0)
-            return
-        if vehicle.tasks.is_stopped:
-            raise Rejection(R.STOPPED, "STOP is latched: continue first")
-        if self._is_return(vehicle, mode):
-            submitter = asked.client.submitter(asked.packet.source)
-            draft = _return_home(vehicle, submitter, marks_of(asked.command, asked.packet.raw))
-            self._submissions.run_now(asked, draft, now=now)
-            return
-        if self._is_mission(vehicle, mode):
-            self._start_plan(asked, first=0, now=now)
-            return
-        vehicle.client_asks_mode(mode, asked.client.key, now=now)
-        _relay(asked, now=now)
-
 
 def _check_last_item(asked: Asked) -> None:
     last = whole(asked.command, 2, "last item", high=0xFFFF)
     if last:
         raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)
-
-
-def _return_home(vehicle: Vehicle, submitter: Submitter, marks: Marks) -> Draft:
-    """What the mode RTL asks for."""
-    command = MavCmd.NAV_RETURN_TO_LAUNCH
-    return Draft(vehicle.system_id, command, GoTo(None), submitter, marks=marks)
 
 
 def _check_relay(asked: Asked, *, now: float) -> None:

@@ -27,6 +27,7 @@ from mav_tasks.engine.inputs import (
 )
 from mav_tasks.engine.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.mission_reports import MissionReports
+from mav_tasks.engine.mode_requests import ModeRequests
 from mav_tasks.engine.motion_gate import may_pass, passed
 from mav_tasks.engine.operator_watch import OperatorWatch
 from mav_tasks.engine.plans import Plans
@@ -86,12 +87,14 @@ class Engine:
         )
         self._reports = MissionReports(self._gcs, self._vehicles, self._book, self._plans, settings)
         displays = Displays(self._gcs, self._vehicles, self._book)
+        self._modes = ModeRequests(self._gcs, self._book, self._submissions, self._plans, settings)
         self._commands = Commands(
             self._gcs,
             self._vehicles,
             self._book,
             self._submissions,
             self._plans,
+            self._modes,
             TaskControl(self._book, settings),
             displays,
             settings,
@@ -215,7 +218,7 @@ class Engine:
                     if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
                         self._publisher.withhold(packet)
                     else:
-                        self._gcs.forward(packet, now=now)
+                        self._gcs.forward(vehicle.as_shown(packet, now=now), now=now)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
@@ -225,7 +228,9 @@ class Engine:
         elif isinstance(message, m.CommandCancel):
             self._commands.cancel_latest(client, packet, message, now=now)
         elif isinstance(message, m.SetMode):
-            self._commands.set_mode(client, packet, message, now=now)
+            vehicle = self._vehicles.get(message.target_system)
+            if vehicle is not None:
+                self._modes.heard(client, vehicle, packet, int(message.custom_mode), now=now)
         elif isinstance(message, MESSAGES) and self._desks.receive(
             client, packet, message, now=now
         ):
@@ -262,6 +267,7 @@ class Engine:
             if woken is not None:
                 woken.wake(now=now)
         for vehicle in self._vehicles.settle():
+            self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
                 self._commands.deliver(vehicle, answered, now=now)
         if self._stop_by is not None:

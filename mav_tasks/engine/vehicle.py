@@ -14,6 +14,9 @@ from mav_tasks.engine.hold_before import HoldBefore
 from mav_tasks.engine.motion_monitor import MotionMonitor, is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
+from mav_tasks.engine.shown_mode import ShownMode
+from mav_tasks.engine.start_mark import WAITS as START_WAITS
+from mav_tasks.engine.start_mark import Marker, StartMark
 from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -31,11 +34,12 @@ from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, Step
 from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
 RUNNING = frozenset({TaskState.STARTING, TaskState.EXECUTING, TaskState.CANCELLING})
+SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
@@ -91,6 +95,8 @@ class Vehicle:
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
         self._hold_before = HoldBefore()
+        self._start_mark = StartMark()
+        self._shown_mode = ShownMode()
         self._own_components: set[int] = set()
         #: the task server's address inside this vehicle's system
         self.server_address = self._free_address()
@@ -246,6 +252,7 @@ class Vehicle:
         if self.tasks.is_stopped:
             return
         self._hold_before.forget()
+        self._forget_start()
         self.control.lose()
         self.requests.end_performing()
         begun = self.tasks.begun
@@ -317,12 +324,42 @@ class Vehicle:
         Our own mode then counts as set by us. Any other one is a takeover, believed when a
         heartbeat shows it; but nothing that we still ask for may work against it.
         """
+        self._forget_start()
         present_mode = self._monitor.custom_mode
         self._authority.client_asks(mode, client, present_mode=present_mode, now=now)
         if mode == self.persona.control_mode:
             return
         if self.control.is_taking:
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
+
+    def start_when_armed(self, client: Hashable, submitter: Submitter, *, now: float) -> None:
+        """A client asks a disarmed vehicle for its mission: it begins when it is armed soon."""
+        self._start_mark.put(client, submitter, now=now)
+
+    def take_start(self, *, now: float) -> Marker | None:
+        """Give who wanted the mission to begin now that it is armed, once; None: nobody."""
+        if not self._start_mark.is_put(now=now) or not self.armed or self.control.is_engaged:
+            return None
+        return self._start_mark.take()
+
+    def _forget_start(self) -> None:
+        self._start_mark.remove()
+        self._shown_mode.forget()
+
+    def show_mode(self, mode: int, *, now: float) -> None:
+        """Let clients see a mode that they have asked for, and that we are ourselves."""
+        is_put = self._start_mark.is_put(now=now)
+        self._shown_mode.show(mode, until=now + (START_WAITS if is_put else SHOWN_FOR))
+
+    def as_shown(self, packet: Packet, *, now: float) -> Packet:
+        """Give a packet of this vehicle as clients are to see it."""
+        if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
+            return packet
+        return self._shown_mode.applied(packet, now=now)
+
+    def heartbeat_shown(self, *, now: float) -> m.Heartbeat:
+        """Give its latest heartbeat as clients are to see it."""
+        return self._shown_mode.in_message(self._monitor.latest, now=now)
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
@@ -396,6 +433,7 @@ class Vehicle:
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: zero and HOLD leave in this very step."""
         self._hold_before.forget()
+        self._forget_start()
         self._authority.revoke()
         self.stopped_at = now
         killed = self.tasks.stop(clear=clear, actor=actor, now=now)
@@ -420,6 +458,7 @@ class Vehicle:
         was_paused, paused = self.tasks.paused, None
         if not self.tasks.is_empty:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
+        self._forget_start()
         if self.persona.is_held_before_places and self.control.phase is Phase.CONTROL:
             self._hold_before.note(client, has_paused=not was_paused, now=now)
             self.step(now=now)
@@ -517,6 +556,7 @@ class Vehicle:
         A vehicle that moves without a task is stopped as by HOLD.
         """
         self._hold_before.forget()
+        self._forget_start()
         if self.tasks.begun is None and self.armed and not self.control.is_engaged:
             return self.hold(client=None, actor=actor, now=now)
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)

@@ -104,12 +104,29 @@ def with_seq(packet: Packet, seq: int) -> bytes:
     The CRC is corrected by its linearity and never verified: no CRC_EXTRA is needed, unknown ids
     work, and what was corrupt stays corrupt.
     """
-    raw = packet.raw
+    raw = _unsigned(packet.raw)
     if raw[0] == MAGIC_V2:
-        if raw[2] & SIGNED:
-            raw = _patched(raw[:-SIGNATURE_LENGTH], 2, raw[2] & ~SIGNED)
         return raw if raw[4] == seq else _patched(raw, 4, seq)
     return raw if raw[2] == seq else _patched(raw, 2, seq)
+
+
+def with_payload(packet: Packet, at: int, data: bytes) -> Packet:
+    """Give the packet with other bytes in its payload from ``at`` on, unsigned.
+
+    Corrected as in ``with_seq``. Bytes beyond a payload that was cut short are left out.
+    """
+    raw = _unsigned(packet.raw)
+    start = HEADER_V2 if raw[0] == MAGIC_V2 else HEADER_V1
+    for index, value in enumerate(data[: max(0, raw[1] - at)], start + at):
+        if raw[index] != value:
+            raw = _patched(raw, index, value)
+    return packet._replace(raw=raw)
+
+
+def _unsigned(raw: bytes) -> bytes:
+    if raw[0] == MAGIC_V2 and raw[2] & SIGNED:
+        return _patched(raw[:-SIGNATURE_LENGTH], 2, raw[2] & ~SIGNED)
+    return raw
 
 
 def _patched(raw: bytes, index: int, value: int) -> bytes:

@@ -40,6 +40,8 @@ class Persona:
     stop_disarms: bool
     #: some clients ask for HOLD before each "go to", which nobody has wished for
     is_held_before_places: bool
+    #: asked for the mission while it is disarmed, it begins it when it is armed
+    starts_when_armed: bool
     #: it turns at a rate, also on the spot, and reverses; else it is steered by where to go
     turns_on_spot: bool
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
@@ -103,6 +105,7 @@ ARDUPILOT = Persona(
     drives_in_hold=False,
     stop_disarms=False,
     is_held_before_places=False,
+    starts_when_armed=False,
     turns_on_spot=True,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
     setpoint_frame=MavFrame.BODY_NED,
@@ -144,6 +147,7 @@ PX4 = Persona(
     drives_in_hold=True,
     stop_disarms=False,
     is_held_before_places=True,
+    starts_when_armed=True,
     turns_on_spot=False,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
     setpoint_frame=MavFrame.LOCAL_NED,

@@ -10,7 +10,13 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
-from mav_tasks.mavlink.packet import SIGNATURE_LENGTH, Packet, split_datagram, with_seq
+from mav_tasks.mavlink.packet import (
+    SIGNATURE_LENGTH,
+    Packet,
+    split_datagram,
+    with_payload,
+    with_seq,
+)
 from tests.unit.mavlink.samples import stock_message, stock_packet
 
 HEARTBEAT = common.MAVLink_heartbeat_message(10, 3, 81, 15, 4, 3)
@@ -142,3 +148,29 @@ class TestRenumbering:
     def test_a_signature_is_taken_off_and_its_flag_with_it(self, seq: int) -> None:
         (packet,) = split_datagram(signed(HEARTBEAT, seq=7))
         assert with_seq(packet, seq) == stock_packet(HEARTBEAT, seq=seq, source=(3, 1))
+
+
+class TestAnotherPayload:
+    @pytest.mark.parametrize("raw", [V1, V2, signed(HEARTBEAT, seq=7)], ids=["v1", "v2", "signed"])
+    def test_decodes_as_the_message_with_the_other_field(self, raw: bytes) -> None:
+        (packet,) = split_datagram(raw)
+        other = with_payload(packet, 0, (0x04040000).to_bytes(4, "little"))
+        assert not other.is_signed
+        message = Decoder().decode(other)
+        assert message is not None
+        before = Decoder().decode(packet)
+        assert before is not None
+        assert message.to_dict() == {**before.to_dict(), "custom_mode": 0x04040000}
+
+    def test_beyond_what_was_sent_is_left_out(self) -> None:
+        (packet,) = split_datagram(V2)
+        length = len(packet.payload)
+        assert with_payload(packet, length - 1, b"\x07\x08\x09").payload[-1] == 7
+        assert with_payload(packet, length, b"\x07") == packet._replace(
+            raw=with_seq(packet, packet.seq)
+        )
+
+    def test_corrupt_stays_corrupt(self) -> None:
+        broken = V2[:-1] + bytes([V2[-1] ^ 1])
+        (packet,) = split_datagram(broken)
+        assert Decoder().decode(with_payload(packet, 0, b"\x01\x02")) is None

@@ -1,0 +1,131 @@
+"""PX4's way to start a mission: the mode and arming, in either order."""
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import ACCEPTED, set_mode
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, RETURN, ask_mode
+from tests.kit.world import World, at, is_at, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+WAYPOINT = 16
+
+
+@pytest.fixture
+def world(make_world: MakeWorld) -> World:
+    """A rover at which a plan waits."""
+    world = make_world(persona=PROMPT_PX4)
+    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))])
+    world.until(lambda: upload.result is not None, within=5)
+    assert (upload.result, upload.opaque_id) == (0, 1)
+    return world
+
+
+def waits_for_start(world: World) -> bool:
+    world.client.request_status(1)
+    world.run(0.1)
+    status = world.client.statuses(1)[-1]
+    return (status.state, status.reason) == (S.BLOCKED, R.WAITING_FOR_START)
+
+
+def shown(world: World) -> int:
+    """The mode that the client was shown last."""
+    beats = [
+        m for p in world.client.of_id(0) if p.source == (1, 1) for m in [world.client.decoded(p)]
+    ]
+    return int(beats[-1].custom_mode)
+
+
+@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
+    if by == "SET_MODE":
+        world.client.send(set_mode(MISSION))
+        world.run(0.05)
+    else:
+        sent = ask_mode(world.client, MISSION)
+        world.run(0.05)
+        assert sent.answer == (ACCEPTED, 1)
+    assert shown(world) == MISSION, "at once"
+    world.run(3)
+    assert shown(world) == MISSION, "and as long as it is marked"
+    assert waits_for_start(world)
+    assert not world.rover.autopilot.armed
+    world.client.arm()
+    world.until_state(1, S.COMPLETED, within=40)
+    assert is_at(world, 2.0, 0.0)
+    assert shown(world) != MISSION
+
+
+@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+def test_armed_before_the_mode_starts(world: World, by: str) -> None:
+    world.client.arm()
+    world.run(0.3)
+    if by == "SET_MODE":
+        world.client.send(set_mode(MISSION))
+        world.run(0.05)
+    else:
+        sent = ask_mode(world.client, MISSION)
+        world.run(0.05)
+        assert sent.answer == (ACCEPTED, 1)
+    assert world.state(1)[0] is S.STARTING
+    world.run(0.1)
+    assert shown(world) == MISSION
+    world.run(2)
+    assert shown(world) != MISSION, "the next plan can be uploaded"
+    world.until_state(1, S.COMPLETED, within=40)
+
+
+def test_armed_too_late_does_not_start(world: World) -> None:
+    ask_mode(world.client, MISSION)
+    world.run(10.1)
+    world.client.arm()
+    world.run(2)
+    assert waits_for_start(world)
+    assert shown(world) == HOLD
+
+
+@pytest.mark.parametrize("other", ["STOP", "pause", "HOLD", "another mode", "hold of another"])
+def test_another_wish_removes_the_mark(world: World, other: str) -> None:
+    ask_mode(world.client, MISSION)
+    world.run(0.5)
+    if other == "STOP":
+        world.client.stop()
+        world.run(1)
+        world.client.proceed()
+    elif other == "pause":
+        world.client.pause()
+        world.run(0.2)
+        world.client.proceed()
+    elif other == "hold of another":
+        somebody = world.add_client("somebody")
+        world.run(1)
+        ask_mode(somebody, HOLD)
+    else:
+        ask_mode(world.client, HOLD if other == "HOLD" else MANUAL)
+    world.run(1)
+    assert shown(world) != MISSION
+    world.client.arm()
+    world.run(1.5)
+    assert waits_for_start(world)
+
+
+def test_without_a_plan_the_mode_is_the_rovers_own_affair(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    sent = ask_mode(world.client, MISSION)
+    world.run(0.3)
+    assert sent.answer is not None
+    assert sent.answer[0] != ACCEPTED, "it has none, either"
+
+
+def test_a_return_is_shown_and_driven(world: World) -> None:
+    world.client.arm()
+    world.run(0.3)
+    world.client.command(54000, 1.0)
+    world.until_state(2, S.COMPLETED, within=20)
+    world.client.send(set_mode(RETURN))
+    world.run(0.05)
+    assert shown(world) == RETURN
+    world.until_state(3, S.COMPLETED, within=30)
+    assert near_pose(world.pose(), (0.0, 0.0, 180.0), metres=0.05, angle=5)
