@@ -123,8 +123,8 @@ class ModeRequests:
 
     def start_plan(self, asked: Asked, *, first: int, now: float) -> None:
         """Start or continue the uploaded mission; one that is over is another task."""
-        self._submissions.check_open()
         vehicle, submitter = asked.vehicle, asked.client.submitter(asked.packet.source)
+        self._submissions.check_new(vehicle)
         started = self._plans.start(vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
             task = self._submissions.submit_draft(asked, started, now=now)
@@ -153,9 +153,9 @@ class ModeRequests:
             self._gcs.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
 
     def _start_unasked(self, vehicle: Vehicle, submitter: Submitter, *, now: float) -> None:
+        self._submissions.check_new(vehicle)
         started = self._plans.start(vehicle, submitter, first=0, now=now)
         if isinstance(started, Draft):
-            self._submissions.check_open()
             task = vehicle.tasks.submit(started, now=now)
             self._plans.restarted(vehicle, task, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)

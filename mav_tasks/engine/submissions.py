@@ -83,7 +83,7 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
-        self.check_open()
+        self.check_new(vehicle)
         if self._is_for_now(asked):
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
         else:
@@ -98,7 +98,7 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
-        self.check_open()
+        self.check_new(asked.vehicle)
         task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
         self._await_commit(asked, task, now=now)
 
@@ -106,13 +106,13 @@ class Submissions:
         """The same for what no acknowledgement is expected of."""
         known = self._recollection.known(draft, confirmation=0, origin=vehicle.origin, now=now)
         if known is None:
-            self.check_open()
+            self.check_new(vehicle)
             task = vehicle.run_now(draft, actor=actor, now=now)
             self._recollection.remember(task, at=now, now=now)
 
     def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
         """Take in a task that a command means without naming it; Rejection says why not."""
-        self.check_open()
+        self.check_new(asked.vehicle)
         task = asked.vehicle.tasks.submit(draft, now=now)
         self._await_commit(asked, task, now=now)
         return task
@@ -124,7 +124,7 @@ class Submissions:
 
     def submit_plan(self, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
         """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
-        self.check_open()
+        self.check_new(vehicle)
         task = vehicle.tasks.submit(draft, now=now)
         self._recollection.remember(task, at=now, now=now)
         return task
@@ -169,6 +169,11 @@ class Submissions:
             raise Rejection(R.BAD_PARAMETER, words)
         if not vehicle.is_within_fence(goal):
             raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
+
+    def check_new(self, vehicle: Vehicle) -> None:
+        """Raise Rejection while no new task is taken in for a vehicle."""
+        self.check_open()
+        vehicle.check_stops_by_itself()
 
     def check_open(self) -> None:
         """Raise Rejection while nothing new is taken in."""

@@ -172,9 +172,36 @@ class Vehicle:
             self._receive_of_frame(message, now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
+        elif isinstance(message, m.ParamValue):
+            self._receive_parameter(message, now=now)
         elif isinstance(message, m.AutopilotVersion):
             self.tasks.identified(_uid_of(message), now=now)
             self.requests.is_identified = True
+
+    def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
+        failsafe = self.requests.loss_failsafe
+        if failsafe is not None:
+            failsafe.receive(message)
+            self._note_failsafe(now=now)
+
+    def _note_failsafe(self, *, now: float) -> None:
+        failsafe = self.requests.loss_failsafe
+        if failsafe is None or not failsafe.changed:
+            return
+        failsafe.changed = False
+        if failsafe.is_unknown:
+            self._note("does not say whether it stops when setpoints stop", now=now)
+        elif failsafe.why_off:
+            self._note(f"would drive on without setpoints: {failsafe.why_off}", now=now)
+        else:
+            self._note("stops when setpoints stop", now=now)
+
+    def check_stops_by_itself(self) -> None:
+        """Raise Rejection where the vehicle is known to drive on when setpoints stop."""
+        failsafe = self.requests.loss_failsafe
+        if failsafe is not None and failsafe.why_off:
+            words = f"the rover would drive on without setpoints: {failsafe.why_off}"
+            raise Rejection(TaskReason.NOT_ALLOWED, words)
 
     def _receive_of_frame(self, message: Seen, *, now: float) -> None:
         self._frame.receive(message, now=now)
@@ -201,6 +228,8 @@ class Vehicle:
         if not self._clock.is_running:
             self.step(now=now)
         self._ask_for_rates(now=now)
+        self.requests.ask_for_failsafe()
+        self._note_failsafe(now=now)
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
@@ -240,6 +269,8 @@ class Vehicle:
         self._motion.forget()
         self._frame.forget()
         self.requests.intervals.ask_all_again()
+        if self.requests.loss_failsafe is not None:
+            self.requests.loss_failsafe.forget()
         self._note("restarted", now=now)
         if not self.tasks.is_stopped:
             if self.control.is_engaged:
@@ -660,6 +691,8 @@ class Vehicle:
             home=self.home,
             is_fence_unknown=self.tasks.bounds.is_unknown(self._frame.origin),
             turns_on_spot=self.persona.turns_on_spot,
+            drives_on=self.requests.loss_failsafe is not None
+            and bool(self.requests.loss_failsafe.why_off),
         )
 
     def apply(self, settings: Settings) -> None:

@@ -14,6 +14,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_sender import Answered, CommandSender
 from mav_tasks.services.interval_requester import IntervalRequester
+from mav_tasks.services.loss_failsafe import LossFailsafe
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import Done, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
@@ -47,6 +48,8 @@ class VehicleRequests:
         self._performed: set[int] = set()  # commands that plans have ordered
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
+        #: None: how it stops when setpoints stop is known
+        self.loss_failsafe = LossFailsafe(target) if persona.has_loss_parameters else None
         self._versions_asked = 0
         self._ask_version_at = now
         #: whether the vehicle has said which one it is
@@ -137,6 +140,12 @@ class VehicleRequests:
             request.target_system, request.target_component = self._target
             self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
             self.flush(now=now)
+
+    def ask_for_failsafe(self) -> None:
+        """Ask whether the vehicle stops by itself, some times, until it has said so."""
+        if self.loss_failsafe is not None:
+            for request in self.loss_failsafe.requests():
+                self._outlet.send(request, self._source)
 
     def ask_which(self, *, now: float) -> None:
         """Ask which vehicle it is, some times, until it has said so."""

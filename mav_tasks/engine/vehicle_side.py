@@ -46,10 +46,12 @@ USED = frozenset(
         m.MissionAck.id,
         m.MissionRequest.id,
         m.MissionRequestInt.id,
+        m.ParamValue.id,
     }
     | SETPOINTS
 )
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
+DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 
 
 @dataclass(slots=True)
@@ -246,6 +248,10 @@ class VehicleSide:
             return None
         if packet.system_id in (0, self._our_address.system_id):
             return None  # 0 would address every vehicle, and our own id is no vehicle's
+        if heartbeat.type not in DRIVEN:  # others mean other things by the same mode numbers
+            words = f"a vehicle of type {heartbeat.type} is no rover: not driven"
+            self._note_once(packet.system_id, words, now=now)
+            return None
         honours = self._settings.yaw_rate == "honoured"
         persona = persona_of(heartbeat, honours_yaw_rate=honours)
         if persona is None:

@@ -88,6 +88,7 @@ class MavType(IntEnum):
     GENERIC = 0
     GCS = 6
     GROUND_ROVER = 10
+    SURFACE_BOAT = 11
     ONBOARD_CONTROLLER = 18
 
 

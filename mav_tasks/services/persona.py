@@ -42,6 +42,8 @@ class Persona:
     is_held_before_places: bool
     #: asked for the mission while it is disarmed, it begins it when it is armed
     starts_when_armed: bool
+    #: what it does when setpoints stop is up to its parameters
+    has_loss_parameters: bool
     #: it turns at a rate, also on the spot, and reverses; else it is steered by where to go
     turns_on_spot: bool
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
@@ -106,6 +108,7 @@ ARDUPILOT = Persona(
     stop_disarms=False,
     is_held_before_places=False,
     starts_when_armed=False,
+    has_loss_parameters=False,  # it stops after 3 s (observed on 4.6.3)
     turns_on_spot=True,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
     setpoint_frame=MavFrame.BODY_NED,
@@ -148,6 +151,7 @@ PX4 = Persona(
     stop_disarms=False,
     is_held_before_places=True,
     starts_when_armed=True,
+    has_loss_parameters=True,
     turns_on_spot=False,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
     setpoint_frame=MavFrame.LOCAL_NED,

@@ -199,6 +199,9 @@ class Executor:
         if seen.refusal:
             self._finish(S.FAILED, seen.refusal, actor=SERVER, now=now)
             return view.HOLD
+        if seen.drives_on:
+            self._finish(S.FAILED, R.NOT_ALLOWED, actor=SERVER, now=now)
+            return view.HOLD
         if not seen.in_control:
             if now - self._since > self._settings.watch.start_timeout:
                 self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)

@@ -232,3 +232,44 @@ class TestPausing:
         world.run(0.1)
         assert world.client.acks_of(REPOSITION) == [(ACCEPTED, 1)]
         assert world.state(1) == (S.PAUSED, R.OPERATOR)
+
+
+class TestOneThatWouldDriveOnWithoutUs:
+    """Its offboard-loss failsafe is off: nobody could stop it if the server went away."""
+
+    def make(self, make_world: MakeWorld) -> World:
+        world = make_world(persona=PROMPT_PX4)
+        world.client.send(
+            common.MAVLink_param_set_message(1, 1, b"COM_OF_LOSS_T", 60.0, 9)  # REAL32
+        )
+        world.run(0.2)
+        assert any("would drive on without setpoints" in t for t in world.client.texts())
+        return world
+
+    def test_is_given_no_task(self, make_world: MakeWorld) -> None:
+        world = self.make(make_world)
+        sent = world.client.move(1)
+        world.run(0.1)
+        assert sent.answer == (DENIED, R.NOT_ALLOWED)
+        assert any("COM_OF_LOSS_T is 60 s" in text for text in world.client.texts())
+        upload = Upload(world.client, [Item(WAYPOINT, **at(1, 0))])
+        world.until(lambda: upload.result is not None, within=5)
+        assert upload.result == 14  # DENIED
+
+    def test_begins_none_that_waits(self, make_world: MakeWorld) -> None:
+        world = make_world(persona=PROMPT_PX4)
+        world.client.command(MOVE, 1.0, 0, 0, 0, 0, 2.0, 5)  # in two seconds
+        world.run(0.5)
+        world.rover.autopilot.parameters["COM_OF_LOSS_T"] = 60.0
+        world.client.send(common.MAVLink_param_request_read_message(1, 1, b"COM_OF_LOSS_T", -1))
+        world.until(lambda: world.state(1)[0] is S.FAILED, within=5)
+        assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
+        assert not world.rover.autopilot.armed
+
+    def test_is_driven_again_when_it_is_mended(self, make_world: MakeWorld) -> None:
+        world = self.make(make_world)
+        world.client.send(common.MAVLink_param_set_message(1, 1, b"COM_OF_LOSS_T", 1.0, 9))
+        world.run(0.2)
+        world.client.move(1)
+        world.until_idle(tasks=1)
+        assert world.state(1)[0] is S.COMPLETED
