@@ -8,6 +8,7 @@ from math import inf
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.view import ModeKind
 
+STREAM_GAP = 0.5  # s between setpoints that are a stream: the least for OFFBOARD is 2 Hz
 BY_CLIENT = 2.0  # s after a client asked for a mode, in which a change to it is its doing
 
 
@@ -23,6 +24,7 @@ class Authority:
         self._granted: set[Hashable] = set()
         self._other_at = -inf
         self._client_armed_at = -inf
+        self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
         #: until somebody disarms or changes the mode
         self.may_arm = may_arm
 
@@ -78,6 +80,15 @@ class Authority:
     def has_granted(self, client: Hashable) -> bool:
         """Whether this client has asked for our mode since the last task or STOP."""
         return client in self._granted
+
+    def note_withheld(self, client: Hashable, *, now: float) -> None:
+        """A motion message of a client did not pass."""
+        self._withheld = client, now
+
+    def streams(self, client: Hashable, *, now: float) -> bool:
+        """Whether a client would drive now, if it might."""
+        who, at = self._withheld
+        return who == client and now - at <= STREAM_GAP
 
     def revoke(self) -> None:
         """A task has ended, or STOP: who wants to drive must ask again."""

@@ -28,7 +28,7 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.engine.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.mission_reports import MissionReports
 from mav_tasks.engine.mode_requests import ModeRequests
-from mav_tasks.engine.motion_gate import may_pass, passed
+from mav_tasks.engine.motion_gate import may_pass, passed, withheld
 from mav_tasks.engine.operator_watch import OperatorWatch
 from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
@@ -253,6 +253,9 @@ class Engine:
                 for vehicle in vehicles:
                     passed(vehicle, message, now=now)
                 vehicles[0].requests.forward(received.packet)
+            else:
+                for vehicle in vehicles:
+                    withheld(vehicle, client.key, message, now=now)
 
     def _watch_operator(self, *, now: float) -> None:
         is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)

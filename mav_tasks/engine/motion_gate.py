@@ -36,6 +36,12 @@ def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None) -> b
     return True
 
 
+def withheld(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, now: float) -> None:
+    """Note that a client's message does not go to the vehicle."""
+    if _moves(message):
+        vehicle.is_not_moved_by(client, now=now)
+
+
 def passed(vehicle: Vehicle, message: m.Message | None, *, now: float) -> None:
     """Note what a message that goes to the vehicle means for its tasks."""
     if _moves(message):

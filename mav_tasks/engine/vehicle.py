@@ -359,6 +359,10 @@ class Vehicle:
         present_mode = self._monitor.custom_mode
         self._authority.client_asks(mode, client, present_mode=present_mode, now=now)
         if mode == self.persona.control_mode:
+            if self.persona.arms_in_hold and self._authority.streams(client, now=now):
+                # the vehicle enters that mode only in a stream, of which it has not heard yet
+                self.requests.send_zero()
+                self.requests.send_zero()
             return
         if self.control.is_taking:
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
@@ -426,6 +430,10 @@ class Vehicle:
         if not self._authority.has_granted(client):
             return f"ask for {self.persona.mode_name(self.persona.control_mode)} first"
         return ""
+
+    def is_not_moved_by(self, client: Hashable, *, now: float) -> None:
+        """A client's motion message does not go to it."""
+        self._authority.note_withheld(client, now=now)
 
     def is_moved_by_client(self, *, now: float) -> None:
         """A client's motion message goes to it: tasks wait."""

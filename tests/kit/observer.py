@@ -34,6 +34,7 @@ BURST = 4  # moving setpoints in 0.1 s
 ENGAGED = 0.2  # s since the last setpoint: the server is driving
 OWN_REQUEST = 3.0  # s in which a change to HOLD or disarmed follows from our own request
 KNOWN = 0.5  # s since the server heard of it: no setpoint from before is on its way any more
+GREETING = 2  # zeros in a row that are not driving: a client's OFFBOARD needs some before it
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
 
@@ -113,6 +114,7 @@ class Observer:
     _attitude_at: float = -1e9
     _setpoint_at: float = -1e9
     _zeros_since: float = 1e9
+    _in_row: int = 0  # of the server's setpoints
     _hold_at: float = -1e9
     _disarm_at: float = -1e9
     _moved_last: bool = False
@@ -279,7 +281,7 @@ class Observer:
         if moves and not self.armed:
             self._violation(now, "moving setpoint to a rover not seen armed")
         if (message.get_srcSystem(), message.get_srcComponent()) != SERVER:
-            if moves and now - self._setpoint_at < ENGAGED:
+            if moves and now - self._setpoint_at < ENGAGED and self._in_row > GREETING:
                 self._violation(now, "a client's setpoint while the server drives")
             return
         if self.taken_over:
@@ -295,6 +297,7 @@ class Observer:
             self._zero_in_mode = True
             if self._stop_due is not None:
                 self._stop_due[1].discard("zero")
+        self._in_row = self._in_row + 1 if now - self._setpoint_at < ENGAGED else 1
         self._setpoint_at = now
         self._moved_last = moves
 

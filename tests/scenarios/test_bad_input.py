@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.snapshot import Snapshot
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -269,3 +270,12 @@ def whole(message_id: int, crc_extra: int, payload: bytes, source: tuple[int, in
     crc = common.x25crc(head + payload)
     crc.accumulate(bytes((crc_extra,)))
     return b"\xfd" + head + payload + struct.pack("<H", crc.crc)
+
+
+def test_what_is_no_ground_vehicle_is_not_driven(world: World) -> None:
+    copter = common.MAVLink(None, 2, 1)
+    world.from_vehicle_side(common.MAVLink_heartbeat_message(2, 3, 1, 0, 4, 3).pack(copter))
+    world.run(0.5)
+    assert [v.system_id for v in world.server.engine.snapshot(now=world.now).vehicles] == [1]
+    noted = [event.text for event in world.events(VehicleNoted) if event.vehicle == 2]
+    assert noted == ["a vehicle of type 2 is no rover: not driven"]

@@ -1,0 +1,79 @@
+"""A client's own OFFBOARD on a PX4 rover, which is entered only while setpoints stream."""
+
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, setpoint
+from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+VELOCITY_NED = 2503  # MAVSDK's mask: velocity and yaw
+
+
+@pytest.fixture(params=[PROMPT_PX4, PROMPT_GENERIC], ids=lambda persona: persona.name)
+def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
+    """An armed rover and a client that streams."""
+    world = make_world(persona=request.param)
+    world.client.arm()
+    world.run(0.3)
+    world.client.stream(northwards(0.5), rate=20)
+    world.run(0.5)
+    assert world.stands()
+    return world
+
+
+def northwards(speed: float) -> Any:
+    return common.MAVLink_set_position_target_local_ned_message(
+        0, 1, 1, 1, VELOCITY_NED, 0, 0, 0, speed, 0, 0, 0, 0, 0, 0, 0
+    )
+
+
+def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> None:
+    sent = ask_mode(world.client, OFFBOARD)
+    world.run(0.2)
+    assert sent.answer is not None
+    assert sent.answer[0] == ACCEPTED
+    assert world.rover.autopilot.mode is Mode.GUIDED
+    world.run(2)
+    assert world.truth.forward_speed > 0.4
+    asked_at = world.now
+    ask_mode(world.client, HOLD)
+    world.run(0.05)
+    assert "HOLD" in world.observer.sent_since(asked_at), "at once: no task of ours is driving"
+    world.run(2)
+    assert world.stands()
+    world.run(2)
+    assert world.stands(), "the stream goes on, and is not passed"
+
+
+def test_is_refused_by_the_rover_without_a_stream(world: World) -> None:
+    world.client.end_streams()
+    world.run(1)
+    sent = ask_mode(world.client, OFFBOARD)
+    world.run(0.5)
+    assert sent.answer is not None
+    assert sent.answer[0] != ACCEPTED
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_does_not_come_back_when_a_task_has_ended(world: World) -> None:
+    ask_mode(world.client, OFFBOARD)
+    world.run(1)
+    world.client.end_streams()
+    world.client.stream(setpoint(0.0), rate=5)
+    world.run(0.5)
+    world.client.end_streams()
+    world.run(2.5)
+    world.client.move(1.0)
+    world.until_state(1, S.EXECUTING, within=10)
+    world.client.stream(northwards(-0.5), rate=20)
+    world.until_state(1, S.COMPLETED, within=20)
+    where = world.truth.north
+    world.run(3)
+    assert world.stands()
+    assert abs(world.truth.north - where) < 0.02
