@@ -1,13 +1,13 @@
 """Measures the server and prints one table. Nothing is asserted: take ratios, not figures.
 
-Everything is on loopback, bounded in count and time. ``--profile FILE`` with one of ``commands``
-and ``forwarding`` writes cProfile's figures of the server process.
+Everything is on loopback, bounded in count and time. ``--profile FILE`` with one of ``commands``,
+``forwarding`` and ``uploads`` writes cProfile's figures of the server process.
 """
 
 import argparse
 from collections.abc import Callable
 
-from . import commands, forwarding, queue, setpoints, simulation, start, stop
+from . import commands, forwarding, queue, setpoints, simulation, start, stop, uploads
 from .table import Row, render
 
 MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
@@ -19,10 +19,12 @@ MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "forwarding": forwarding.measure,
     "simulation": simulation.measure,
     "start": start.measure,
+    "uploads": uploads.measure,
 }
 PROFILED: dict[str, Callable[[str], list[Row]]] = {
     "commands": commands.measure,
     "forwarding": forwarding.measure,
+    "uploads": uploads.measure,
 }
 
 

@@ -41,6 +41,19 @@ def child(
         said += process.communicate(timeout=END_WITHIN)[0].splitlines()
 
 
+@contextmanager
+def simulated_rovers(count: int, port: int) -> Iterator[None]:
+    """Run kinematic rovers on a UDP port while the block runs."""
+    command = [sys.executable, "-m", "rover_sim", "--body", "kinematic"]
+    command += ["--count", str(count), "--port", str(port)]
+    simulator = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        simulator.terminate()
+        simulator.wait(END_WITHIN)
+
+
 def free_port() -> int:
     """Give a UDP port of the loopback interface that nobody has at the moment."""
     with udp_socket() as probe:

@@ -1,8 +1,6 @@
 """How evenly setpoints leave at 20 Hz with 1, 20 and 100 driven kinematic rovers in one server."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from statistics import quantiles
 from time import monotonic, sleep
@@ -11,7 +9,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavState, MavType
 
-from .child import child, free_port, udp_socket
+from .child import child, free_port, simulated_rovers, udp_socket
 from .scripted import CLIENT, loopback
 from .table import Row
 
@@ -42,19 +40,16 @@ def _row(rovers: int, errors: list[float]) -> Row:
 
 def _errors(rovers: int) -> list[float]:
     port, vehicle_port = free_port(), free_port()
-    command = [sys.executable, "-m", "rover_sim", "--body", "kinematic"]
-    command += ["--count", str(rovers), "--port", str(vehicle_port)]
-    simulator = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    try:
-        options = str(port), str(vehicle_port), "--drive"
-        with udp_socket() as client, child("server", *options, quiet=True) as said:
-            client.connect(loopback(port))
-            _drive(client.send, rovers)
-        errors: list[float] = json.loads(said[-1])
-        return errors
-    finally:
-        simulator.terminate()
-        simulator.wait(10)
+    options = str(port), str(vehicle_port), "--drive"
+    with (
+        simulated_rovers(rovers, vehicle_port),
+        udp_socket() as client,
+        child("server", *options, quiet=True) as said,
+    ):
+        client.connect(loopback(port))
+        _drive(client.send, rovers)
+    errors: list[float] = json.loads(said[-1])
+    return errors
 
 
 def _drive(send: Callable[[bytes], object], rovers: int) -> None:
