@@ -13,12 +13,12 @@ from typing import Protocol
 from zlib import crc32
 
 from mav_tasks.engine.commit_gate import Effect
-from mav_tasks.engine.fence_items import check_fence_item, check_rally_item, fence_of
+from mav_tasks.engine.fence_items import fence_of
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import bad
+from mav_tasks.engine.item_check import ItemCheck
 from mav_tasks.engine.motion_gate import GO_TO
-from mav_tasks.engine.plan_items import plan_of, result_of, step_of
+from mav_tasks.engine.plan_items import result_of
 from mav_tasks.engine.plans import (
     MISSION,
     NOTHING,
@@ -41,7 +41,7 @@ from mav_tasks.services.mission_sender import MissionSender
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
-from mav_tasks.tasks.goal import GoTo, Plan, Step
+from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Task, TaskId, Terms
 
@@ -85,8 +85,9 @@ class Refuse(Protocol):
 class _Desk:
     """Uploads to, and downloads from, one address."""
 
-    def __init__(self, receiver: MissionReceiver) -> None:
-        self.receiver = receiver
+    def __init__(self, check: ItemCheck) -> None:
+        self.check = check
+        self.receiver = MissionReceiver(check=check)
         self.sender = MissionSender()
 
 
@@ -109,11 +110,12 @@ class MissionDesks:
         self._plans = plans
         self._settings = settings
         self._desks: dict[tuple[int, int], _Desk] = {}
-        self._why = ""  # an item was refused, in words
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
+        for desk in self._desks.values():
+            desk.check.apply(settings)
 
     # the mission protocol
 
@@ -181,17 +183,16 @@ class MissionDesks:
         key = vehicle.system_id, component
         desk = self._desks.get(key)
         if desk is None:
-            check = partial(self._check, vehicle, component)
-            desk = self._desks[key] = _Desk(MissionReceiver(check=check))
+            desk = self._desks[key] = _Desk(ItemCheck(vehicle, component, self._settings))
         return desk
 
     def _flush(self, desk: _Desk, vehicle: Vehicle, *, now: float) -> None:
         outgoing, uploads = desk.receiver.take()
         for told in outgoing:
             self._send(told)
-            if self._why and isinstance(told.message, m.MissionAck):
-                self._tell(told.sender, vehicle, self._why, now=now)
-                self._why = ""
+            why = desk.check.take_why() if isinstance(told.message, m.MissionAck) else ""
+            if why:
+                self._tell(told.sender, vehicle, why, now=now)
         for upload in uploads:
             self._decide(desk, vehicle, upload, now=now)
 
@@ -211,51 +212,6 @@ class MissionDesks:
         client = self._client(sender)
         if client is not None:
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-
-    def _check(
-        self,
-        vehicle: Vehicle,
-        component: int,
-        kind: int,
-        seq: int,
-        item: Item,
-        count: int,
-    ) -> MavMissionResult | None:
-        """Whether an item can be part of a plan; keeps why not in words."""
-        if kind not in STORED:
-            return MavMissionResult.UNSUPPORTED
-        manner = self._plans.manner(vehicle, is_staged=component == AUTOPILOT)
-        try:
-            if kind == MavMissionType.FENCE:
-                check_fence_item(item, seq, count=count)
-            elif kind == MavMissionType.RALLY:
-                check_rally_item(item, seq)
-            else:
-                step = step_of(item, seq, count=count, manner=manner)
-                if isinstance(step, GoTo):
-                    self._check_place(vehicle, component, step, seq)
-        except Rejection as refusal:
-            self._why = refusal.text
-            return result_of(refusal)
-        return None
-
-    def _check_place(self, vehicle: Vehicle, component: int, step: GoTo, seq: int) -> None:
-        """Whether a place is within reach, and it and the way from the one before in the fence."""
-        far, longest = vehicle.distance_to(step), self._settings.driving.max_distance
-        if far is not None and far > longest:
-            words = f"item {seq} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
-            raise bad(words, param=5)
-        if not vehicle.is_within_fence(step):
-            raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
-        items = self._desk(vehicle, component).receiver.items
-        steps: list[Step] = [step]
-        manner = self._plans.manner(vehicle, is_staged=component == AUTOPILOT)
-        for number in range(len(items) - 1, -1, -1):  # as far as the last place
-            steps.insert(0, step_of(items[number], number, count=seq, manner=manner))
-            if isinstance(steps[0], GoTo):
-                break
-        if vehicle.leg_over_fence(steps) is not None:
-            raise Rejection(R.OUTSIDE_FENCE, f"item {seq}: the way there leads over the fence")
 
     def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
         """What an address has to show: the task server, of missions, the one that is driven."""
@@ -303,12 +259,7 @@ class MissionDesks:
         """A mission: a task that waits to be started, or is queued."""
         sender = upload.sender
         is_staged = sender.addressed.component_id == AUTOPILOT
-        manner = self._plans.manner(vehicle, is_staged=is_staged)
-        wanted = plan_of(upload.items, manner=manner, now=now)
-        forbidden = vehicle.leg_over_fence(wanted.plan.steps)
-        if forbidden is not None:
-            words = f"item {forbidden}: a jump there leads over the fence"
-            raise Rejection(R.OUTSIDE_FENCE, words)
+        wanted = desk.check.plan_of(upload.items, now=now)
         terms = replace(wanted.terms, is_staged=is_staged)
         draft = self._draft(vehicle, wanted.plan, terms, sender)
         # a long plan may take longer to come again than it is remembered

@@ -30,6 +30,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
 from mav_tasks.services.command_receiver import Command, command_of
 from mav_tasks.services.mission_item import NOT_GIVEN, Item, packed
+from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import (
     Delay,
@@ -84,6 +85,11 @@ class Manner(NamedTuple):
     turns_on_spot: bool
     driving: Driving
 
+    @classmethod
+    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "Manner":
+        """Give that of a vehicle; ``is_staged``: the plan is for the autopilot itself."""
+        return cls(persona.has_home_item and is_staged, persona.turns_on_spot, driving)
+
 
 class Wanted(NamedTuple):
     """What a plan asks for: its steps, and the terms that it names for itself."""
@@ -127,11 +133,15 @@ def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
     raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
 
 
-def plan_of(items: Sequence[Item], *, manner: Manner, now: float) -> Wanted:
-    """Give the plan of items of which each was found good; Rejection when they make none."""
-    steps = tuple(
+def steps_of(items: Sequence[Item], *, manner: Manner) -> tuple[Step, ...]:
+    """Give what all items of a plan ask for."""
+    return tuple(
         step_of(item, seq, count=len(items), manner=manner) for seq, item in enumerate(items)
     )
+
+
+def plan_of(items: Sequence[Item], steps: tuple[Step, ...], *, now: float) -> Wanted:
+    """Give the plan of items and of what they ask for; Rejection when they make none."""
     plan = Plan(steps, packed(items))
     loop = loops_in_vain(plan)
     if loop is not None:

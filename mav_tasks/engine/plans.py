@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from mav_tasks.engine.fence_items import fence_of, rally_of
-from mav_tasks.engine.plan_items import Manner, plan_of
+from mav_tasks.engine.plan_items import Manner, plan_of, steps_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -211,17 +211,11 @@ class Plans:
     def _again(
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
     ) -> Draft:
-        manner = self.manner(vehicle, is_staged=True)
-        wanted = plan_of(stored.items, manner=manner, now=now)
+        manner = Manner.of(vehicle.persona, is_staged=True, driving=self._settings.driving)
+        wanted = plan_of(stored.items, steps_of(stored.items, manner=manner), now=now)
         plan = replace(wanted.plan, first=first)
         command = MavCmd.MISSION_START
         return Draft(vehicle.system_id, command, plan, submitter, terms=wanted.terms)
-
-    def manner(self, vehicle: Vehicle, *, is_staged: bool) -> Manner:
-        """Give by what the items of a vehicle's plan are read; ``is_staged``: at the autopilot."""
-        persona = vehicle.persona
-        has_home = persona.has_home_item and is_staged
-        return Manner(has_home, persona.turns_on_spot, self._settings.driving)
 
     def go_on_with(self, vehicle: Vehicle, seq: int, *, now: float) -> Task | None:
         """Let the mission go on, or begin, with another item; Rejection: it cannot."""

@@ -125,6 +125,15 @@ def test_a_loop_in_which_nothing_is_driven_is_refused(world: World) -> None:
     assert world.tasks() == ()
 
 
+def test_a_jump_may_lead_ahead_of_all_items_that_have_come_by_then(world: World) -> None:
+    jump = Item(JUMP, param1=4, param2=1, frame=2)
+    assert uploaded(world, HOME, place(1, 0), jump, place(1, 3), place(1, 1)).result == 0
+    assert start(world) == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert reached(world.client) == [1, 4]
+    assert is_at(world, 1.0, 1.0)
+
+
 def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
     uploaded(world)
     uploaded(world, HOME, Item(LAND))
