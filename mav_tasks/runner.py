@@ -215,14 +215,16 @@ class Runner:
         self._rearm(self._loop)
 
     def _rearm(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Have the timer come in time, or too early: then it is for nothing, and set again.
+
+        Most deadlines only move on, with each packet. To set the timer anew each time costs more.
+        """
         due = self._pump.engine.next_deadline()
+        if due is None or (self._timer is not None and self._timer.when() <= due):
+            return
         if self._timer is not None:
-            if self._timer.when() == due:
-                return
             self._timer.cancel()
-            self._timer = None
-        if due is not None:
-            self._timer = loop.call_at(due, self._on_timer)
+        self._timer = loop.call_at(due, self._on_timer)
 
     def _finish(self, code: int) -> None:
         if self._timer is not None:
