@@ -20,6 +20,7 @@ class MotionMonitor:
         self._attitude: Attitude | None = None
         self._attitude_at = 0.0
         self._moved_at: float | None = None
+        self._latest: Motion | None = None  # made of what came last, when it is asked for
         self._last_boot_ms: dict[int, int] = {}
         self.rebooted = False
 
@@ -27,6 +28,7 @@ class MotionMonitor:
         """Take a message in; one that is not finite, or older than the last, is dropped."""
         if not is_finite(message) or not self._is_newer(message):
             return
+        self._latest = None
         if isinstance(message, LocalPositionNed):
             if not self._is_frozen(message):
                 self._position_at = now
@@ -38,6 +40,11 @@ class MotionMonitor:
 
     def latest(self) -> Motion | None:
         """Give the last measured motion, or None before both messages have come."""
+        if self._latest is None:
+            self._latest = self._motion()
+        return self._latest
+
+    def _motion(self) -> Motion | None:
         position, attitude = self._position, self._attitude
         if position is None or attitude is None:
             return None
@@ -62,7 +69,7 @@ class MotionMonitor:
 
     def forget(self) -> None:
         """Start afresh, as after a restart of the vehicle."""
-        self._position = self._attitude = None
+        self._position = self._attitude = self._latest = None
         self._moved_at = None
         self._last_boot_ms.clear()
         self.rebooted = False

@@ -6,7 +6,6 @@ out itself.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from math import inf, isnan
 from typing import NamedTuple
 
@@ -28,7 +27,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
-from mav_tasks.services.command_receiver import Command, command_of
+from mav_tasks.services.command_receiver import Command
 from mav_tasks.services.mission_item import NOT_GIVEN, Item, packed
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
@@ -55,6 +54,9 @@ FOR_EVER = 1e9  # s; JSON has no infinity
 MAX_JUMPS = 65_535
 NO_CHANGE, DEFAULT = -1.0, -2.0  # DO_CHANGE_SPEED, param2
 GROUND_OR_AIR = 1  # the same, highest param1: airspeed counts as ground speed
+NOBODY = Address(0, 0)
+#: an item came in none, and to make one for each takes a tenth of its time
+NO_MESSAGE = m.CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 HERE = (0, NOT_GIVEN)  # what x and y are where no place is meant
 
 #: what the vehicle carries out itself: cameras, gimbals, servos, relays, its home
@@ -167,8 +169,8 @@ def _given(value: float) -> float:
 
 def _command_of(item: Item) -> Command:
     first = (item.param1, item.param2, item.param3, item.param4)
-    message = m.CommandInt(0, 0, item.frame, item.command, 0, 0, *first, item.x, item.y, item.z)
-    return command_of(message)
+    params = (*first, float(item.x), float(item.y), item.z)
+    return Command(NOBODY, item.command, params, 0, item.frame, NO_MESSAGE)
 
 
 def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
@@ -196,8 +198,9 @@ def _options(command: Command, *, now: float) -> Terms:
 def _waypoint(command: Command, _count: int, driving: Driving) -> Step:
     goal = goal_of(command, driving)
     assert isinstance(goal, GoTo), "a waypoint is a place"
-    passes = goal.wait == 0.0 and goal.yaw is None
-    return replace(goal, passes=passes)
+    if goal.wait or goal.yaw is not None:
+        return goal
+    return GoTo(goal.place, goal.speed, goal.radius, passes=True)
 
 
 def _loiter(command: Command, _count: int, driving: Driving) -> Step:
