@@ -111,6 +111,15 @@ class Plans:
             return
         vehicle.tasks.cancel(task, kill=False, reason=reason, actor=actor, now=now)
 
+    def let_go(
+        self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
+    ) -> None:
+        """A mission is not the vehicle's any more: if it has not begun, it never will."""
+        current = None if task is None else self._book.get(task.id)
+        if current is not None:
+            self.end(vehicle, current, reason, actor=actor, now=now)
+        self.begin_at(vehicle, 0)
+
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
         """Let the next start begin with this item; 0: with the first."""
         self._first[vehicle.system_id] = first

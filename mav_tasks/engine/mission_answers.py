@@ -1,0 +1,36 @@
+"""What clients of the mission protocol are told: messages to one of them, and why not in words."""
+
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
+from mav_tasks.services.mission_receiver import Sender, ToClient
+
+
+class MissionAnswers:
+    """Answers to whoever asked, while that client is still there."""
+
+    def __init__(self, gcs: GcsSide) -> None:
+        self._gcs = gcs
+
+    def client(self, sender: Sender) -> GcsClient | None:
+        """Give the client that a sender is at, if it is still there."""
+        assert isinstance(sender.key, tuple), "only MissionDesks.receive makes senders"
+        return self._gcs.client(sender.key)
+
+    def send(self, told: ToClient) -> None:
+        """Send a message in the name of the address that was spoken to."""
+        client = self.client(told.sender)
+        if client is not None:
+            client.outlet.send(told.message, told.sender.addressed)
+
+    def ack(self, sender: Sender, kind: int, result: MavMissionResult) -> None:
+        """Send a MISSION_ACK that names no plan."""
+        self.send(ToClient(sender, m.MissionAck(*sender.address, result, kind)))
+
+    def tell(self, sender: Sender, vehicle: Vehicle, words: str, *, now: float) -> None:
+        """Say in words why not."""
+        client = self.client(sender)
+        if client is not None:
+            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)

@@ -1,0 +1,97 @@
+"""Clearing plans: a mission that has not begun, and what the vehicle keeps as well."""
+
+from collections.abc import Mapping, Sequence
+
+from mav_tasks.engine.mission_answers import MissionAnswers
+from mav_tasks.engine.plan_items import result_of
+from mav_tasks.engine.plans import MISSION, NOTHING, STORED, Plans, Stored
+from mav_tasks.engine.submissions import Submissions
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.engine.write_through import WriteThrough
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
+from mav_tasks.services.mission_receiver import Sender
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason
+from mav_tasks.tasks.task import TaskId
+
+R = TaskReason
+
+
+class MissionClearing:
+    """Sees to MISSION_CLEAR_ALL."""
+
+    def __init__(
+        self,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        answers: MissionAnswers,
+        write_through: WriteThrough,
+    ) -> None:
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._plans = plans
+        self._answers = answers
+        self._write_through = write_through
+
+    def clear(self, vehicle: Vehicle, sender: Sender, kind: int, *, now: float) -> None:
+        """Forget plans of a kind, or of all; the answer comes once that is durable."""
+        kinds: list[int] = list(STORED) if kind == MavMissionType.ALL else [kind]
+        if kinds[0] not in STORED:
+            self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
+            return
+        task = self._plans.task(vehicle)
+        if MISSION in kinds and task is not None and task.state in ACTIVE:
+            self._answers.ack(sender, kind, MavMissionResult.DENIED)
+            words = f"task {task.id} has begun: cancel it first"
+            self._answers.tell(sender, vehicle, words, now=now)
+            return
+        stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
+        self._forget(vehicle, sender, kind, stored, {}, now=now)
+
+    def _forget(
+        self,
+        vehicle: Vehicle,
+        sender: Sender,
+        asked: int,
+        kinds: Sequence[int],
+        before: Mapping[int, Stored],
+        *,
+        now: float,
+    ) -> None:
+        """One kind after the other, what the vehicle keeps first there; then the answer."""
+        actor = str(sender.address)
+        if not kinds:
+            task = self._book.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
+
+            def accept(*, now: float) -> None:
+                self._vehicles.get(vehicle.system_id)
+                self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+                self._answers.ack(sender, asked, MavMissionResult.ACCEPTED)
+
+            def give_up(*, now: float) -> None:
+                for kind, stored in before.items():
+                    self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
+                self._answers.ack(sender, asked, MavMissionResult.ERROR)
+
+            self._submissions.when_durable(accept, give_up, now=now)
+            return
+        first, rest = kinds[0], kinds[1:]
+
+        def go_on(*, now: float) -> None:
+            so_far = {**before, first: self._plans.stored(vehicle.system_id, first)}
+            self._plans.keep(vehicle, first, NOTHING, actor=actor, now=now)
+            self._forget(vehicle, sender, asked, rest, so_far, now=now)
+
+        def refuse(refusal: Rejection, *, now: float) -> None:
+            self._answers.ack(sender, asked, result_of(refusal))
+            self._answers.tell(sender, vehicle, refusal.text, now=now)
+
+        if first == MISSION:
+            go_on(now=now)
+        else:
+            self._write_through.write(vehicle, first, (), go_on, refuse, now=now)
