@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from tests.kit.processes import process
+from tests.kit.scripts import ROOT
 
 pytestmark = pytest.mark.interop
 
-SCRIPTS = Path(__file__).with_name("mavsdk_scripts.py")
+SCRIPTS = "tests.interop.scripts.simulated"
 LIMIT = 20.0  # s for a script
 
 
@@ -21,10 +22,11 @@ def test_mavsdk_and_a_simulated_rover(persona: str, script: str, tmp_path: Path)
     with process(*rover, folder=tmp_path, name="rover") as running:
         started = running.wait_for(rf"rover 1 \({persona}, kinematic\) on udp 127\.0\.0\.1:(\d+)")
         result = subprocess.run(
-            [sys.executable, str(SCRIPTS), script, started[1]],
+            [sys.executable, "-m", SCRIPTS, script, started[1]],
             capture_output=True,
             text=True,
             timeout=LIMIT,
             check=False,
+            cwd=ROOT,
         )
         assert result.returncode == 0, f"{result.stdout}\n{result.stderr}\n{running.text}"

@@ -142,11 +142,14 @@ class Stand:
 
 
 @contextmanager
-def stand(folder: Path, *serve_options: str, body: str = "kinematic") -> Iterator[Stand]:
-    """Run a server and a rover on ports of their own."""
+def stand(
+    folder: Path, *serve_options: str, body: str = "kinematic", persona: str = "ardupilot"
+) -> Iterator[Stand]:
+    """Run a server and a rover of that make on ports of their own."""
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
-    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", body, "--truth", str(truth))
+    rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", body, "--persona", persona]
+    rover += ["--truth", str(truth)]
     serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client_port}"]
     serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]

@@ -1,7 +1,7 @@
-"""Scripts for the real MAVSDK 4, one a process: some answers take the whole process down.
+"""What scripts do with a simulated rover, no server between.
 
-``python mavsdk_scripts.py NAME PORT`` runs one against a vehicle on that UDP port; it ends with
-status 0 if all went as it should.
+``python -m tests.interop.scripts.simulated NAME PORT`` runs one against a rover on that UDP port;
+it ends with status 0 if all went as it should.
 """
 
 import sys
@@ -10,7 +10,6 @@ from collections.abc import Callable
 from math import isnan, nan
 from typing import Any
 
-from mavsdk import ComponentType, Configuration, Mavsdk
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.geofence import Geofence
 from mavsdk.plugins.geofence.geofence import Circle, FenceType, GeofenceData, Point, Polygon
@@ -21,16 +20,15 @@ from mavsdk.plugins.offboard.offboard import VelocityBodyYawspeed, VelocityNedYa
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import Telemetry
 
+from tests.interop.scripts.common import system_at, wait_for
+
 LIMIT = 10.0  # s for anything that is waited for
 HOLD, MISSION, RETURN, OFFBOARD = 3, 4, 5, 7  # MAVSDK's FlightMode
 LATITUDE, LONGITUDE = -35.363262, 149.165237
 
 
 def wait_until(condition: Callable[[], object]) -> None:
-    end = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < end, f"not within {LIMIT} s"
-        time.sleep(0.02)
+    wait_for(condition, "what was expected", within=LIMIT)
 
 
 def telemetry(system: Any) -> None:
@@ -153,11 +151,7 @@ SCRIPTS: dict[str, Callable[[Any], None]] = {
 
 
 def main(name: str, port: str) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    with Mavsdk(configuration) as mavsdk:
-        mavsdk.add_any_connection(f"udpout://127.0.0.1:{port}")
-        system = mavsdk.first_autopilot(LIMIT)
-        assert system is not None
+    with system_at(f"udpout://127.0.0.1:{port}", within=LIMIT) as system:
         SCRIPTS[name](system)
 
 

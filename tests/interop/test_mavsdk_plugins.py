@@ -1,0 +1,57 @@
+"""MAVSDK 4, unmodified: all besides missions through the server, by both faces, over good and bad
+nets. No answer may take its process down.
+"""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.interop.scripts.heard import STREAMS
+from tests.kit.processes import stand
+from tests.kit.scripts import each_face, each_net, each_persona, run_script
+
+pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(200)]
+
+
+@each_net
+@each_face
+@each_persona
+def test_fence_parameters_and_own_setpoints_work_as_without_a_server(
+    persona: str, face: str, loss: float, tmp_path: Path
+) -> None:
+    with stand(tmp_path, persona=persona) as running:
+        said = run_script(f"{face}plugins", running, persona=persona, loss=loss)
+        for line in ("fence [4]", "fences 0", "parameters True True", "moves", "stands"):
+            assert line in said, said
+        assert "task 1" not in running.server.text, "none of it is a task"
+
+
+@each_net
+@each_face
+@each_persona
+def test_every_stream_of_telemetry_comes_and_tells_of_the_drive(
+    persona: str, face: str, loss: float, tmp_path: Path
+) -> None:
+    with stand(tmp_path, persona=persona) as running:
+        said = run_script(f"{face}streams", running, persona=persona, loss=loss)
+        assert f"heard {' '.join(STREAMS)}" in said, said
+
+
+@each_net
+@each_face
+@each_persona
+def test_with_our_dialect_each_request_tells_its_task(
+    persona: str, face: str, loss: float, tmp_path: Path
+) -> None:
+    with stand(tmp_path, persona=persona) as running:
+        said = run_script(f"{face}direct", running, persona=persona, loss=loss)
+        log = running.server.text
+        assert "task 1 completed" in said
+        assert "goto [(0, 2)]" in said
+        mission = re.search(r"mission (\d+)$", said, re.MULTILINE)
+        assert mission is not None, said
+        assert f"vehicle 1: mission {mission[1]}, by" in log
+        assert "task 1 completed" in log
+        for goal in ("move", "go to"):
+            assert log.count(f" of vehicle 1: {goal}") == 1, "sent again, it is the same task"
