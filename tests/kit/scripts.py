@@ -24,7 +24,7 @@ SEED = 20
 TRIES = 8
 
 each_persona = pytest.mark.parametrize("persona", DRIVEN)
-each_face = pytest.mark.parametrize("face", [""], ids=["sync"])
+each_face = pytest.mark.parametrize("face", ["", "asyncio_"], ids=["sync", "asyncio"])
 each_net = pytest.mark.parametrize("loss", [0.0, LOSS], ids=["nothing lost", "a fifth lost"])
 
 
