@@ -11,6 +11,7 @@ from mavsdk.asyncio.plugins.param import ParamAsync
 from tests.interop.scripts.asyncio_common import arm, connected
 from tests.interop.scripts.asyncio_waiting import first
 from tests.interop.scripts.circumstances import Circumstances
+from tests.interop.scripts.facts import LEAD
 from tests.interop.scripts.plans import fence
 
 
@@ -42,6 +43,7 @@ async def setpoints(here: Circumstances, system: Any, telemetry: Any) -> None:
     await arm(here, ActionAsync(system), telemetry)
     plugin = OffboardAsync(system)
     await plugin.set_velocity_body(VelocityBodyYawspeed(0.5, 0.0, 0.0, 0.0))
+    await asyncio.sleep(LEAD)
     await here.attempt_async(plugin.start)
     await first(telemetry.subscribe_velocity_ned(), "motion", lambda v: v.north_m_s > 0.4)
     print("moves")

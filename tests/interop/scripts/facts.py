@@ -13,6 +13,7 @@ TASK_MOVE, TASK_STATUS, REQUEST_MESSAGE, GOTO = 54000, 54000, 512, 192
 COMPLETED = 9  # TASK_STATE
 HOLD, OFFBOARD = 3, 7  # MAVSDK's FlightMode; OFFBOARD is also GUIDED
 NONCE = 54321
+LEAD = 0.5  # s that setpoints are sent before they are to be followed: PX4 asks for it
 
 
 @dataclass(frozen=True)

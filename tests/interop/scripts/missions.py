@@ -37,7 +37,7 @@ def mission(here: Circumstances, system: Any, home: Any) -> None:
     here.attempt(plugin.upload_mission, plan(home))
     print("downloaded", len(here.attempt(plugin.download_mission).mission_items))
     here.attempt(plugin.start_mission)
-    wait_for(lambda: seen[-1][0] >= 1, "the first item")
+    wait_for(lambda: seen and seen[-1][0] >= 1, "the first item")
     here.attempt(plugin.pause_mission)
     here.attempt(plugin.set_current_mission_item, 1)
     here.attempt(plugin.start_mission)

@@ -1,5 +1,6 @@
 """What a MAVSDK script does besides missions: a fence, parameters, setpoints of its own."""
 
+import time
 from typing import Any
 
 from mavsdk.plugins.action import Action
@@ -10,6 +11,7 @@ from mavsdk.plugins.param import Param
 
 from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.common import arm, connected, wait_for
+from tests.interop.scripts.facts import LEAD
 from tests.interop.scripts.plans import fence
 
 
@@ -41,6 +43,7 @@ def setpoints(here: Circumstances, system: Any, telemetry: Any) -> None:
     arm(here, Action(system), telemetry)
     plugin = Offboard(system)
     plugin.set_velocity_body(VelocityBodyYawspeed(0.5, 0.0, 0.0, 0.0))
+    time.sleep(LEAD)
     here.attempt(plugin.start)
     wait_for(lambda: telemetry.velocity_ned().north_m_s > 0.4, "motion")
     print("moves")
