@@ -5,23 +5,33 @@ from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Any, Generic, Self, TypeVar
 
-from tests.interop.scripts.circumstances import PATIENCE
+from tests.interop.scripts.circumstances import PATIENCE, Circumstances
 
 T = TypeVar("T")
 STEP = 0.05  # s
 
 
-async def wait_for(condition: Callable[[], Awaitable[object]], what: str) -> None:
+async def wait_for(
+    condition: Callable[[], Awaitable[object]], what: str, *, within: float = PATIENCE
+) -> None:
     """Ask until it is true; TimeoutError names what did not come.
 
     What is being asked is waited for even then: MAVSDK cannot be torn down in the middle of it.
     """
     loop = asyncio.get_running_loop()
-    end = loop.time() + PATIENCE
+    end = loop.time() + within
     while not await condition():
         if loop.time() > end:
             raise TimeoutError(what)
         await asyncio.sleep(STEP)
+
+
+async def wait_for_end(here: Circumstances, is_finished: Callable[[], Awaitable[object]]) -> None:
+    """Wait for the end of a mission; MAVSDK needs the report of its last item for it."""
+    try:
+        await wait_for(is_finished, "the end", within=here.until_end)
+    except TimeoutError:
+        here.never_told("the end of a mission")
 
 
 async def first(
