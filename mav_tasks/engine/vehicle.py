@@ -358,6 +358,7 @@ class Vehicle:
         self._forget_start()
         present_mode = self._monitor.custom_mode
         self._authority.client_asks(mode, client, present_mode=present_mode, now=now)
+        self.control.hand_over()
         if mode == self.persona.control_mode:
             if self.persona.arms_in_hold and self._authority.streams(client, now=now):
                 # the vehicle enters that mode only in a stream, of which it has not heard yet

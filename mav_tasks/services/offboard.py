@@ -201,6 +201,15 @@ class OffboardControl:
         self.refused = None
         self.we_armed = False
 
+    def hand_over(self) -> None:
+        """Somebody else goes on from the hand-back: HOLD, as long as it is asked for, would undo it.
+
+        What was sent already is heard first; it is not called back.
+        """
+        if self.phase is Phase.RELEASING:
+            self.phase = Phase.IDLE
+            self.we_armed = False
+
     def take(self, *, may_arm: bool, now: float) -> None:
         """Get into control, one step a call; never moves the vehicle.
 

@@ -9,7 +9,7 @@ from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.personas import Mode
+from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.client import ACCEPTED, DENIED, GUIDED, HOLD, RTL, heartbeat, setpoint
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
@@ -31,6 +31,23 @@ def go_there(current: int) -> common.MAVLink_message:
     return common.MAVLink_mission_item_message(
         1, 1, 0, 3, 16, current, 1, 0, 0, 0, nan, 47.39775, 8.545594, 0
     )
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.05, 0.3, 1.2])
+def test_our_mode_asked_for_right_after_hold_is_not_undone(
+    make_world: MakeWorld, gap: float
+) -> None:
+    world = make_world(persona=ARDUPILOT)  # shows a change within a second
+    world.client.mode(HOLD)
+    world.run(gap)
+    world.client.arm(True)
+    sent = world.client.mode(GUIDED)
+    world.run(0.3)
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(3)
+    assert sent.answer is not None
+    assert world.rover.autopilot.mode is Mode.GUIDED
+    assert world.truth.forward_speed > 0.4
 
 
 @pytest.mark.parametrize("command", [MOTOR_TEST, ORBIT, FOLLOW])
