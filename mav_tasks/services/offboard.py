@@ -202,7 +202,7 @@ class OffboardControl:
         self.we_armed = False
 
     def hand_over(self) -> None:
-        """Somebody else goes on from the hand-back: HOLD, as long as it is asked for, would undo it.
+        """Somebody else goes on from the hand-back, and HOLD asked for again would undo it.
 
         What was sent already is heard first; it is not called back.
         """

@@ -13,8 +13,8 @@ from mav_tasks.links.memory import Conditions
 from tests.kit.lossy_udp import lossy_udp
 from tests.kit.processes import STOP_LIMIT, Stand
 
-#: Makes of rover that the server drives.
-DRIVEN = ("ardupilot",)  # px4 and generic come here once it drives them
+#: makes of rover that the server drives
+DRIVEN = ("ardupilot", "px4", "generic")
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 150.0  # s for a script
 LOSS = 0.2  # of the datagrams, each way

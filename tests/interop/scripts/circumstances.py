@@ -7,12 +7,17 @@ MAVSDK ends the script; with more it is the last one.
 import sys
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from io import TextIOWrapper
 from typing import Any, Self
 
 from tests.interop.scripts.facts import PERSONAS, Persona
 
 PATIENCE = 40.0  # s for anything that is waited for
 END = 20.0  # s for the end of a mission, where its report may be lost: longer than it drives
+
+# MAVSDK writes to the same output from threads of its own: each line of ours goes there whole
+assert isinstance(sys.stdout, TextIOWrapper)
+sys.stdout.reconfigure(line_buffering=True, write_through=False)
 
 
 @dataclass(frozen=True)
