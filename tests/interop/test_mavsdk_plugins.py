@@ -9,14 +9,12 @@ import pytest
 
 from tests.interop.scripts.heard import STREAMS
 from tests.kit.processes import stand
-from tests.kit.scripts import each_face, each_net, each_persona, run_script
+from tests.kit.scripts import each_case, run_script
 
 pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(200)]
 
 
-@each_net
-@each_face
-@each_persona
+@each_case
 def test_fence_parameters_and_own_setpoints_work_as_without_a_server(
     persona: str, face: str, loss: float, tmp_path: Path
 ) -> None:
@@ -27,9 +25,7 @@ def test_fence_parameters_and_own_setpoints_work_as_without_a_server(
         assert "task 1" not in running.server.text, "none of it is a task"
 
 
-@each_net
-@each_face
-@each_persona
+@each_case
 def test_every_stream_of_telemetry_comes_and_tells_of_the_drive(
     persona: str, face: str, loss: float, tmp_path: Path
 ) -> None:
@@ -38,9 +34,7 @@ def test_every_stream_of_telemetry_comes_and_tells_of_the_drive(
         assert f"heard {' '.join(STREAMS)}" in said, said
 
 
-@each_net
-@each_face
-@each_persona
+@each_case
 def test_with_our_dialect_each_request_tells_its_task(
     persona: str, face: str, loss: float, tmp_path: Path
 ) -> None:
