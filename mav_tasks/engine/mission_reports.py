@@ -5,6 +5,8 @@ own messages of the mission protocol are withheld meanwhile: two sources would c
 other.
 """
 
+from dataclasses import dataclass
+
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.plan_items import performed
 from mav_tasks.engine.plans import Plans
@@ -23,8 +25,11 @@ from mav_tasks.tasks.events import (
     TaskChanged,
 )
 from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.tasks.task import TaskId
 
 INTERVAL = 1.0  # s, of MISSION_CURRENT
+ENDS_TOLD = 5  # times more that the last item's MISSION_ITEM_REACHED is sent; PX4 does 10
 #: of the vehicle, when the server has its missions
 REPLACED = frozenset(
     {
@@ -40,6 +45,15 @@ REPLACED = frozenset(
 )
 
 
+@dataclass(slots=True)
+class _Last:
+    """The last item that a mission has reached."""
+
+    task_id: TaskId
+    step: int
+    left: int = ENDS_TOLD  # times to say so again, when the mission is over
+
+
 class MissionReports:
     """What clients are told of missions without asking."""
 
@@ -52,6 +66,7 @@ class MissionReports:
         self._plans = plans
         self._claims = settings.claim
         self._next_at = 0.0
+        self._last: dict[int, _Last] = {}  # by vehicle
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -92,12 +107,23 @@ class MissionReports:
         for vehicle in self._vehicles:
             if vehicle.is_heard(now=now):
                 self._tell(vehicle, self._plans.current(vehicle))
+                self._tell_end_again(vehicle)
+
+    def _tell_end_again(self, vehicle: Vehicle) -> None:
+        """Who has missed the last item would take the mission for unfinished for ever."""
+        task, last = self._plans.shown(vehicle), self._last.get(vehicle.system_id)
+        if task is None or last is None or task.id != last.task_id or last.left == 0:
+            return
+        if task.state is TaskState.COMPLETED:
+            last.left -= 1
+            self._tell(vehicle, m.MissionItemReached(last.step))
 
     def _reached(self, event: StepReached, *, now: float) -> None:
         vehicle = self._vehicles.get(event.vehicle)
         if vehicle is None:
             return
         self._tell(vehicle, m.MissionItemReached(event.step))
+        self._last[event.vehicle] = _Last(event.task_id, event.step)
         task = self._book.get(event.task_id) if event.performs else None
         if task is not None:
             item = self._plans.item_of(task, event.step)

@@ -64,6 +64,25 @@ def test_a_plan_waits_until_it_is_started_and_is_driven(world: World) -> None:
     assert (last.seq, last.total, last.state, last.mission_id) == (3, 4, COMPLETE, 1)
 
 
+def test_the_end_is_told_some_times_for_who_has_missed_it(world: World) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(10)
+    assert reached(world.client) == [1, 2, 3, 3, 3, 3, 3, 3]
+
+
+def test_a_mission_that_is_started_again_is_not_told_the_end_of_the_last(world: World) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(1.2)
+    told = len(reached(world.client))
+    assert start(world) == (ACCEPTED, 2)
+    world.run(2.5)
+    assert 3 not in reached(world.client)[told:]
+
+
 def test_at_the_task_server_it_is_queued_at_once_and_so_is_the_next(world: World) -> None:
     first = uploaded(world, place(1, 0), place(1, 1), target=(1, 191))
     second = uploaded(world, place(0, 0), target=(1, 191))
