@@ -99,7 +99,8 @@ class MissionDesks:
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
     ) -> bool:
         """See to a client's message; False: it is not for us."""
-        vehicle = self._vehicles.get(message.target_system)
+        # an item more does nothing to the vehicle: what does touches it
+        vehicle = self._vehicles.look_at(message.target_system)
         if vehicle is None:
             return False
         component = message.target_component or AUTOPILOT
@@ -133,8 +134,10 @@ class MissionDesks:
                     )
                 )
             case m.MissionClearAll():
+                self._vehicles.touch(vehicle)
                 self._clearing.clear(vehicle, sender, message.mission_type, now=now)
             case m.MissionSetCurrent():
+                self._vehicles.touch(vehicle)
                 self._set_current(vehicle, client, sender, message.seq, now=now)
             case m.MissionRequestPartialList() | m.MissionWritePartialList():
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)

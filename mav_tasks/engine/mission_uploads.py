@@ -73,6 +73,7 @@ class MissionUploads:
             if why:
                 self._answers.tell(told.sender, vehicle, why, now=now)
         for upload in uploads:
+            self._vehicles.touch(vehicle)
             self._decide(desk, vehicle, upload, now=now)
 
     def _decide(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
@@ -159,7 +160,7 @@ class MissionUploads:
         *,
         now: float,
     ) -> None:
-        self._vehicles.get(vehicle.system_id)
+        self._vehicles.touch(vehicle)
         self._submissions.take_back(vehicle, task, now=now)
         if task.terms.is_staged:
             self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
@@ -187,7 +188,7 @@ class MissionUploads:
 
         def accept(*, now: float) -> None:
             if kind == MISSION:
-                self._vehicles.get(vehicle.system_id)
+                self._vehicles.touch(vehicle)
                 self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
             self.flush(desk, vehicle, now=now)

@@ -574,8 +574,10 @@ class Vehicle:
         """Whether the place that a goal means is one where it may be, as far as that is known."""
         origin = self._frame.origin
         fence = self.tasks.bounds.local(origin)
+        if fence is None:
+            return True
         place = local_place(self.home if goal.place is None else goal.place, origin)
-        return fence is None or place is None or fence.allows(place)
+        return place is None or fence.allows(place)
 
     def leg_over_fence(self, steps: Sequence[Step]) -> int | None:
         """Give a step of a plan to which the straight way leads over the fence, if there is one."""

@@ -102,6 +102,14 @@ class VehicleSide:
             self._agenda.touch(vehicle)
         return vehicle
 
+    def touch(self, vehicle: Vehicle) -> None:
+        """Note that something is about to be done to a vehicle that was only looked at."""
+        self._agenda.touch(vehicle)
+
+    def look_at(self, system_id: int) -> Vehicle | None:
+        """Give a vehicle to which nothing is done."""
+        return self._vehicles.get(system_id)
+
     def addressed_by(self, system_id: int) -> list[Vehicle]:
         """Give the vehicles that a target_system means, 0 all of them, to do something to them."""
         wanted = sorted(self._vehicles) if system_id == 0 else [system_id]
