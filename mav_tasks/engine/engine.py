@@ -273,6 +273,7 @@ class Engine:
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
                 self._commands.deliver(vehicle, answered, now=now)
+            self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
         events = self._book.take_events()

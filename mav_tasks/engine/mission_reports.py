@@ -23,6 +23,7 @@ from mav_tasks.tasks.events import (
     StepReached,
     TaskAdvanced,
     TaskChanged,
+    VehicleNoted,
 )
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TaskState
@@ -128,6 +129,14 @@ class MissionReports:
         if task is not None:
             item = self._plans.item_of(task, event.step)
             vehicle.perform(performed(item, Address(vehicle.system_id, AUTOPILOT)), now=now)
+
+    def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
+        """Say what the vehicle would not do of what a plan orders; the plan goes on."""
+        for answered in vehicle.requests.take_unperformed():
+            ack, command = answered.ack, answered.command
+            what = "no answer" if ack is None else f"refused, result {ack.result}"
+            words = f"command {command} of a plan: {what}"
+            self._book.record(VehicleNoted(vehicle.system_id, words, now))
 
     def _tell(self, vehicle: Vehicle, message: m.Message) -> None:
         source = Address(vehicle.system_id, AUTOPILOT)

@@ -46,6 +46,7 @@ class VehicleRequests:
         self._answers: list[Answered] = []
         self._uploader = MissionUploader(target)
         self._performed: set[int] = set()  # commands that plans have ordered
+        self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         #: None: how it stops when setpoints stop is known
@@ -185,6 +186,11 @@ class VehicleRequests:
         for answer in answers:
             self._dispatch(answer, now=now)
 
+    def take_unperformed(self) -> list[Answered]:
+        """Give the orders of plans that the vehicle has refused or not answered since."""
+        unperformed, self._unperformed = self._unperformed, []
+        return unperformed
+
     def take_answers(self) -> list[Answered]:
         """Give the answers to clients' commands since the last call."""
         answers, self._answers = self._answers, []
@@ -195,6 +201,9 @@ class VehicleRequests:
             self._answers.append(answer)
         elif is_request_of(answer):
             self.control.answered(answer, now=now)
+        elif answer.command in self._performed:
+            if answer.ack is None or answer.ack.result != MavResult.ACCEPTED:
+                self._unperformed.append(answer)
         elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:
             ack = answer.ack
             self.intervals.answered(

@@ -12,6 +12,7 @@ from mav_tasks.tasks.goal import (
     Goal,
     GoTo,
     Jump,
+    LocalPlace,
     Near,
     Nothing,
     Perform,
@@ -25,6 +26,12 @@ from mav_tasks.tasks.task import Progress, Task
 ON_THE_WAY = (SetSpeed, Perform, Delay, Near)
 SHORT = 1.0  # s; a loop of shorter waits would only keep everybody busy
 END = Wait(0.0)  # past the last step: what is pending is still done
+
+
+def has_local_place(goal: Goal) -> bool:
+    """Whether a goal names a place in the vehicle's own frame, which means nothing in another."""
+    steps = goal.steps if isinstance(goal, Plan) else (goal,)
+    return any(isinstance(step, GoTo) and isinstance(step.place, LocalPlace) for step in steps)
 
 
 def present_goal(goal: Goal, progress: Progress) -> SingleGoal:

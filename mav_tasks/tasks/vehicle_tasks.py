@@ -24,7 +24,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import Plan, Rotate, SingleGoal
-from mav_tasks.tasks.itinerary import goal_of, present_goal, skipped_to
+from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, skipped_to
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
@@ -313,6 +313,11 @@ class VehicleTasks:
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:
         """What is left must be known: measured along its line, or counted until it was held."""
         progress = task.progress
+        if task.reason is R.FRAME_RESET and has_local_place(task.goal):
+            words = (
+                f"places of task {task.id} were in a frame that is lost: run it again, or skip it"
+            )
+            raise Rejection(R.WRONG_STATE, words)
         counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_LINE)
         if not counts_from_here and seen.motion and is_off_line(task, seen.motion.pose):
             words = f"off the line of task {task.id}: run it again from here, or skip it"

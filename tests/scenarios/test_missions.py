@@ -16,7 +16,7 @@ from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, DELAY, SPEED, JUMP, SERVO, TAKEOFF, LAND, OPTIONS = 16, 93, 178, 177, 183, 22, 21, 54014
-START, SET_CURRENT, MOVE = 300, 224, 54000
+START, SET_CURRENT, MOVE, PICTURE = 300, 224, 54000, 2000
 HOME = Item(WAYPOINT, frame=0, current=1)
 NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
 
@@ -311,6 +311,13 @@ def test_a_servo_is_moved_and_a_takeoff_passed_over(world: World) -> None:
     world.until_state(1, S.COMPLETED, within=60)
     assert reached(world.client) == [2, 3, 4]
     assert world.observer.sent_since(0).count(str(SERVO)) == 1
+
+
+def test_what_the_rover_will_not_do_of_a_plan_is_told_and_the_plan_goes_on(world: World) -> None:
+    uploaded(world, HOME, place(1, 0), Item(PICTURE, frame=2, param4=0.0), place(1.5, 0, hold=0.1))
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert "Vehicle 1 command 2000 of a plan: refused, result 3" in world.client.texts()
 
 
 def test_moves_and_turns_can_be_items(world: World) -> None:

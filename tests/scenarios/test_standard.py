@@ -18,6 +18,7 @@ from tests.scenarios.conftest import MakeWorld
 WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
 YAW, SPEED, REPOSITION, YAW_SPEED = 115, 178, 192, 213
 GLOBAL, LOCAL, GLOBAL_RELATIVE_INT = 0, 1, 6
+RELEASE = 54013
 
 
 @pytest.mark.parametrize("target", [(1, 1), (1, 191), (1, 0)])
@@ -204,6 +205,21 @@ def test_another_origin_holds_what_runs(world: World) -> None:
     world.run(0.2)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     world.until(world.stands, within=3)
+
+
+def test_the_remainder_of_a_way_to_a_place_in_a_lost_frame_is_not_driven(world: World) -> None:
+    world.client.command_int(REPOSITION, -1, 1, 0, nan, x=30_000, y=0, frame=LOCAL)
+    world.until(lambda: world.truth.north > 1.0, within=20)
+    moved = common.MAVLink_gps_global_origin_message(-353_600_000, 1_491_600_000, 0)
+    world.from_vehicle_side(moved.pack(common.MAVLink(None, 1, 1)), peer="rover1")
+    world.until_state(1, S.HELD, within=10)
+    world.run(3)
+    remainder = world.client.command(RELEASE, 1, 1)
+    world.run(0.2)
+    assert remainder.answer == (DENIED, R.WRONG_STATE)
+    again = world.client.command(RELEASE, 1, 0)
+    world.run(0.2)
+    assert again.answer == (ACCEPTED, 1)
 
 
 def test_while_stopped_they_wait(world: World) -> None:
