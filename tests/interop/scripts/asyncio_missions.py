@@ -8,7 +8,7 @@ from mavsdk.asyncio.plugins.mission import MissionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 
 from tests.interop.scripts.asyncio_common import arm, connected
-from tests.interop.scripts.asyncio_waiting import Watch, wait_for_end, wait_for_motion
+from tests.interop.scripts.asyncio_waiting import Watch, wait_for, wait_for_motion
 from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.facts import METRES, NAN
 from tests.interop.scripts.plans import places, plan, raw_items
@@ -26,7 +26,7 @@ async def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: An
         await wait_for_motion(telemetry.subscribe_velocity_ned(), moves=False)
         await here.attempt_async(raw.set_current_mission_item, 3)
         await here.attempt_async(raw.start_mission)
-        await wait_for_end(here, raw.is_mission_finished)
+        await wait_for(raw.is_mission_finished, "the end")
         print("raw progress", (progress.seen[-1].current, progress.seen[-1].total))
     await here.attempt_async(raw.clear_mission)
 
@@ -42,7 +42,7 @@ async def mission(here: Circumstances, system: Any, home: Any) -> None:
         await here.attempt_async(plugin.pause_mission)
         await here.attempt_async(plugin.set_current_mission_item, 1)
         await here.attempt_async(plugin.start_mission)
-        await wait_for_end(here, plugin.is_mission_finished)
+        await wait_for(plugin.is_mission_finished, "the end")
         print("progress", [(each.current, each.total) for each in progress.seen])
     await here.attempt_async(plugin.clear_mission)
 

@@ -5,7 +5,7 @@ from collections.abc import AsyncGenerator, Awaitable, Callable
 from contextlib import aclosing
 from typing import Any, Generic, Self, TypeVar
 
-from tests.interop.scripts.circumstances import PATIENCE, Circumstances
+from tests.interop.scripts.circumstances import PATIENCE
 
 T = TypeVar("T")
 STEP = 0.05  # s
@@ -24,14 +24,6 @@ async def wait_for(
         if loop.time() > end:
             raise TimeoutError(what)
         await asyncio.sleep(STEP)
-
-
-async def wait_for_end(here: Circumstances, is_finished: Callable[[], Awaitable[object]]) -> None:
-    """Wait for the end of a mission; MAVSDK needs the report of its last item for it."""
-    try:
-        await wait_for(is_finished, "the end", within=here.until_end)
-    except TimeoutError:
-        here.never_told("the end of a mission")
 
 
 async def first(

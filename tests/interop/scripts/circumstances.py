@@ -13,7 +13,6 @@ from typing import Any, Self
 from tests.interop.scripts.facts import PERSONAS, Persona
 
 PATIENCE = 40.0  # s for anything that is waited for
-END = 20.0  # s for the end of a mission, where its report may be lost: longer than it drives
 
 # MAVSDK writes to the same output from threads of its own: each line of ours goes there whole
 assert isinstance(sys.stdout, TextIOWrapper)
@@ -39,17 +38,6 @@ class Circumstances:
     def is_lossy(self) -> bool:
         """Whether something may get lost: then a report that comes once may not come at all."""
         return self.tries > 1
-
-    def never_told(self, what: str) -> None:
-        """A report has not come, as may be where one that comes once is lost; else an error."""
-        if not self.is_lossy:
-            raise TimeoutError(what)
-        print("never told:", what)
-
-    @property
-    def until_end(self) -> float:
-        """How long to wait for the end of a mission, s."""
-        return END if self.is_lossy else PATIENCE
 
     def attempt(self, operation: Callable[..., Any], *arguments: Any) -> Any:
         """Call it until it succeeds; the last error is raised."""

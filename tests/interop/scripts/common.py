@@ -63,11 +63,3 @@ def arm(here: Circumstances, action: Any, telemetry: Any) -> None:
     here.attempt(action.hold)
     wait_for(lambda: telemetry.flight_mode() == HOLD, "HOLD")
     here.attempt(action.arm)
-
-
-def wait_for_end(here: Circumstances, is_finished: Callable[[], bool]) -> None:
-    """Wait for the end of a mission; MAVSDK needs the report of its last item for it."""
-    try:
-        wait_for(is_finished, "the end", within=here.until_end)
-    except TimeoutError:
-        here.never_told("the end of a mission")

@@ -7,7 +7,7 @@ from mavsdk.plugins.mission import Mission
 from mavsdk.plugins.mission_raw import MissionRaw
 
 from tests.interop.scripts.circumstances import Circumstances
-from tests.interop.scripts.common import arm, connected, wait_for, wait_for_end, wait_for_motion
+from tests.interop.scripts.common import arm, connected, wait_for, wait_for_motion
 from tests.interop.scripts.facts import METRES, NAN
 from tests.interop.scripts.plans import places, plan, raw_items
 
@@ -25,7 +25,7 @@ def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: Any) -> 
     wait_for_motion(telemetry, moves=False)
     here.attempt(raw.set_current_mission_item, 3)
     here.attempt(raw.start_mission)
-    wait_for_end(here, raw.is_mission_finished)
+    wait_for(raw.is_mission_finished, "the end")
     print("raw progress", seen[-1])
     here.attempt(raw.clear_mission)
 
@@ -41,7 +41,7 @@ def mission(here: Circumstances, system: Any, home: Any) -> None:
     here.attempt(plugin.pause_mission)
     here.attempt(plugin.set_current_mission_item, 1)
     here.attempt(plugin.start_mission)
-    wait_for_end(here, plugin.is_mission_finished)
+    wait_for(plugin.is_mission_finished, "the end")
     print("progress", seen)
     here.attempt(plugin.clear_mission)
 

@@ -11,7 +11,7 @@ from mavsdk_grpc.action import ActionError
 from mavsdk_grpc.mission import MissionError, MissionItem, MissionPlan
 from mavsdk_grpc.telemetry import TelemetryError
 
-from tests.interop.scripts.asyncio_waiting import Watch, first, wait_for_end, wait_for_motion
+from tests.interop.scripts.asyncio_waiting import Watch, first, wait_for, wait_for_motion
 from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.facts import METRES, NAN
 
@@ -50,7 +50,7 @@ async def mission(here: Circumstances, rover: System, home: Any) -> None:
     print("downloaded", len(back.mission_items))
     async with Watch(rover.mission.mission_progress()) as progress:
         await here.attempt_async(rover.mission.start_mission)
-        await wait_for_end(here, rover.mission.is_mission_finished)
+        await wait_for(rover.mission.is_mission_finished, "the end")
         print("progress", [(each.current, each.total) for each in progress.seen])
     await here.attempt_async(rover.mission.clear_mission)
 
