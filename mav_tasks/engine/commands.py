@@ -147,7 +147,7 @@ class Commands:
             MavCmd.SET_MESSAGE_INTERVAL,
             MavCmd.GET_MESSAGE_INTERVAL,
         )
-        at_nobody = is_interval and not asked.vehicle.is_own_component(component)
+        at_nobody = is_interval and component not in asked.vehicle.components
         if component in (0, AUTOPILOT) or at_server or at_nobody:
             match asked.command.command:
                 case number if becomes_task(number) and (at_server or self._claims(number)):

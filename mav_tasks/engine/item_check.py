@@ -66,7 +66,7 @@ class ItemCheck:
         count = len(items)
         steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
         wanted = plan_of(items, steps, now=now)
-        forbidden = self._vehicle.leg_over_fence(steps)
+        forbidden = self._vehicle.where.leg_over_fence(steps)
         if forbidden is not None:
             words = f"item {forbidden}: a jump there leads over the fence"
             raise Rejection(R.OUTSIDE_FENCE, words)
@@ -88,16 +88,16 @@ class ItemCheck:
 
     def _check_place(self, step: GoTo, seq: int) -> None:
         """Whether a place is within reach, and it and the way from the one before in the fence."""
-        far, longest = self._vehicle.distance_to(step), self._settings.driving.max_distance
+        far, longest = self._vehicle.where.distance_to(step), self._settings.driving.max_distance
         if far is not None and far > longest:
             words = f"item {seq} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
             raise bad(words, param=5)
-        if not self._vehicle.is_within_fence(step):
+        if not self._vehicle.where.is_within_fence(step):
             raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
         steps: list[Step] = [step]
         for number in range(min(seq, len(self._read)) - 1, -1, -1):  # as far as the last place
             steps.insert(0, self._read[number][1])
             if isinstance(steps[0], GoTo):
                 break
-        if self._vehicle.leg_over_fence(steps) is not None:
+        if self._vehicle.where.leg_over_fence(steps) is not None:
             raise Rejection(R.OUTSIDE_FENCE, f"item {seq}: the way there leads over the fence")

@@ -9,6 +9,7 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import marks_of
 from mav_tasks.engine.plans import MISSION, Plans
+from mav_tasks.engine.start_mark import WAITS as START_WAITS
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -23,6 +24,7 @@ from mav_tasks.tasks.task import Draft, Marks, Submitter
 
 R = TaskReason
 
+SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
 STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
 
 
@@ -144,7 +146,9 @@ class ModeRequests:
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Begin the mission of a vehicle that was to be armed first, if it has just been."""
-        marker = vehicle.take_start(now=now)
+        if not vehicle.start_mark.is_put(now=now) or not vehicle.armed:
+            return
+        marker = None if vehicle.control.is_engaged else vehicle.start_mark.take()
         if marker is None:
             return
         try:
@@ -163,15 +167,16 @@ class ModeRequests:
     def _mark(
         self, vehicle: Vehicle, client: GcsClient, submitter: Submitter, *, now: float
     ) -> None:
-        vehicle.start_when_armed(client.key, submitter, now=now)
+        vehicle.start_mark.put(client.key, submitter, now=now)
         words = "The mission starts when the rover is armed"
         client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
     def _show(self, vehicle: Vehicle, mode: int, *, now: float) -> None:
         """Let clients see a mode at once: who sends SET_MODE is told in no other way."""
-        vehicle.show_mode(mode, now=now)
-        heartbeat = vehicle.heartbeat_shown(now=now)
+        lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
+        vehicle.shown_mode.show(mode, until=now + lasts)
+        heartbeat = vehicle.shown_mode.in_message(vehicle.heartbeat, now=now)
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs:
             if client.knows(vehicle.system_id):
@@ -182,7 +187,9 @@ class ModeRequests:
 
     def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether a mode is the return that we drive ourselves: towards a home that is known."""
-        return self._claims and mode == vehicle.persona.return_mode and vehicle.home is not None
+        return (
+            self._claims and mode == vehicle.persona.return_mode and vehicle.where.home is not None
+        )
 
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""

@@ -6,6 +6,7 @@ instead, a mission or a return, the vehicle would never show.
 
 from math import inf
 
+from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.messages import Heartbeat
 from mav_tasks.mavlink.packet import Packet, with_payload
 
@@ -43,8 +44,10 @@ class ShownMode:
             mavlink_version=heartbeat.mavlink_version,
         )
 
-    def applied(self, heartbeat: Packet, *, now: float) -> Packet:
-        """Give a heartbeat of the vehicle as clients are to see it."""
+    def applied(self, packet: Packet, *, now: float) -> Packet:
+        """Give a packet of the vehicle as clients are to see it."""
         if now >= self._until:
-            return heartbeat
-        return with_payload(heartbeat, CUSTOM_MODE, self._mode.to_bytes(BYTES, "little"))
+            return packet
+        if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
+            return packet
+        return with_payload(packet, CUSTOM_MODE, self._mode.to_bytes(BYTES, "little"))

@@ -78,7 +78,7 @@ class Submissions:
         self._check_reach(vehicle, goal)
         draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)
         known = self._recollection.known(
-            draft, confirmation=command.confirmation, origin=vehicle.origin, now=now
+            draft, confirmation=command.confirmation, origin=vehicle.where.origin, now=now
         )
         if known is not None:
             self._answer_repeat(asked, known, now=now)
@@ -93,7 +93,7 @@ class Submissions:
     def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
         """Take in a task that runs at once; Rejection says why not."""
         known = self._recollection.known(
-            draft, confirmation=0, origin=asked.vehicle.origin, now=now
+            draft, confirmation=0, origin=asked.vehicle.where.origin, now=now
         )
         if known is not None:
             self._answer_repeat(asked, known, now=now)
@@ -104,7 +104,9 @@ class Submissions:
 
     def run_unasked(self, vehicle: Vehicle, draft: Draft, *, actor: str, now: float) -> None:
         """The same for what no acknowledgement is expected of."""
-        known = self._recollection.known(draft, confirmation=0, origin=vehicle.origin, now=now)
+        known = self._recollection.known(
+            draft, confirmation=0, origin=vehicle.where.origin, now=now
+        )
         if known is None:
             self.check_new(vehicle)
             task = vehicle.run_now(draft, actor=actor, now=now)
@@ -162,18 +164,20 @@ class Submissions:
         """A slip of a digit in a place is a drive that nobody meant."""
         if not isinstance(goal, GoTo):
             return
-        far = vehicle.distance_to(goal)
+        far = vehicle.where.distance_to(goal)
         longest = self._settings.driving.max_distance
         if far is not None and far > longest:
             words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
             raise Rejection(R.BAD_PARAMETER, words)
-        if not vehicle.is_within_fence(goal):
+        if not vehicle.where.is_within_fence(goal):
             raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
 
     def check_new(self, vehicle: Vehicle) -> None:
         """Raise Rejection while no new task is taken in for a vehicle."""
         self.check_open()
-        vehicle.check_stops_by_itself()
+        why = vehicle.requests.loss_failsafe.why_off
+        if why:
+            raise Rejection(R.NOT_ALLOWED, f"the rover would drive on without setpoints: {why}")
 
     def check_open(self) -> None:
         """Raise Rejection while nothing new is taken in."""

@@ -4,20 +4,21 @@ Its rule of order: STOP before everything; what somebody else did to the vehicle
 want; and no setpoint at all to a vehicle that is not ours.
 """
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from dataclasses import replace
 from math import inf
 
 from mav_tasks.engine.authority import Authority
-from mav_tasks.engine.frame_monitor import FrameMonitor, Seen
+from mav_tasks.engine.components import Components
+from mav_tasks.engine.frame_monitor import Seen
 from mav_tasks.engine.hold_before import HoldBefore
-from mav_tasks.engine.motion_monitor import MotionMonitor, is_finite
+from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.shown_mode import ShownMode
-from mav_tasks.engine.start_mark import WAITS as START_WAITS
-from mav_tasks.engine.start_mark import Marker, StartMark
+from mav_tasks.engine.start_mark import StartMark
 from mav_tasks.engine.vehicle_requests import VehicleRequests
+from mav_tasks.engine.whereabouts import Whereabouts
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -30,16 +31,12 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
-from mav_tasks.tasks.frames import local_place
-from mav_tasks.tasks.goal import GlobalPlace, GoTo, Step
-from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
 RUNNING = frozenset({TaskState.STARTING, TaskState.EXECUTING, TaskState.CANCELLING})
-SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
@@ -83,8 +80,7 @@ class Vehicle:
         self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
         self._book = book
         self._settings = settings
-        self._motion = MotionMonitor(settings.watch)
-        self._frame = FrameMonitor()
+        self.where = Whereabouts(settings.watch, tasks.bounds)
         self._monitor = HeartbeatMonitor(
             heartbeat, lost_after=settings.watch.heartbeat_lost, now=now
         )
@@ -95,11 +91,11 @@ class Vehicle:
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
         self._hold_before = HoldBefore()
-        self._start_mark = StartMark()
-        self._shown_mode = ShownMode()
-        self._own_components: set[int] = set()
-        #: the task server's address inside this vehicle's system
-        self.server_address = self._free_address()
+        #: whether its mission begins when it is armed
+        self.start_mark = StartMark()
+        #: what its heartbeats say towards clients
+        self.shown_mode = ShownMode()
+        self.components = Components(system_id, first=settings.identity.component_id)
 
     def __repr__(self) -> str:
         return f"Vehicle({self.system_id}, {self.control!r}, {self.tasks!r})"
@@ -107,12 +103,22 @@ class Vehicle:
     @property
     def server_component(self) -> int:
         """The component id under which the task server appears inside this vehicle's system."""
-        return self.server_address.component_id
+        return self.components.server.component_id
+
+    @property
+    def server_address(self) -> Address:
+        """The task server's address inside this vehicle's system."""
+        return self.components.server
 
     @property
     def armed(self) -> bool:
         """Whether the vehicle was last seen armed."""
         return self._monitor.armed
+
+    @property
+    def heartbeat(self) -> m.Heartbeat:
+        """What it said last."""
+        return self._monitor.latest
 
     @property
     def _is_by_hand(self) -> bool:
@@ -162,8 +168,8 @@ class Vehicle:
             if not is_finite(message):
                 return
             # read after a delay, it may have come at any time since
-            self._motion.receive(message, now=min(now, self._clock.next_at))
-            if self._motion.rebooted:
+            self.where.motion.receive(message, now=min(now, self._clock.next_at))
+            if self.where.motion.rebooted:
                 self._rebooted(now=now)
             self._receive_of_frame(message, now=now)
             if not self._clock.is_running and not self.tasks.is_idle:
@@ -179,34 +185,18 @@ class Vehicle:
             self.requests.is_identified = True
 
     def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
-        failsafe = self.requests.loss_failsafe
-        if failsafe is not None:
-            failsafe.receive(message)
-            self._note_failsafe(now=now)
+        self.requests.loss_failsafe.receive(message)
+        self._note_failsafe(now=now)
 
     def _note_failsafe(self, *, now: float) -> None:
-        failsafe = self.requests.loss_failsafe
-        if failsafe is None or not failsafe.changed:
-            return
-        failsafe.changed = False
-        if failsafe.is_unknown:
-            self._note("does not say whether it stops when setpoints stop", now=now)
-        elif failsafe.why_off:
-            self._note(f"would drive on without setpoints: {failsafe.why_off}", now=now)
-        else:
-            self._note("stops when setpoints stop", now=now)
-
-    def check_stops_by_itself(self) -> None:
-        """Raise Rejection where the vehicle is known to drive on when setpoints stop."""
-        failsafe = self.requests.loss_failsafe
-        if failsafe is not None and failsafe.why_off:
-            words = f"the rover would drive on without setpoints: {failsafe.why_off}"
-            raise Rejection(TaskReason.NOT_ALLOWED, words)
+        news = self.requests.loss_failsafe.take_news()
+        if news:
+            self._note(news, now=now)
 
     def _receive_of_frame(self, message: Seen, *, now: float) -> None:
-        self._frame.receive(message, now=now)
-        if self._frame.changed:
-            self._frame.changed = False
+        self.where.frame.receive(message, now=now)
+        if self.where.frame.changed:
+            self.where.frame.changed = False
             self._note("has another origin", now=now)
             self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
@@ -266,11 +256,9 @@ class Vehicle:
 
     def _rebooted(self, *, now: float) -> None:
         """Its frame may be another one now, and nothing of ours is in force there."""
-        self._motion.forget()
-        self._frame.forget()
+        self.where.forget()
         self.requests.intervals.ask_all_again()
-        if self.requests.loss_failsafe is not None:
-            self.requests.loss_failsafe.forget()
+        self.requests.loss_failsafe.forget()
         self._note("restarted", now=now)
         if not self.tasks.is_stopped:
             if self.control.is_engaged:
@@ -299,24 +287,10 @@ class Vehicle:
             self.requests.send_zero()
 
     def _note_component(self, component_id: int, *, now: float) -> None:
-        if component_id in self._own_components:
-            return
         before = self.server_component
-        self._own_components.add(component_id)
-        self.server_address = self._free_address()
-        if self.server_component != before:
-            self._note(
-                f"component {before} is its own; tasks are at {self.server_component}", now=now
-            )
-
-    def is_own_component(self, component_id: int) -> bool:
-        """Whether the vehicle has such a component besides its autopilot, as far as was heard."""
-        return component_id in self._own_components
-
-    def _free_address(self) -> Address:
-        first = self._settings.identity.component_id
-        free = (c for c in range(first, first + 4) if c not in self._own_components)
-        return Address(self.system_id, next(free, first))
+        if component_id not in self.components and self.components.note(component_id):
+            words = f"component {before} is its own; tasks are at {self.server_component}"
+            self._note(words, now=now)
 
     # what clients ask for, beyond tasks
 
@@ -326,7 +300,7 @@ class Vehicle:
         """Forward a client's command; its answer comes from ``requests``."""
         asked = getattr(message, "target_component", 0)
         # an autopilot answers for every component that is not there, and does as it was told
-        target = asked if asked in self._own_components else AUTOPILOT
+        target = asked if asked in self.components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
         if command == MavCmd.COMPONENT_ARM_DISARM and not disarms:
             self._authority.client_arms(now=now)
@@ -368,34 +342,9 @@ class Vehicle:
         if self.control.is_taking:
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
 
-    def start_when_armed(self, client: Hashable, submitter: Submitter, *, now: float) -> None:
-        """A client asks a disarmed vehicle for its mission: it begins when it is armed soon."""
-        self._start_mark.put(client, submitter, now=now)
-
-    def take_start(self, *, now: float) -> Marker | None:
-        """Give who wanted the mission to begin now that it is armed, once; None: nobody."""
-        if not self._start_mark.is_put(now=now) or not self.armed or self.control.is_engaged:
-            return None
-        return self._start_mark.take()
-
     def _forget_start(self) -> None:
-        self._start_mark.remove()
-        self._shown_mode.forget()
-
-    def show_mode(self, mode: int, *, now: float) -> None:
-        """Let clients see a mode that they have asked for, and that we are ourselves."""
-        is_put = self._start_mark.is_put(now=now)
-        self._shown_mode.show(mode, until=now + (START_WAITS if is_put else SHOWN_FOR))
-
-    def as_shown(self, packet: Packet, *, now: float) -> Packet:
-        """Give a packet of this vehicle as clients are to see it."""
-        if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
-            return packet
-        return self._shown_mode.applied(packet, now=now)
-
-    def heartbeat_shown(self, *, now: float) -> m.Heartbeat:
-        """Give its latest heartbeat as clients are to see it."""
-        return self._shown_mode.in_message(self._monitor.latest, now=now)
+        self.start_mark.remove()
+        self.shown_mode.forget()
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
@@ -403,7 +352,7 @@ class Vehicle:
             return
         if self._authority.since_other(now=now) < self._settings.watch.other_controller:
             raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
-        if not self._motion.is_still(now=now):
+        if not self.where.motion.is_still(now=now):
             raise Rejection(TaskReason.WRONG_MODE, "driven by hand: it must stand first")
 
     def leave_manual(self, *, now: float) -> None:
@@ -551,38 +500,6 @@ class Vehicle:
         self.step(now=now)
         return task
 
-    @property
-    def origin(self) -> GlobalPlace | None:
-        """Where the vehicle's local frame begins on earth, if that is known."""
-        return self._frame.origin
-
-    @property
-    def home(self) -> GlobalPlace | None:
-        """Where the vehicle returns to: the nearest rally point, else the home that it has said."""
-        bounds = self.tasks.bounds
-        motion = self._motion.latest() if bounds.rally else None
-        rally = None if motion is None else bounds.refuge(motion.pose, self._frame.origin)
-        return rally or self._frame.home
-
-    def distance_to(self, goal: GoTo) -> float | None:
-        """Give the metres to the place that a goal means, or None while that is not known."""
-        motion, origin = self._motion.latest(), self._frame.origin
-        place = local_place(self.home if goal.place is None else goal.place, origin)
-        return None if motion is None or place is None else distance(motion.pose, place)
-
-    def is_within_fence(self, goal: GoTo) -> bool:
-        """Whether the place that a goal means is one where it may be, as far as that is known."""
-        origin = self._frame.origin
-        fence = self.tasks.bounds.local(origin)
-        if fence is None:
-            return True
-        place = local_place(self.home if goal.place is None else goal.place, origin)
-        return place is None or fence.allows(place)
-
-    def leg_over_fence(self, steps: Sequence[Step]) -> int | None:
-        """Give a step of a plan to which the straight way leads over the fence, if there is one."""
-        return self.tasks.bounds.forbidden_leg(steps, self._frame.origin)
-
     def operator_lost(self, *, now: float) -> None:
         """No ground station is heard any more: nothing runs unseen."""
         begun = self.tasks.begun
@@ -695,15 +612,14 @@ class Vehicle:
             may_arm=self._authority.may_arm,
             in_control=self.control.in_control,
             refusal=REFUSALS[self.control.refused],
-            motion=self._motion.latest(),
-            still=self._motion.is_still(now=now),
+            motion=self.where.motion.latest(),
+            still=self.where.motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,
-            frame=self._frame.frame(),
-            home=self.home,
-            is_fence_unknown=self.tasks.bounds.is_unknown(self._frame.origin),
+            frame=self.where.frame.frame(),
+            home=self.where.home,
+            is_fence_unknown=self.where.is_fence_unknown,
             turns_on_spot=self.persona.turns_on_spot,
-            drives_on=self.requests.loss_failsafe is not None
-            and bool(self.requests.loss_failsafe.why_off),
+            drives_on=bool(self.requests.loss_failsafe.why_off),
         )
 
     def apply(self, settings: Settings) -> None:

@@ -49,8 +49,7 @@ class VehicleRequests:
         self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
-        #: None: how it stops when setpoints stop is known
-        self.loss_failsafe = LossFailsafe(target) if persona.has_loss_parameters else None
+        self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_parameters)
         self._versions_asked = 0
         self._ask_version_at = now
         #: whether the vehicle has said which one it is
@@ -144,9 +143,8 @@ class VehicleRequests:
 
     def ask_for_failsafe(self) -> None:
         """Ask whether the vehicle stops by itself, some times, until it has said so."""
-        if self.loss_failsafe is not None:
-            for request in self.loss_failsafe.requests():
-                self._outlet.send(request, self._source)
+        for request in self.loss_failsafe.requests():
+            self._outlet.send(request, self._source)
 
     def ask_which(self, *, now: float) -> None:
         """Ask which vehicle it is, some times, until it has said so."""

@@ -12,18 +12,18 @@ AFTER, ACTION = "COM_OF_LOSS_T", "COM_OBL_RC_ACT"  # s; what is done then
 DISABLED = -1  # an action, of versions before 1.14
 LONGEST = 5.0  # s that a vehicle may drive on without setpoints; ArduPilot takes 3
 ASKS = 10  # times that a parameter is asked for
+NEVER = ASKS + 1
 REAL32 = 9  # MAV_PARAM_TYPE; an integer's bytes stand in the float
 
 
 class LossFailsafe:
     """What is known of one vehicle's failsafe."""
 
-    def __init__(self, target: Address) -> None:
+    def __init__(self, target: Address, *, is_by_parameters: bool) -> None:
         self._target = target
         self._values: dict[str, float] = {}
-        self._asked = 0
-        #: its parameters have changed what ``why_off`` gives, or were asked for in vain
-        self.changed = False
+        self._asked = 0 if is_by_parameters else NEVER
+        self._has_changed = False  # what ``why_off`` gives, or they were asked for in vain
 
     def __repr__(self) -> str:
         return f"LossFailsafe({self._values})"
@@ -31,7 +31,7 @@ class LossFailsafe:
     @property
     def is_unknown(self) -> bool:
         """Whether it was asked for, and did not say."""
-        return self._asked >= ASKS and len(self._values) < len((AFTER, ACTION))
+        return self._asked == ASKS and len(self._values) < len((AFTER, ACTION))
 
     @property
     def why_off(self) -> str:
@@ -49,11 +49,13 @@ class LossFailsafe:
         if not missing or self._asked >= ASKS:
             return []
         self._asked += 1
-        self.changed = self.changed or self.is_unknown
+        self._has_changed = self._has_changed or self.is_unknown
         return [ParamRequestRead(*self._target, name.encode(), -1) for name in missing]
 
     def receive(self, message: ParamValue) -> None:
         """Take in a parameter of the vehicle; whoever asked for it, or changed it."""
+        if self._asked == NEVER:
+            return
         name = _text(message.param_id)
         if name not in (AFTER, ACTION):
             return
@@ -64,11 +66,23 @@ class LossFailsafe:
             return
         before = self.why_off
         self._values[name] = float(value)
-        self.changed = self.changed or self.why_off != before
+        self._has_changed = self._has_changed or self.why_off != before
+
+    def take_news(self) -> str:
+        """Give in words what is known anew, "" if nothing is."""
+        if not self._has_changed:
+            return ""
+        self._has_changed = False
+        if self.is_unknown:
+            return "does not say whether it stops when setpoints stop"
+        if self.why_off:
+            return f"would drive on without setpoints: {self.why_off}"
+        return "stops when setpoints stop"
 
     def forget(self) -> None:
         """The vehicle has restarted."""
-        self._asked = 0
+        if self._asked != NEVER:
+            self._asked = 0
 
 
 def _text(param_id: str | bytes) -> str:

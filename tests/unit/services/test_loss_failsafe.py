@@ -8,6 +8,7 @@ from mav_tasks.services.loss_failsafe import ASKS, LossFailsafe
 
 AFTER, ACTION = "COM_OF_LOSS_T", "COM_OBL_RC_ACT"
 REAL32, INT32 = 9, 6
+UNKNOWN = "does not say whether it stops when setpoints stop"
 
 
 def value(name: str, number: float) -> ParamValue:
@@ -20,7 +21,7 @@ def value(name: str, number: float) -> ParamValue:
 
 
 def failsafe(*values: ParamValue) -> LossFailsafe:
-    made = LossFailsafe(Address(1, 1))
+    made = LossFailsafe(Address(1, 1), is_by_parameters=True)
     for each in values:
         made.receive(each)
     return made
@@ -40,7 +41,7 @@ def test_one_that_never_says_is_unknown_and_not_asked_for_ever() -> None:
     asked = [made.requests() for _ in range(ASKS + 3)]
     assert [len(each) for each in asked] == [2] * ASKS + [0] * 3
     assert made.is_unknown
-    assert made.changed
+    assert (made.take_news(), made.take_news()) == (UNKNOWN, "")
     assert made.why_off == ""
 
 
@@ -57,16 +58,15 @@ def test_one_that_never_says_is_unknown_and_not_asked_for_ever() -> None:
 def test_whether_it_stops_by_itself(after: float, action: int, why: str) -> None:
     made = failsafe(value(AFTER, after), value(ACTION, action))
     assert made.why_off == why
-    assert made.changed is bool(why)
+    assert made.take_news() == (f"would drive on without setpoints: {why}" if why else "")
 
 
 def test_a_change_by_anybody_is_noticed() -> None:
     made = failsafe(value(AFTER, 1.0), value(ACTION, 5))
     made.receive(value(AFTER, 30.0))
-    assert (made.changed, bool(made.why_off)) == (True, True)
-    made.changed = False
+    assert made.take_news().startswith("would drive on")
     made.receive(value(AFTER, 2.0))
-    assert (made.changed, made.why_off) == (True, "")
+    assert (made.take_news(), made.why_off) == ("stops when setpoints stop", "")
 
 
 def test_other_parameters_mean_nothing() -> None:
@@ -79,3 +79,10 @@ def test_after_a_restart_what_is_missing_is_asked_for_again() -> None:
         made.requests()
     made.forget()
     assert len(made.requests()) == 2
+
+
+def test_of_one_that_stops_anyhow_nothing_is_asked_or_believed() -> None:
+    made = LossFailsafe(Address(1, 1), is_by_parameters=False)
+    made.receive(value(AFTER, 60.0))
+    made.forget()
+    assert (made.requests(), made.why_off, made.take_news()) == ([], "", "")
