@@ -35,7 +35,7 @@ class Watch:
     position_lost: float = 1.0  # older data than this pauses the task, POSITION_LOST
     heartbeat_lost: float = 3.5  # silent after three missed beats and some jitter; QGroundControl's
     late_tick: float = 0.5  # a setpoint tick later than this holds the task, LATE
-    start_timeout: float = 5.0  # from STARTING to in control
+    start_timeout: float = 8.0  # from STARTING to in control; PX4 takes four heartbeats
     ask_vehicle: float = 1.0  # arm and mode requests are repeated for at most this long
     lost_timeout: float = 30.0  # paused LINK_LOST or POSITION_LOST for longer than this fails
     fresh_before_resume: float = 2.0  # of good data, before a lost task resumes by itself

@@ -210,9 +210,26 @@ class Commands:
         if is_reposition and place_in(asked.command) is None:
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
         else:
+            held_at = asked.vehicle.hold_before.since
+            # a copy of a "go to" from before a HOLD says nothing about that
+            is_older = asked.receiver.older_copy(asked.command, before=held_at, now=now)
             self._submissions.submit(asked, now=now)
-            if is_reposition:
-                asked.vehicle.go_to_follows(asked.client.key, actor=asked.actor, now=now)
+            if is_reposition and not is_older:
+                self._undo_hold_before(asked, now=now)
+
+    def _undo_hold_before(self, asked: Asked, *, now: float) -> None:
+        vehicle = asked.vehicle
+        number = vehicle.hold_before.undoing(asked.client.key, now=now)
+        if number is None:
+            return
+
+        def undo(*, now: float) -> None:
+            vehicle.go_to_follows(number, actor=asked.actor, now=now)
+
+        def leave(*, now: float) -> None:
+            """It was not stored in time."""
+
+        self._submissions.when_durable(undo, leave, now=now)
 
     def cancel_latest(
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float

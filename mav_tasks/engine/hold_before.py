@@ -17,6 +17,9 @@ class HoldBefore:
         self._client: Hashable = None
         self._until = -inf
         self._has_paused = False
+        self._number = 0  # of wishes: which one a promise to undo was about
+        #: when the first of those HOLDs came that are one and the same
+        self.since = -inf
 
     def __repr__(self) -> str:
         return f"HoldBefore({self._client}, until={self._until:.2f})"
@@ -28,6 +31,9 @@ class HoldBefore:
         """
         if client == self._client and self.is_open(now=now):
             has_paused = has_paused or self._has_paused
+        else:
+            self.since = now
+        self._number += 1
         self._client, self._has_paused, self._until = client, has_paused, now + WAITS
 
     def is_open(self, *, now: float) -> bool:
@@ -36,11 +42,19 @@ class HoldBefore:
 
     def forget(self) -> None:
         """Something else has been wished for since."""
+        self._number += 1
         self._until = -inf
 
-    def is_undone_by(self, client: Hashable, *, now: float) -> bool:
-        """Whether a "go to" of this client shows that the pause was not meant; asked once."""
-        undone = self._has_paused and client == self._client and self.is_open(now=now)
-        if client == self._client:
-            self.forget()
-        return undone
+    def undoing(self, client: Hashable, *, now: float) -> int | None:
+        """A "go to" of this client is being taken in: it may show that the pause was not meant.
+
+        Gives what ``is_still`` is asked with when it has been; None: it undoes nothing.
+        """
+        if client != self._client or not self.is_open(now=now):
+            return None
+        self.forget()
+        return self._number if self._has_paused else None
+
+    def is_still(self, number: int) -> bool:
+        """Whether nothing else has been wished for since."""
+        return number == self._number

@@ -148,9 +148,15 @@ class ModeRequests:
         """Begin the mission of a vehicle that was to be armed first, if it has just been."""
         if not vehicle.start_mark.is_put(now=now) or not vehicle.armed:
             return
-        marker = None if vehicle.control.is_engaged else vehicle.start_mark.take()
-        if marker is None:
+        if vehicle.control.is_engaged or vehicle.control.we_armed:
+            return  # armed by ourselves, for a task
+        marker = vehicle.start_mark.take()
+        vehicle.shown_mode.forget()
+        plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
+        if marker is None or marker.plan_id != plan_id:
             return
+        if vehicle.is_by_hand and not vehicle.is_armed_by_client(now=now):
+            return  # by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, now=now)
         except Rejection as refusal:
@@ -167,7 +173,8 @@ class ModeRequests:
     def _mark(
         self, vehicle: Vehicle, client: GcsClient, submitter: Submitter, *, now: float
     ) -> None:
-        vehicle.start_mark.put(client.key, submitter, now=now)
+        plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
+        vehicle.start_mark.put(client.key, submitter, plan_id=plan_id, now=now)
         words = "The mission starts when the rover is armed"
         client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)

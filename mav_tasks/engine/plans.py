@@ -91,6 +91,8 @@ class Plans:
 
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
         """Let a plan take the place of the one before; NOTHING: there is none any more."""
+        if kind == MISSION and stored.items != self.stored(vehicle.system_id, MISSION).items:
+            vehicle.forget_start()
         self._stored[vehicle.system_id, kind] = stored
         self._apply_bounds(vehicle.system_id, kind, stored.items)
         source = packed(stored.items)

@@ -18,6 +18,7 @@ class Marker(NamedTuple):
 
     client: Hashable
     submitter: Submitter
+    plan_id: int  # as clients knew it then
 
 
 class StartMark:
@@ -30,14 +31,19 @@ class StartMark:
     def __repr__(self) -> str:
         return f"StartMark({self._marker}, until={self._until:.2f})"
 
-    def put(self, client: Hashable, submitter: Submitter, *, now: float) -> None:
+    def put(self, client: Hashable, submitter: Submitter, *, plan_id: int, now: float) -> None:
         """A client wants it, and has not armed yet."""
-        self._marker = Marker(client, submitter)
+        self._marker = Marker(client, submitter, plan_id)
         self._until = now + WAITS
 
     def is_put(self, *, now: float) -> bool:
         """Whether somebody wants it still."""
         return self._marker is not None and now < self._until
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether somebody wants it, or did and nobody armed in time."""
+        return self._marker is not None
 
     def remove(self) -> None:
         """Something else was wished for since."""

@@ -90,7 +90,8 @@ class Vehicle:
         self._was_heard = True
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
-        self._hold_before = HoldBefore()
+        #: a HOLD that a "go to" may undo
+        self.hold_before = HoldBefore()
         #: whether its mission begins when it is armed
         self.start_mark = StartMark()
         #: what its heartbeats say towards clients
@@ -121,7 +122,8 @@ class Vehicle:
         return self._monitor.latest
 
     @property
-    def _is_by_hand(self) -> bool:
+    def is_by_hand(self) -> bool:
+        """Whether it is in a mode in which a person drives."""
         return self._monitor.custom_mode in self.persona.manual_modes
 
     @property
@@ -147,12 +149,19 @@ class Vehicle:
         """A vehicle of an earlier run is heard: first of all it stands, if we left it driving."""
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
-        elif was_driven and self._monitor.custom_mode == self.persona.control_mode:
+        elif was_driven and self._may_still_be_driven:
             self.control.begin_release(now=now)
             self.requests.flush(now=now)
             self._plan_tick(now=now)
         elif was_driven:
             self.requests.send_zero()
+
+    @property
+    def _may_still_be_driven(self) -> bool:
+        """Whether it follows setpoints, or would if one came: it holds because they were lost."""
+        mode, persona = self._monitor.custom_mode, self.persona
+        is_lost = persona.has_loss_failsafe and mode == persona.hold_mode
+        return is_lost or mode == persona.control_mode
 
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:
         """Take in a message that the server itself makes use of."""
@@ -237,7 +246,11 @@ class Vehicle:
             self._rebooted(now=now)
         elif not ours and was_mode != booting:
             self._authority.withdraw_arming()
+            may_be_lost = self.control.is_streaming and mode == self.persona.hold_mode
             self._take_over(f"mode is {self.persona.mode_name(mode)}", now=now)
+            if may_be_lost and self.persona.has_loss_failsafe:
+                self.control.ask_to_stay(now=now)
+                self.requests.flush(now=now)
 
     def _mode_changed_in_spite_of_stop(self, mode: int, *, now: float) -> None:
         """A request from before the STOP was late. Later, it is a person at the vehicle."""
@@ -259,6 +272,7 @@ class Vehicle:
         self.where.forget()
         self.requests.intervals.ask_all_again()
         self.requests.loss_failsafe.forget()
+        self.forget_start()
         self._note("restarted", now=now)
         if not self.tasks.is_stopped:
             if self.control.is_engaged:
@@ -270,8 +284,8 @@ class Vehicle:
         """Somebody else has the vehicle: let go, and let the queue stand if a task has begun."""
         if self.tasks.is_stopped:
             return
-        self._hold_before.forget()
-        self._forget_start()
+        self.hold_before.forget()
+        self.forget_start()
         self.control.lose()
         self.requests.end_performing()
         begun = self.tasks.begun
@@ -329,12 +343,13 @@ class Vehicle:
         Our own mode then counts as set by us. Any other one is a takeover, believed when a
         heartbeat shows it; but nothing that we still ask for may work against it.
         """
-        self._forget_start()
+        self.forget_start()
         present_mode = self._monitor.custom_mode
         self._authority.client_asks(mode, client, present_mode=present_mode, now=now)
         self.control.hand_over()
         if mode == self.persona.control_mode:
-            if self.persona.arms_in_hold and self._authority.streams(client, now=now):
+            streams = self._authority.streams(client, now=now)
+            if self.persona.arms_in_hold and streams and self.may_move(client):
                 # the vehicle enters that mode only in a stream, of which it has not heard yet
                 self.requests.send_zero()
                 self.requests.send_zero()
@@ -342,13 +357,19 @@ class Vehicle:
         if self.control.is_taking:
             self._take_over(f"client asks for {self.persona.mode_name(mode)}", now=now)
 
-    def _forget_start(self) -> None:
-        self.start_mark.remove()
-        self.shown_mode.forget()
+    def is_armed_by_client(self, *, now: float) -> bool:
+        """Whether a client has asked for arming, through us, just now."""
+        return self._authority.armed_by_client(now=now)
+
+    def forget_start(self) -> None:
+        """The mission that was to begin when it is armed is another one now, or is not wanted."""
+        if self.start_mark.is_marked:
+            self.start_mark.remove()
+            self.shown_mode.forget()
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
-        if not (self.armed and self._is_by_hand):
+        if not (self.armed and self.is_by_hand):
             return
         if self._authority.since_other(now=now) < self._settings.watch.other_controller:
             raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
@@ -360,7 +381,7 @@ class Vehicle:
 
         By way of HOLD, from which tasks take the vehicle.
         """
-        if self.armed and self._is_by_hand and not self.control.is_engaged:
+        if self.armed and self.is_by_hand and not self.control.is_engaged:
             self.control.begin_release(now=now)
             self.requests.flush(now=now)
             self._clock.restart(now=now)
@@ -403,16 +424,15 @@ class Vehicle:
         if self.control.phase is Phase.STOPPING:
             return
         if self.control.is_engaged:
-            self.requests.send_zero()
             self.requests.send_hold()
+            self.requests.send_zero()
         if self.tasks.begun is not None or self.control.is_engaged:
             self._take_over(f"second controller {who}", now=now)
 
-    def go_to_follows(self, client: Hashable, *, actor: str, now: float) -> None:
-        """A client's "go to" was taken in: a HOLD of it just before was none."""
-        if not self._hold_before.is_undone_by(client, now=now):
-            return
-        if self.tasks.paused is not TaskReason.OPERATOR:
+    def go_to_follows(self, number: int, *, actor: str, now: float) -> None:
+        """A client's "go to" is stored: a HOLD of it just before was none."""
+        is_still = self.hold_before.is_still(number)
+        if not is_still or self.tasks.paused is not TaskReason.OPERATOR:
             return
         try:
             self.go_on(actor=actor, now=now)
@@ -421,8 +441,8 @@ class Vehicle:
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: zero and HOLD leave in this very step."""
-        self._hold_before.forget()
-        self._forget_start()
+        self.hold_before.forget()
+        self.forget_start()
         self._authority.revoke()
         self.stopped_at = now
         killed = self.tasks.stop(clear=clear, actor=actor, now=now)
@@ -447,12 +467,12 @@ class Vehicle:
         was_paused, paused = self.tasks.paused, None
         if not self.tasks.is_empty:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
-        self._forget_start()
+        self.forget_start()
         if self.persona.is_held_before_places and self.control.phase is Phase.CONTROL:
-            self._hold_before.note(client, has_paused=not was_paused, now=now)
+            self.hold_before.note(client, has_paused=not was_paused, now=now)
             self.step(now=now)
             return paused
-        self._hold_before.forget()
+        self.hold_before.forget()
         self.control.begin_release(now=now)
         self.requests.flush(now=now)
         self._clock.restart(now=now)
@@ -460,7 +480,8 @@ class Vehicle:
 
     def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
         """Call a task off; if it is the begun one, zeros leave in this very step."""
-        self._hold_before.forget()
+        self.hold_before.forget()
+        self.forget_start()
         begun = self.tasks.begun
         is_begun = begun is not None and begun.id == task.id
         self.tasks.cancel(task, kill=kill, reason=TaskReason.CANCELLED, actor=actor, now=now)
@@ -470,7 +491,8 @@ class Vehicle:
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
         """Call off what waits, or everything."""
-        self._hold_before.forget()
+        self.hold_before.forget()
+        self.forget_start()
         self.tasks.clear(begun_too=begun_too, actor=actor, now=now)
         if begun_too:
             self._authority.revoke()
@@ -495,7 +517,7 @@ class Vehicle:
 
     def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
         """Take a task in that runs at once, before what runs and what waits."""
-        self._hold_before.forget()
+        self.hold_before.forget()
         task = self.tasks.run_now(draft, self.view(now=now), actor=actor, now=now)
         self.step(now=now)
         return task
@@ -514,8 +536,8 @@ class Vehicle:
 
         A vehicle that moves without a task is stopped as by HOLD.
         """
-        self._hold_before.forget()
-        self._forget_start()
+        self.hold_before.forget()
+        self.forget_start()
         if self.tasks.begun is None and self.armed and not self.control.is_engaged:
             return self.hold(client=None, actor=actor, now=now)
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
@@ -527,7 +549,7 @@ class Vehicle:
 
         Raises Rejection, and changes nothing, while the begun task could not take the vehicle.
         """
-        self._hold_before.forget()
+        self.hold_before.forget()
         seen = replace(self.view(now=now), may_arm=self._authority.may_arm_again)
         going_on = self.tasks.proceed(seen, actor=actor, now=now)
         self._authority.restore_arming()
@@ -593,7 +615,11 @@ class Vehicle:
         begun = self.tasks.begun
         late = self._clock.lateness(now=now) > self._settings.watch.late_tick
         if late and begun is not None and begun.state is TaskState.EXECUTING:
-            self.requests.send_zero()
+            if self.persona.has_loss_failsafe:  # a zero alone would end it
+                self.control.begin_release(now=now)
+                self.requests.flush(now=now)
+            else:
+                self.requests.send_zero()
             self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
@@ -634,7 +660,7 @@ class Vehicle:
                 wanted = demand.velocity
                 self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
-                still = seen.still and not self._hold_before.is_open(now=now)
+                still = seen.still and not self.hold_before.is_open(now=now)
                 self.control.release(still=still, disarm=False, now=now)
             case DemandKind.HAND_BACK:
                 self.control.release(still=seen.still, disarm=True, now=now)

@@ -39,6 +39,7 @@ class VehicleRequests:
         now: float,
     ) -> None:
         self._target = target
+        self._persona = persona
         self._source = source
         self._watch = watch
         self._outlet = outlet
@@ -49,7 +50,7 @@ class VehicleRequests:
         self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
-        self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_parameters)
+        self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
         self._versions_asked = 0
         self._ask_version_at = now
         #: whether the vehicle has said which one it is
@@ -171,7 +172,9 @@ class VehicleRequests:
         """Move what the services want sent to the way out, and their answers to who asked."""
         setpoints = self.control.take_messages()
         outgoing, answers = self._sender.take()
-        if self.control.phase is Phase.STOPPING:  # HOLD also stops what does not follow setpoints
+        is_handed_back = self.control.phase is Phase.RELEASING and self._persona.has_loss_failsafe
+        # HOLD also stops what does not follow setpoints; and a zero before it would end a failsafe
+        if is_handed_back or self.control.phase is Phase.STOPPING:
             outgoing += setpoints
         else:  # in our mode a zero comes before arming
             outgoing = [*setpoints, *outgoing]

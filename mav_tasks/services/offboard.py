@@ -35,6 +35,7 @@ RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show H
 LATE = 0.3
 UNANSWERED = 0.3  # s after which a request without an answer was heard, or lost
 AWAITED = 1.5  # s, the longest until a 1 Hz heartbeat shows what a disarming has done
+LEAD_GAP = 0.2  # s between zeros, after which the stream counts anew
 LEAD_IN = 1.0  # s of zeros before a mode that is entered only while setpoints stream
 UNSTOPPED = 1.0  # s after which a STOP may depend on HOLD no more, where HOLD is not to be trusted
 
@@ -90,6 +91,8 @@ class OffboardControl:
         #: whether a heartbeat shows what became of the last mode or disarm request of ours
         self._is_settled = True
         self._settles_at = -inf  # a heartbeat from then on was sent after the request was heard
+        #: HOLD was shown when it was asked for: only the answer tells it from that of a failsafe
+        self._awaits_answer = False
         self._last_was_awaited = False  # the latest heartbeat was the first to show it
         self._outgoing: list[Message] = []
         self._ask_until = -inf  # our mode or arming is asked for until then
@@ -97,6 +100,8 @@ class OffboardControl:
         self._next_hold_at = 0.0
         self._release_until: float | None = None  # zeros only, until then at the longest
         self._lead_until = 0.0  # zeros only, before our mode is asked for
+        self._led_at = 0.0  # the last of them
+        self._was_heard_leading_in = False
         self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
         self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
         self.phase = Phase.IDLE
@@ -169,8 +174,10 @@ class OffboardControl:
         the last known mode is up to a second old.
         """
         self._last_was_awaited = not self._is_settled
-        if now >= self._settles_at:
+        is_old_news = self._awaits_answer and mode == self._persona.hold_mode
+        if now >= self._settles_at and not is_old_news:
             self._is_settled = True
+        self._was_heard_leading_in = True
         if self._armed and not armed:
             self.we_armed = False
         self._armed = armed
@@ -180,7 +187,8 @@ class OffboardControl:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
         if answer.ack is not None and answer.ack.result == MavResult.ACCEPTED:
             self._settles_at = min(self._settles_at, now)
-            if self.phase is Phase.ASKING_HOLD and self._mode == self._persona.hold_mode:
+            if self._awaits_answer and answer.command == MavCmd.DO_SET_MODE:
+                self._awaits_answer = False
                 self._is_settled = True  # shown before, and heard that it is meant
             return
         asked = {
@@ -197,9 +205,19 @@ class OffboardControl:
         """Somebody else has the vehicle, or may have: send not one thing more."""
         self._withdraw_requests()
         self._outgoing.clear()
+        self._awaits_answer = False
         self.phase = Phase.IDLE
         self.refused = None
         self.we_armed = False
+
+    def ask_to_stay(self, *, now: float) -> None:
+        """HOLD is shown and was not asked for: ask for it, whoever has the vehicle.
+
+        It may be a failsafe's, which ends as soon as a setpoint that is under way comes.
+        """
+        self._hold_at = now
+        until = now + self._watch.ask_vehicle
+        self._request(self._orders.hold(), until=until, now=now, urgent=True)
 
     def hand_over(self) -> None:
         """Somebody else goes on from the hand-back, and HOLD asked for again would undo it.
@@ -233,7 +251,7 @@ class OffboardControl:
             case Phase.ASKING_ARM if self._may_arm_here and not self._armed:
                 self._send_setpoint(STANDING)
                 self._insist(Refused.ARM, now=now)
-            case Phase.LEADING_IN if self._in_hold and self._armed and now < self._lead_until:
+            case Phase.LEADING_IN if self._in_hold and self._armed and self._is_leading_in(now):
                 self._send_setpoint(STANDING)
             case Phase.CONTROL if self.in_control:
                 self._send_setpoint(STANDING)
@@ -257,7 +275,8 @@ class OffboardControl:
             self._begin_arming(may_arm=may_arm, now=now)
         elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._in_hold:
             self._begin_asking(Phase.LEADING_IN, now=now)
-            self._lead_until = now + LEAD_IN
+            self._lead_until, self._led_at = now + LEAD_IN, now
+            self._was_heard_leading_in = False
             self._send_setpoint(STANDING)
         elif self.phase is Phase.LEADING_IN and self._in_hold and self._armed:
             self._begin_asking(Phase.ASKING_MODE, now=now)
@@ -266,6 +285,16 @@ class OffboardControl:
         else:
             self._begin_asking(Phase.ASKING_HOLD, now=now)
             self._ask_hold(now=now)
+
+    def _is_leading_in(self, now: float) -> bool:
+        """Whether the stream has not lasted yet, or nothing was heard of the vehicle meanwhile.
+
+        Somebody may have taken it since, and a mode is not asked for on old news.
+        """
+        if now > self._led_at + LEAD_GAP:
+            self._lead_until = now + LEAD_IN
+        self._led_at = now
+        return now < self._lead_until or not self._was_heard_leading_in
 
     def drive(self, wanted: Speeds) -> None:
         """Send a velocity setpoint; zeros unless ``in_control``."""
@@ -312,7 +341,7 @@ class OffboardControl:
         self.phase = Phase.RELEASING
         self.refused = None
         self._ask_until = now + RELEASE_LIMIT
-        self._unsettle(now)
+        self._unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
@@ -323,7 +352,7 @@ class OffboardControl:
         self.phase = Phase.STOPPING
         self.refused = None
         self._disarm_by = now + UNSTOPPED if self._persona.stop_disarms else inf
-        self._unsettle(now)
+        self._unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=STOP_REPEAT)
 
@@ -388,6 +417,7 @@ class OffboardControl:
         if now >= self._ask_until:
             self.refused = what
             self.we_armed = False
+            self._awaits_answer = False
         elif now >= self._ask_again_at:
             self._ask_again_at = None
             if what is Refused.ARM:
@@ -404,7 +434,7 @@ class OffboardControl:
 
     def _ask_hold(self, *, now: float) -> None:
         self._hold_at = now
-        self._unsettle(now)
+        self._unsettle(now, awaits_hold=True)
         self._request(self._orders.hold(), until=self._ask_until, now=now)
 
     def _ask_arming(self, *, now: float) -> None:
@@ -440,10 +470,13 @@ class OffboardControl:
 
     @property
     def _is_disarmed_by_stop(self) -> bool:
-        return self._persona.stop_disarms and self._is_settled and not self._armed
+        is_news = self._is_settled or self._awaits_answer
+        return self._persona.stop_disarms and is_news and not self._armed
 
-    def _unsettle(self, now: float) -> None:
+    def _unsettle(self, now: float, *, awaits_hold: bool = False) -> None:
         """What the next heartbeats say may be from before the request that leaves now."""
+        is_shown = self._mode == self._persona.hold_mode
+        self._awaits_answer = awaits_hold and is_shown and self._persona.has_loss_failsafe
         self._is_settled = False
         self._settles_at = now + UNANSWERED
 

@@ -42,8 +42,9 @@ class Persona:
     is_held_before_places: bool
     #: asked for the mission while it is disarmed, it begins it when it is armed
     starts_when_armed: bool
-    #: what it does when setpoints stop is up to its parameters
-    has_loss_parameters: bool
+    #: what it does when setpoints stop is up to its parameters; when they return, so does our
+    #: mode, by itself, and with what it was told last
+    has_loss_failsafe: bool
     #: it turns at a rate, also on the spot, and reverses; else it is steered by where to go
     turns_on_spot: bool
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
@@ -108,7 +109,7 @@ ARDUPILOT = Persona(
     stop_disarms=False,
     is_held_before_places=False,
     starts_when_armed=False,
-    has_loss_parameters=False,  # it stops after 3 s (observed on 4.6.3)
+    has_loss_failsafe=False,  # it stops after 3 s (observed on 4.6.3)
     turns_on_spot=True,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
     setpoint_frame=MavFrame.BODY_NED,
@@ -151,7 +152,7 @@ PX4 = Persona(
     stop_disarms=False,
     is_held_before_places=True,
     starts_when_armed=True,
-    has_loss_parameters=True,
+    has_loss_failsafe=True,
     turns_on_spot=False,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
     setpoint_frame=MavFrame.LOCAL_NED,

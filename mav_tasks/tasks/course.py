@@ -34,6 +34,8 @@ class Course:
         self.passing = passing
         #: m from that end, where it does
         self.within = within
+        #: how often a place was driven past beside it, and driven to again
+        self.misses = 0
 
     def __repr__(self) -> str:
         return f"Course({self.goal}, {self.progress})"
@@ -98,6 +100,7 @@ class Course:
             near_enough = max(self.goal.radius or 0.0, BESIDE)
             if distance(motion.pose, target) > near_enough:
                 following = WAY if self.by_course else FACE
+                self.misses += 1
         if following >= leg_count(self.goal):
             return False
         anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)

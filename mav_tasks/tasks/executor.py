@@ -27,6 +27,8 @@ from mav_tasks.tasks.way_back import is_off_line, way_back
 
 S, R = TaskState, TaskReason
 
+#: times that a vehicle may drive past a place that its turning circle keeps it from
+MISSES = 3
 #: interruptions that end by themselves when the vehicle is back
 LOSSES = frozenset({R.LINK_LOST, R.POSITION_LOST})
 
@@ -318,6 +320,9 @@ class Executor:
         """The end of a leg: the next one, the next step, back to the task itself, or all done."""
         self._stuck.begin(now=now)
         if course.advance(motion):
+            if course.by_course and course.misses > MISSES:
+                self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
+                return
             if course is self._course:
                 self._book.advance(task.id, course.progress, now=now)
         elif course is self._way_back:

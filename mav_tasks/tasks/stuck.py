@@ -4,7 +4,7 @@ Two ways to see it: no progress towards the end of the leg, or, where a leg has 
 nearer to, standing still while a velocity is asked for.
 """
 
-from math import inf
+from math import inf, pi
 
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Move, Rotate
@@ -12,6 +12,7 @@ from mav_tasks.tasks.guidance import Velocity, is_far_off, wrap
 from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
+FULL_TURNS = 2 * pi  # rad that it turns by itself towards its course, at the most; more is a circle
 BLIND = 1.0  # m or rad towards the goal commanded without progress: the same, but sooner
 
 
@@ -24,6 +25,8 @@ class StuckWatch:
         self._commanded = 0.0  # m or rad, since the last progress
         self._last = (0.0, 0.0)
         self._course: float | None = None  # that it was told to drive in, if it was
+        self._turned = 0.0  # rad, by itself since the last progress
+        self._yaw: float | None = None  # when that was last looked at
 
     def begin(self, *, now: float) -> None:
         """Begin anew: another leg, or nothing has been asked for yet."""
@@ -31,6 +34,7 @@ class StuckWatch:
         self._progress_at = now
         self._commanded = 0.0
         self._last = (0.0, 0.0)
+        self._turned, self._yaw = 0.0, None
 
     def commanded(self, velocity: Velocity, *, seconds: float) -> None:
         """Take in what is asked of the vehicle for the next ``seconds``."""
@@ -41,13 +45,14 @@ class StuckWatch:
         """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
         leg = course.leg
         forward, turned = self._last
-        if self._turns_by_itself(seen) and not seen.still:
+        if self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS:
             self._progressed(now)
         if isinstance(leg, Move | Rotate):
             self._commanded += forward if isinstance(leg, Move) else turned
             left = abs(course.remaining)
             if left < self._best_remaining - PROGRESS:
                 self._best_remaining = left
+                self._turned = 0.0
                 self._progressed(now)
         elif not seen.still or not (forward or turned):
             self._progressed(now)
@@ -57,6 +62,9 @@ class StuckWatch:
         """Whether it was told to drive where it does not point yet."""
         if self._course is None or seen.motion is None:
             return False
+        yaw = seen.motion.pose.yaw
+        self._turned += abs(wrap(yaw - (yaw if self._yaw is None else self._yaw)))
+        self._yaw = yaw
         return is_far_off(wrap(self._course - seen.motion.pose.yaw))
 
     def _progressed(self, now: float) -> None:

@@ -396,6 +396,9 @@ class VehicleTasks:
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
         if blocker:
             raise Rejection(blocker, f"cannot go on: {words_of(blocker)}")
+        if seen.drives_on:
+            words = "cannot go on: the rover would drive on without setpoints"
+            raise Rejection(R.NOT_ALLOWED, words)
 
     def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
         if self._is_of_another_frame(task, seen):

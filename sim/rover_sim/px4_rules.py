@@ -114,9 +114,8 @@ class Px4Rules:
         self._failing = False
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode with nothing left of the one before."""
+        """Begin a mode; what setpoints asked for last is kept, for when OFFBOARD returns."""
         del mode
-        self._offboard.clear()
         self._place = self._cruise = None
 
     def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, setpoint
@@ -77,3 +78,24 @@ def test_does_not_come_back_when_a_task_has_ended(world: World) -> None:
     world.run(3)
     assert world.stands()
     assert abs(world.truth.north - where) < 0.02
+
+
+@pytest.mark.parametrize("lost", [1.0, 5.0])
+def test_is_not_opened_for_a_stream_that_would_not_pass(make_world: MakeWorld, lost: float) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    world.rover.autopilot.parameters["COM_OF_LOSS_T"] = lost
+    world.client.move(60, speed=1.5)
+    world.until(lambda: world.truth.forward_speed > 1.4, within=20)
+    world.operator_mode(Mode.MANUAL)
+    world.run(5)
+    assert world.paused() is R.TAKEOVER
+    where = world.truth.north
+    world.client.stream(northwards(0.0), rate=20)
+    world.run(0.5)
+    ask_mode(world.client, OFFBOARD)
+    modes = set()
+    for _ in range(160):
+        world.run(0.05)
+        modes.add(world.rover.autopilot.mode)
+    assert abs(world.truth.north - where) < 0.1
+    assert Mode.GUIDED not in modes

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import nan
+from math import nan, remainder, tau
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim import offboard, steering
+from rover_sim.estimate import Estimate
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
@@ -112,6 +114,21 @@ class TestDriving:
         world.client.rotate(90)
         world.until_idle(tasks=2)
         assert near_pose(world.pose(), (-1.0, 0.0, 90.0), metres=0.04, angle=1)
+
+    @pytest.mark.parametrize("radius", [0.5, 1.5, 3.0])
+    def test_a_place_within_its_turning_circle_ends_the_task(
+        self, world: World, monkeypatch: pytest.MonkeyPatch, radius: float
+    ) -> None:
+        def as_a_car(estimate: Estimate, yaw: float, speed: float) -> steering.Demand:
+            if speed == 0.0:
+                return steering.STOP
+            most = abs(estimate.forward_speed) / radius
+            wanted = 2.4 * remainder(yaw - estimate.yaw, tau)
+            return steering.Demand(speed, max(-most, min(most, wanted)))
+
+        monkeypatch.setattr(offboard, "turn_then_drive", as_a_car)
+        go_to(world, 0.0, 0.5)
+        world.until(lambda: world.state(1)[0] in (S.COMPLETED, S.FAILED), within=300)
 
 
 class TestWhatItCannotDo:

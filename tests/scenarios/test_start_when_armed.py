@@ -1,16 +1,18 @@
 """PX4's way to start a mission: the mode and arming, in either order."""
 
 import pytest
+from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, RETURN, ask_mode
 from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT = 16
+WAYPOINT, CANCEL, CLEAR = 16, 54010, 54011
 
 
 @pytest.fixture
@@ -129,3 +131,64 @@ def test_a_return_is_shown_and_driven(world: World) -> None:
     assert shown(world) == RETURN
     world.until_state(3, S.COMPLETED, within=30)
     assert near_pose(world.pose(), (0.0, 0.0, 180.0), metres=0.05, angle=5)
+
+
+@pytest.mark.parametrize("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])
+def test_a_mission_that_was_called_off_does_not_start(
+    world: World, call_off: tuple[int, ...]
+) -> None:
+    ask_mode(world.client, MISSION)
+    world.run(0.3)
+    sent = world.client.command(*call_off)
+    world.run(0.3)
+    assert sent.result == ACCEPTED
+    world.client.arm()
+    world.run(4)
+    assert abs(world.truth.north) < 0.05
+    assert len(world.tasks()) == 1, "nor does another task of it"
+
+
+def test_another_plan_than_the_one_that_was_meant_does_not_start(world: World) -> None:
+    other = world.add_client("other")
+    ask_mode(world.client, MISSION)
+    world.run(1.2)
+    upload = Upload(other, [Item(WAYPOINT, **at(-2.0, 0.0))])
+    world.until(lambda: upload.result is not None, within=5)
+    other.arm()
+    world.run(4)
+    assert abs(world.truth.north) < 0.05
+
+
+def test_a_restart_of_the_rover_removes_the_mark(world: World) -> None:
+    ask_mode(world.client, MISSION)
+    world.run(0.3)
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(6)
+    world.operator_arm(True)
+    world.run(3)
+    assert waits_for_start(world)
+
+
+@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
+def test_a_person_who_arms_to_drive_by_hand_keeps_the_rover(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0))])
+    world.until(lambda: upload.result is not None, within=5)
+    world.operator_mode(Mode.MANUAL)
+    world.run(1.5)
+    ask_mode(world.client, MISSION)
+    world.run(2)
+    world.operator_arm(True)
+    world.run(4)
+    assert world.rover.autopilot.mode is Mode.MANUAL
+    assert world.stands()
+
+
+def test_what_is_shown_ends_with_the_plan(world: World) -> None:
+    ask_mode(world.client, MISSION)
+    world.run(0.3)
+    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 0))
+    world.run(2.0)
+    assert shown(world) == HOLD

@@ -18,8 +18,10 @@ both = pytest.mark.parametrize("persona", [PX4, GENERIC], ids=str)
 
 
 def ticks(rig: Rig, seconds: float) -> None:
-    """Let time pass while control is being taken."""
-    for _ in range(round(seconds / PERIOD)):
+    """Let time pass while control is being taken, with heartbeats that say nothing new."""
+    for number in range(round(seconds / PERIOD)):
+        if number % 10 == 9:
+            rig.hear()
         rig.take()
         rig.tick()
 
@@ -78,6 +80,34 @@ class TestTakingControl:
         rig.hear(mode=HOLD)
         rig.take()
         assert rig.story() == ["zero", "arm"]
+
+    def test_hold_that_was_shown_before_is_believed_only_when_it_is_answered(self) -> None:
+        rig = Rig(PX4)
+        ticks(rig, 0.9)
+        assert rig.story() == ["HOLD"], "a failsafe's looks the same"
+        rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
+        rig.take()
+        assert rig.story() == ["zero", "arm"]
+
+    def test_our_mode_is_not_asked_for_on_old_news(self) -> None:
+        rig = armed_in_hold()
+        for _ in range(60):  # nothing is heard for three seconds
+            rig.take()
+            rig.tick()
+        assert "our mode" not in rig.story()
+        rig.hear()
+        rig.take()
+        assert "our mode" in rig.story()
+
+    def test_after_a_gap_the_second_of_zeros_begins_anew(self) -> None:
+        rig = armed_in_hold()
+        ticks(rig, 0.6)
+        rig.now += 0.4
+        rig.story()
+        ticks(rig, 0.9)
+        assert rig.story() == ["zero"]
+        ticks(rig, 0.2)
+        assert "our mode" in rig.story()
 
     def test_one_that_is_armed_in_our_mode_is_in_control_at_once(self) -> None:
         rig = Rig(PX4, armed=True, mode=OFFBOARD)
@@ -168,6 +198,7 @@ class TestHandingBack:
             rig.release()
             rig.tick()
         assert "HOLD" in rig.story()
+        rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
         rig.hear(mode=HOLD)
         rig.release()
         assert rig.phase in (Phase.IDLE, Phase.DISARMING)

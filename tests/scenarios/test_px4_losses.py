@@ -1,0 +1,151 @@
+"""PX4's offboard-loss failsafe: it ends by itself when setpoints return, and drives on with what it
+was told last. Nothing of ours may wake it, and its HOLD is not one that somebody asked for.
+"""
+
+from pathlib import Path
+from shutil import copy
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.links.memory import Conditions
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import PX4, Mode, Persona
+from tests.kit.px4 import PROMPT_PX4, SET_MODE
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import MODE_COMMAND, World
+from tests.scenarios.conftest import MakeWorld
+
+COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
+HEARTBEAT = 0
+
+
+def driving(make_world: MakeWorld, *, speed: float = 1.5, lost: float = 1.0, **kw: Any) -> World:
+    """A rover that a task drives; without setpoints it stops after ``lost`` seconds."""
+    kw.setdefault("persona", PROMPT_PX4)
+    world = make_world(**kw)
+    world.rover.autopilot.parameters["COM_OF_LOSS_T"] = lost
+    world.client.move(60, speed=speed)
+    world.until(lambda: world.truth.forward_speed > speed - 0.06, within=20)
+    return world
+
+
+def is_mode_request(data: bytes) -> bool:
+    return data[7] == MODE_COMMAND and data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
+
+
+@pytest.mark.parametrize("lost", [1.0, 5.0])
+def test_a_server_that_is_started_again_leaves_it_standing(
+    make_world: MakeWorld, tmp_path: Path, lost: float
+) -> None:
+    path, again = tmp_path / "tasks.sqlite3", tmp_path / "again.sqlite3"
+    store = PromptSqliteStore(path, wall_offset=1.8e9)
+    world = driving(make_world, store=store, lost=lost)
+    world.end_server()
+    for suffix in ("", "-wal"):
+        if Path(f"{path}{suffix}").exists():
+            copy(f"{path}{suffix}", f"{again}{suffix}")
+    store.close()
+    world.run(lost + 4)
+    assert world.stands()
+    where = world.truth.north
+    later = PromptSqliteStore(again, wall_offset=1.8e9)
+    world.start_server(later, later.load())
+    world.run(10)
+    assert abs(world.truth.north - where) < 0.1
+    assert world.stands()
+    assert world.paused() is R.RESTARTED
+
+
+@pytest.mark.parametrize("lost", [1.0, 5.0])
+def test_a_server_whose_machine_slept_leaves_it_standing(
+    make_world: MakeWorld, lost: float
+) -> None:
+    world = driving(make_world, persona=PX4, lost=lost)
+    world.observer.expects_gaps = True
+    world.suspend_server(lost + 3.5)
+    assert world.stands()
+    where = world.truth.north
+    world.run(lost + 4)
+    assert abs(world.truth.north - where) < 0.2
+
+
+@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
+@pytest.mark.parametrize("lost", [1.0, 5.0])
+def test_once_a_takeover_is_told_it_does_not_drive_on(
+    make_world: MakeWorld, lost: float, persona: Persona
+) -> None:
+    conditions = Conditions(delay=0.15)
+    world = driving(make_world, speed=2.0, lost=lost, persona=persona, conditions=conditions)
+    world.run(0.4)
+    end = world.now + lost + 0.15  # just long enough for the failsafe
+    world.watched.loses = lambda source, target, data: target == "rover1" and world.now < end
+    world.until(lambda: world.paused() is R.TAKEOVER, within=lost + 4)
+    told = world.truth.north
+    world.run(lost + 4)
+    assert world.stands()
+    # braking from 2 m/s takes 2.2 m, and 0.3 s of the net 0.6 m
+    assert world.truth.north - told < 3.6
+
+
+def test_its_hold_is_not_taken_for_one_that_was_asked_for(make_world: MakeWorld) -> None:
+    world = driving(make_world, lost=5.0)
+    world.watched.loses = lambda source, target, data: target == "rover1"
+    world.run(9)
+    assert world.stands()
+    until = world.now + 0.8
+    world.watched.loses = lambda source, target, data: (
+        target == "rover1" and world.now < until and is_mode_request(data)
+    )
+    world.client.proceed()
+    seen = set()
+    for _ in range(40):
+        world.run(0.05)
+        seen.add((world.control(), world.rover.autopilot.mode))
+    assert not seen & {("IDLE", Mode.GUIDED), ("LEADING_IN", Mode.GUIDED)}
+
+
+@pytest.mark.parametrize("beats_lost", [False, True])
+def test_who_takes_it_by_hand_just_before_our_mode_is_asked_for_keeps_it(
+    make_world: MakeWorld, beats_lost: bool
+) -> None:
+    world = make_world(persona=PX4)  # shows a change within a second
+    world.client.move(20, speed=1.0)
+    world.until(lambda: world.control() == "LEADING_IN", within=5)
+    world.run(0.3)
+    end = world.now + 1.2
+    world.watched.loses = lambda source, target, data: (
+        beats_lost and source == "rover1" and data[7] == HEARTBEAT and world.now < end
+    )
+    world.operator_mode(Mode.MANUAL)
+    world.run(8)
+    assert world.rover.autopilot.mode is Mode.MANUAL
+    assert world.stands()
+
+
+def test_a_server_that_stalls_while_zeros_stream_begins_that_again(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    world.client.move(2)
+    world.until(lambda: world.control() == "LEADING_IN", within=5)
+    world.run(0.3)
+    world.suspend_server(0.4)
+    world.run(8)
+    assert world.state(1)[0] in (S.EXECUTING, S.COMPLETED)
+
+
+def test_a_task_is_not_continued_while_the_failsafe_is_off(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    world.client.move(5)
+    world.run(4)
+    world.rover.autopilot.parameters["COM_OF_LOSS_T"] = 60.0
+    world.client.send(common.MAVLink_param_request_read_message(1, 1, b"COM_OF_LOSS_T", -1))
+    world.run(0.2)
+    world.client.pause()
+    world.run(2)
+    sent = world.client.proceed()
+    world.run(0.5)
+    assert sent.answer is not None
+    assert sent.answer[1] == R.NOT_ALLOWED
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
