@@ -1,22 +1,38 @@
 """Anybody does anything, on any net: no rule is broken, nothing raises, and STOP stops."""
 
 from collections.abc import Callable
+from math import nan
 from random import Random
+from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.itinerary import goal_of
 from mav_tasks.tasks.legs import leg_of, length_of
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from rover_sim.faults import Faults
-from rover_sim.personas import Mode
-from tests.kit.client import AUTO, GUIDED, HOLD, MANUAL, RTL, FakeClient, setpoint, sticks
+from rover_sim.personas import PX4, Mode
+from tests.kit import px4
+from tests.kit.client import (
+    AUTO,
+    GUIDED,
+    HOLD,
+    MANUAL,
+    RTL,
+    FakeClient,
+    set_mode,
+    setpoint,
+    sticks,
+)
+from tests.kit.mission import Item, Upload
 from tests.kit.store import LateStore
-from tests.kit.world import World
+from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 
 MODES = (MANUAL, HOLD, AUTO, RTL, GUIDED)
+PX4_MODES = (px4.MANUAL, px4.HOLD, px4.MISSION, px4.RETURN, px4.OFFBOARD)
 FAULTS = (
     Faults(silent=True),
     Faults(deaf=True),
@@ -66,9 +82,64 @@ def deeds(world: World, random: Random, store: LateStore) -> list[Callable[[], o
     ]
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_whatever_happens(make_world: MakeWorld, seed: int) -> None:
+def px4_deeds(world: World, random: Random, store: LateStore) -> list[Callable[[], object]]:
+    """Give the same and more for a rover that speaks as PX4 does."""
+    clients = (world.client, world.add_client("fourth"))
+    other = world.net.link("other station")
+
+    def client() -> FakeClient:
+        return random.choice(clients)
+
+    def place() -> dict[str, Any]:
+        return at(random.uniform(-3, 3), random.uniform(-3, 3))
+
+    def go_to() -> None:
+        sender = client()
+        if random.random() < 0.5:
+            px4.ask_mode(sender, px4.HOLD)
+        sender.command_int(px4.REPOSITION, -1, 1, 0, nan, **place(), frame=6, target=(1, 1))
+
+    def go_to_by_another_station() -> None:
+        message = common.MAVLink_command_int_message(
+            *(1, 1, 6, px4.REPOSITION, 0, 0, -1, 1, 0, nan), *place().values(), 0
+        )
+        other.send("rover1", message.pack(common.MAVLink(None, 255, 190)))
+
+    def end_streams() -> None:
+        for each in clients:
+            each.end_streams()
+
+    return [
+        *deeds(world, random, store),
+        go_to,
+        go_to,
+        go_to_by_another_station,
+        lambda: Upload(client(), [Item(16, **place()), Item(16, **place())]),
+        lambda: px4.ask_mode(client(), random.choice(PX4_MODES)),
+        lambda: px4.ask_mode(client(), px4.HOLD),
+        lambda: px4.ask_mode(client(), px4.MISSION),
+        lambda: px4.ask_mode(client(), px4.OFFBOARD),
+        lambda: client().send(set_mode(random.choice(PX4_MODES))),
+        lambda: client().stream(setpoint(0.3), rate=20),
+        end_streams,
+    ]
+
+
+MAKES = {
+    "ardupilot": (PROMPT, deeds),
+    "px4": (px4.PROMPT_PX4, px4_deeds),
+    "px4 at 1 Hz": (PX4, px4_deeds),
+    "generic": (px4.PROMPT_GENERIC, px4_deeds),
+}
+LIVES = [("ardupilot", seed) for seed in range(8)] + [
+    (make, seed) for make in MAKES for seed in range(4) if make != "ardupilot"
+]
+
+
+@pytest.mark.parametrize(("make", "seed"), LIVES)
+def test_whatever_happens(make_world: MakeWorld, make: str, seed: int) -> None:
     random = Random(seed)
+    persona, what_can_happen = MAKES[make]
     net = Conditions(
         delay=0.002,
         jitter=random.choice((0.0, 0.02)),
@@ -76,10 +147,10 @@ def test_whatever_happens(make_world: MakeWorld, seed: int) -> None:
         duplication=random.choice((0.0, 0.1)),
     )
     store = LateStore()
-    world = make_world(seed=seed, conditions=net, store=store)
-    world.rover.autopilot.parameters["WP_SPEED"] = 0.8
+    world = make_world(seed=seed, conditions=net, store=store, persona=persona)
+    world.rover.autopilot.parameters[persona.speed_parameter] = 0.8
     world.observer.expects_gaps = True
-    can_happen = deeds(world, random, store)
+    can_happen = what_can_happen(world, random, store)
     for _ in range(60):
         random.choice(can_happen)()
         world.run(random.choice((0.01, 0.1, 0.5, 2.0)))
@@ -95,7 +166,8 @@ def test_whatever_happens(make_world: MakeWorld, seed: int) -> None:
     where = world.pose()
     world.run(3)
     assert world.pose() == where
-    assert world.rover.autopilot.mode is Mode.HOLD
+    is_disarmed = make == "generic" and not world.rover.autopilot.armed
+    assert world.rover.autopilot.mode is Mode.HOLD or is_disarmed
     assert world.paused() is TaskReason.STOPPED
     assert all(task.state in TERMINAL for task in world.tasks())
     for task in world.tasks():
