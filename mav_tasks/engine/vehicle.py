@@ -324,7 +324,8 @@ class Vehicle:
             self._take_over("disarmed by a client", now=now)
         elif disarms:
             self._authority.revoke()  # a client's stream would leave a velocity behind
-            if self._authority.since_other(now=now) < self._settings.watch.other_controller:
+            is_driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
+            if is_driven and not self.persona.has_loss_failsafe:
                 self.requests.send_zero()
         self.requests.relay(
             packet, message, origin, component=target, command=command, urgent=disarms, now=now
@@ -396,6 +397,8 @@ class Vehicle:
             return "STOP is latched"
         if self.tasks.is_driving or self.control.is_engaged:
             return "not while tasks drive"
+        if self.control.awaits_mode:
+            return "HOLD is being asked for"
         if not self.armed:
             return "the rover is not armed"
         if not self._authority.has_granted(client):
@@ -424,8 +427,11 @@ class Vehicle:
         if self.control.phase is Phase.STOPPING:
             return
         if self.control.is_engaged:
-            self.requests.send_hold()
+            if self.persona.has_loss_failsafe:  # which a zero would end, if HOLD is of that
+                self.requests.send_hold()
             self.requests.send_zero()
+            if not self.persona.has_loss_failsafe:
+                self.requests.send_hold()
         if self.tasks.begun is not None or self.control.is_engaged:
             self._take_over(f"second controller {who}", now=now)
 

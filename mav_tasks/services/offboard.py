@@ -122,6 +122,11 @@ class OffboardControl:
         return self.phase is not Phase.IDLE
 
     @property
+    def awaits_mode(self) -> bool:
+        """Whether a mode that we have asked for is not answered yet."""
+        return self._sender.is_pending(self._target.component_id, MavCmd.DO_SET_MODE)
+
+    @property
     def is_taking(self) -> bool:
         """Whether modes or arming are asked for, so as to get into control."""
         return self.phase in TAKING

@@ -34,7 +34,9 @@ BURST = 4  # moving setpoints in 0.1 s
 ENGAGED = 0.2  # s since the last setpoint: the server is driving
 OWN_REQUEST = 3.0  # s in which a change to HOLD or disarmed follows from our own request
 KNOWN = 0.5  # s since the server heard of it: no setpoint from before is on its way any more
-GREETING = 2  # zeros in a row that are not driving: a client's OFFBOARD needs some before it
+GREETING = (
+    4  # zeros in a row that are not driving: a client's OFFBOARD needs two, and may be asked twice
+)
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
 
