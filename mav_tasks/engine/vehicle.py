@@ -350,7 +350,9 @@ class Vehicle:
         self.control.hand_over()
         if mode == self.persona.control_mode:
             streams = self._authority.streams(client, now=now)
-            if self.persona.arms_in_hold and streams and self.may_move(client):
+            # that it is armed may not have been heard yet: the stream passes when it is
+            is_withheld = self.tasks.is_driving or self.control.is_engaged
+            if self.persona.arms_in_hold and streams and not is_withheld:
                 # the vehicle enters that mode only in a stream, of which it has not heard yet
                 self.requests.send_zero()
                 self.requests.send_zero()

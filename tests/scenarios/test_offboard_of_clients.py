@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
+from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, setpoint
 from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
 from tests.kit.world import World
@@ -50,6 +50,22 @@ def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> 
     assert world.stands()
     world.run(2)
     assert world.stands(), "the stream goes on, and is not passed"
+
+
+@pytest.mark.parametrize("persona", [PX4, GENERIC], ids=lambda persona: persona.name)
+def test_works_also_before_it_was_heard_that_the_rover_is_armed(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)  # shows it within a second
+    world.client.stream(northwards(0.5), rate=20)
+    world.until(lambda: world.rover.autopilot.armed is False, within=1)
+    world.client.arm()
+    world.run(0.1)
+    sent = ask_mode(world.client, OFFBOARD)
+    world.run(3)
+    assert sent.answer is not None
+    assert sent.answer[0] == ACCEPTED
+    assert world.truth.forward_speed > 0.4
 
 
 def test_is_refused_by_the_rover_without_a_stream(world: World) -> None:
