@@ -312,7 +312,7 @@ class Executor:
             if self._is_coming_back:
                 return wish
         fence = self._bounds.local(seen.origin)
-        return within_fence(wish, motion.pose, fence, driving=self._settings.driving)
+        return within_fence(wish, motion, fence, driving=self._settings.driving)
 
     def _arrive(
         self, task: Task, course: Course, seen: VehicleView, motion: Motion, now: float

@@ -4,39 +4,54 @@ Zeros pass at once and unramped: they are STOP, cancel and faults.
 """
 
 from dataclasses import replace
-from math import copysign, isfinite, sqrt
+from math import ceil, copysign, isfinite, sqrt
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.fence import LocalFence
-from mav_tasks.tasks.guidance import ZERO, Velocity
-from mav_tasks.tasks.task import Pose
+from mav_tasks.tasks.guidance import ZERO, Motion, Velocity, wrap
 
 MARGIN = 0.05  # m left between a vehicle and its fence
 LATENCY = 0.3  # s in which a vehicle does not yet do what it is told
+TURNS_ON = LATENCY + 0.3  # s in which a vehicle that is told to stand still turns
+APART = 0.1  # rad, at the most, between directions that are looked in
 CREEP = 0.02  # m/s; slower than this is standing
 
 
 def within_fence(
-    wish: Velocity, pose: Pose, fence: LocalFence | None, *, driving: Driving
+    wish: Velocity, motion: Motion, fence: LocalFence | None, *, driving: Driving
 ) -> Velocity | None:
     """Give what may be asked for so that the vehicle can stop before the fence; None: stop now.
 
-    It goes by the room straight ahead, or behind for one that reverses, and in its course.
+    It goes by the room ahead, or behind for one that reverses, in every direction in which the
+    vehicle may point until it stands.
     """
     if fence is None or wish.forward == 0.0:
         return wish
     ahead = wish.forward > 0.0
     speed, braking = abs(wish.forward), driving.acceleration
     needed = speed * LATENCY + speed * speed / (2 * braking) + MARGIN
-    room = fence.room(pose, forward=ahead, limit=needed) - MARGIN
-    if wish.course is not None:  # it turns there meanwhile
-        turned = replace(pose, yaw=wish.course)
-        room = min(room, fence.room(turned, forward=True, limit=needed) - MARGIN)
+    room = needed
+    for yaw in _headings(wish, motion):
+        room = min(room, fence.room(replace(motion.pose, yaw=yaw), forward=ahead, limit=room))
+    room -= MARGIN
     if room >= needed - MARGIN:
         return wish
     lag = braking * LATENCY
     most = sqrt(lag * lag + 2 * braking * max(room, 0.0)) - lag
     return None if most < CREEP else replace(wish, forward=copysign(most, wish.forward))
+
+
+def _headings(wish: Velocity, motion: Motion) -> list[float]:
+    """Give the directions in which a vehicle may point until it stands, not far from each other."""
+    yaw = motion.pose.yaw
+    if wish.course is not None:  # it turns there by itself, as fast as it can
+        turns = [0.0, wrap(wish.course - yaw)]
+    else:
+        turns = [0.0, wish.yaw_rate * TURNS_ON, motion.yaw_rate * TURNS_ON]
+    least, most = min(turns), max(turns)
+    steps = ceil((most - least) / APART)
+    spread = (most - least) / steps if steps else 0.0
+    return [yaw, *(yaw + least + number * spread for number in range(steps + 1))]
 
 
 def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float) -> Velocity:

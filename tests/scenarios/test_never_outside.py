@@ -90,20 +90,18 @@ def tasks(world: World, random: Random) -> list[Callable[[], object]]:
     ]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
 def test_no_rover_is_ever_outside(make_world: MakeWorld, persona: Persona, seed: int) -> None:
     random = Random(seed)
     net = Conditions(delay=random.choice((0.002, 0.05)), loss=random.choice((0.0, 0.05)))
     world = make_world(seed=seed, persona=persona, conditions=net)
     items = random_fence(random)
-    for _ in range(5):  # over a bad net the rover may not have it in time, and then it is refused
-        if fenced(world, items) == 0:
-            break
+    while not as_the_server_reads_it(items).allows(LocalPlace(0.0, 0.0)):
+        items = random_fence(random)
     fence = as_the_server_reads_it(items)
-    here = LocalPlace(world.truth.north, world.truth.east)
-    assert world.rover.autopilot.missions.stored(FENCE), "it was stored"
-    assert fence.allows(here), "it begins inside"
+    # over a bad net the rover may not have it in time, and then it is refused
+    assert any(fenced(world, items) == 0 for _ in range(20))
     moved = 0.0
     for _ in range(TASKS):
         random.choice(tasks(world, random))()
