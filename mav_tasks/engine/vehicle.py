@@ -36,6 +36,7 @@ from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
+NO_MISSION = (0, 0xFFFF)  # MISSION_CURRENT.total: it does not say; there is none
 RUNNING = frozenset({TaskState.STARTING, TaskState.EXECUTING, TaskState.CANCELLING})
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
@@ -94,6 +95,7 @@ class Vehicle:
         self.hold_before = HoldBefore()
         #: whether its mission begins when it is armed
         self.start_mark = StartMark()
+        self._own_items = 0  # of a mission on board
         #: what its heartbeats say towards clients
         self.shown_mode = ShownMode()
         self.components = Components(system_id, first=settings.identity.component_id)
@@ -187,11 +189,20 @@ class Vehicle:
             self._receive_of_frame(message, now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
+        elif isinstance(message, m.MissionCurrent):
+            self._receive_own_mission(message.total, now=now)
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.AutopilotVersion):
             self.tasks.identified(_uid_of(message), now=now)
             self.requests.is_identified = True
+
+    def _receive_own_mission(self, total: int, *, now: float) -> None:
+        """What is on board is none of ours: its mission mode would drive it, and nobody sees it."""
+        items = total if total not in NO_MISSION else 0
+        if items and items != self._own_items and self._settings.claim:
+            self._note(f"carries {items} mission items of its own: see its mission mode", now=now)
+        self._own_items = items
 
     def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
         self.requests.loss_failsafe.receive(message)

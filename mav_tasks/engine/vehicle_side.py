@@ -44,6 +44,7 @@ USED = frozenset(
         m.AutopilotVersion.id,
         m.CommandAck.id,
         m.MissionAck.id,
+        m.MissionCurrent.id,
         m.MissionRequest.id,
         m.MissionRequestInt.id,
         m.ParamValue.id,

@@ -9,8 +9,18 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
-from tests.kit.client import ACCEPTED, AUTO, DENIED, HOLD, TEMPORARILY_REJECTED, set_mode, sticks
+from tests.kit.client import (
+    ACCEPTED,
+    AUTO,
+    DENIED,
+    HOLD,
+    TEMPORARILY_REJECTED,
+    FakeClient,
+    set_mode,
+    sticks,
+)
 from tests.kit.mission import Download, Item, Upload, acks, currents, reached
+from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -569,3 +579,14 @@ def test_a_start_of_another_rover_does_not_make_one_meant_again(make_world: Make
     answer = start(world)
     assert answer is not None
     assert answer[1] > 2, "the mission that is over is another task"
+
+
+def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    direct = FakeClient(world.net, "direct", server="rover1")
+    world.join(direct)
+    upload = Upload(direct, (place(1, 0), place(2, 0)))
+    world.until(lambda: upload.result is not None, within=5)
+    world.run(5)
+    words = "Vehicle 1 carries 2 mission items of its own: see its mission mode"
+    assert world.client.texts().count(words) == 1
