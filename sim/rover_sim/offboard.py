@@ -10,7 +10,7 @@ ARRIVAL_RADIUS = 0.1  # m
 
 
 class Offboard:
-    """Counts setpoints in any mode; follows those that come in OFFBOARD, and keeps none before."""
+    """Counts setpoints in any mode; follows those that come in OFFBOARD, and keeps the last."""
 
     def __init__(self) -> None:
         self.target: Target | None = None
@@ -20,10 +20,6 @@ class Offboard:
 
     def __repr__(self) -> str:
         return f"Offboard({self.target})"
-
-    def clear(self) -> None:
-        """Forget the target."""
-        self.target = None
 
     def hear(self, *, now: float) -> None:
         """Count a setpoint."""
