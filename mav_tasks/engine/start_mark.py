@@ -40,11 +40,6 @@ class StartMark:
         """Whether somebody wants it still."""
         return self._marker is not None and now < self._until
 
-    @property
-    def is_marked(self) -> bool:
-        """Whether somebody wants it, or did and nobody armed in time."""
-        return self._marker is not None
-
     def remove(self) -> None:
         """Something else was wished for since."""
         self._marker = None

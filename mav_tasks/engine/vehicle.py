@@ -377,9 +377,8 @@ class Vehicle:
 
     def forget_start(self) -> None:
         """The mission that was to begin when it is armed is another one now, or is not wanted."""
-        if self.start_mark.is_marked:
-            self.start_mark.remove()
-            self.shown_mode.forget()
+        self.start_mark.remove()
+        self.shown_mode.forget()
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
