@@ -27,7 +27,9 @@ async def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: An
         await here.attempt_async(raw.set_current_mission_item, 3)
         await here.attempt_async(raw.start_mission)
         await wait_for(raw.is_mission_finished, "the end")
-        print("raw progress", (progress.seen[-1].current, progress.seen[-1].total))
+        # told by another thread, perhaps later; and a start that is sent again after it begins anew
+        await progress.until(lambda seen: any(p.current == p.total for p in seen), "the last item")
+        print("raw progress", {(each.current, each.total) for each in progress.seen})
     await here.attempt_async(raw.clear_mission)
 
 

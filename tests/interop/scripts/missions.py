@@ -26,7 +26,9 @@ def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: Any) -> 
     here.attempt(raw.set_current_mission_item, 3)
     here.attempt(raw.start_mission)
     wait_for(raw.is_mission_finished, "the end")
-    print("raw progress", seen[-1])
+    # told by another thread, perhaps later; and a start that is sent again after it begins anew
+    wait_for(lambda: any(current == total for current, total in seen), "the last item")
+    print("raw progress", set(seen))
     here.attempt(raw.clear_mission)
 
 
