@@ -1,13 +1,15 @@
 """A command on its way through the server: who asked what of which vehicle, and the way back."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 from mav_tasks.engine import translate
 from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command, CommandReceiver, Pending
 from mav_tasks.tasks.events import SubmissionRefused
@@ -43,6 +45,21 @@ class Asked:
         """The component that answers: the one addressed; where that is all, our own."""
         component = self.command.target.component_id or self.vehicle.server_component
         return Address(self.vehicle.system_id, component)
+
+    @property
+    def answers_to(self) -> Hashable:
+        """What one answer is enough for, however often it was asked."""
+        return self.client.key, type(self), self.command.command
+
+    @property
+    def is_go_to(self) -> bool:
+        """Whether it is an operator's "go to" at the autopilot: one that changes the mode."""
+        command = self.command
+        return (
+            command.command == MavCmd.DO_REPOSITION
+            and command.target.component_id == AUTOPILOT
+            and bool(reposition_flags(command) & CHANGE_MODE)
+        )
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Acknowledge it."""

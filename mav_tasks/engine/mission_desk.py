@@ -5,6 +5,7 @@ What becomes of uploads is in ``mission_uploads``, clearing in ``mission_clearin
 
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.go_to_items import GoToItems
 from mav_tasks.engine.item_check import ItemCheck
 from mav_tasks.engine.mission_answers import MissionAnswers
 from mav_tasks.engine.mission_clearing import MissionClearing
@@ -87,6 +88,7 @@ class MissionDesks:
         self._clearing = MissionClearing(
             vehicles, book, submissions, plans, self._answers, write_through
         )
+        self._go_to = GoToItems(submissions, book)
         self._desks: dict[tuple[int, int], _Desk] = {}
 
     def apply(self, settings: Settings) -> None:
@@ -115,8 +117,11 @@ class MissionDesks:
             case m.MissionCount():
                 desk.uploads.receiver.count(message, sender, now=now)
             case m.MissionItem() | m.MissionItemInt():
-                if not desk.uploads.receiver.item(message, sender, now=now):
-                    return message.current not in GO_TO
+                if not desk.uploads.receiver.item(message, sender, now=now) and (
+                    message.current in GO_TO
+                ):
+                    self._vehicles.touch(vehicle)
+                    self._go_to.receive(client, vehicle, packet, message, now=now)
             case m.MissionAck():
                 desk.uploads.receiver.cancelled(message, sender, now=now)
                 desk.sender.end(sender, message.mission_type)

@@ -6,11 +6,10 @@ from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import CHANGE_MODE, reposition_flags, wish_of
+from mav_tasks.engine.goals import wish_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.address import AUTOPILOT
-from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import Goal, GoTo, describe
@@ -32,7 +31,7 @@ class Submissions:
         self._recollection = recollection
         self._settings = settings
         self._gate = CommitGate()
-        #: taken in, and not durable yet: who is to be told, each client once
+        #: taken in, and not durable yet: who is to be told, each client once for a command
         self._undecided: dict[TaskId, list[Asked]] = {}
         self._store_is_away = False
         self._is_closing = False
@@ -84,7 +83,7 @@ class Submissions:
             self._answer_repeat(asked, known, now=now)
             return
         self.check_new(vehicle)
-        if self._is_for_now(asked):
+        if self._settings.guided == "now" and asked.is_go_to:
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
         else:
             task = vehicle.tasks.submit(draft, now=now)
@@ -186,16 +185,6 @@ class Submissions:
         if self._store_is_away:
             raise Rejection(R.STORE_UNAVAILABLE, "the store is away: not accepted")
 
-    def _is_for_now(self, asked: Asked) -> bool:
-        """Whether this is a "go to" at the autopilot that is to have effect at once."""
-        command = asked.command
-        return (
-            self._settings.guided == "now"
-            and command.command == MavCmd.DO_REPOSITION
-            and command.target.component_id == AUTOPILOT
-            and bool(reposition_flags(command) & CHANGE_MODE)
-        )
-
     def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
         self._recollection.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
@@ -226,7 +215,7 @@ class Submissions:
         """The same submission again: the same answer, or none yet if it has none yet."""
         if known.task_id in self._undecided:
             askers = self._undecided[known.task_id]
-            if asked.client.key not in {each.client.key for each in askers}:
+            if asked.answers_to not in {each.answers_to for each in askers}:
                 askers.append(asked)
             return
         asked.answer(MavResult.ACCEPTED, known.task_id)

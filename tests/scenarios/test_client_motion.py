@@ -68,7 +68,10 @@ def test_what_would_move_it_passes_for_who_has_control(world: World) -> None:
 
 
 @pytest.mark.parametrize("current", [2, 3])
-def test_a_go_to_in_the_form_of_an_item_needs_control_too(world: World, current: int) -> None:
+def test_a_go_to_item_that_no_task_is_made_of_needs_control_too(
+    make_world: MakeWorld, current: int
+) -> None:
+    world = make_world(settings=Settings(claim=False))
     world.client.move(5)
     world.until_state(1, S.EXECUTING)
     world.client.send(go_there(current))

@@ -54,6 +54,17 @@ def test_go_to_in_three_forms_is_one_task(world: World) -> None:
     assert len(world.tasks()) == 1
 
 
+def test_each_form_is_answered_though_none_is_stored_yet(world: World) -> None:
+    place = at(2.0, 0.5)
+    sent = [
+        world.client.command_int(command, **place, frame=GLOBAL)
+        for command in (REPOSITION, WAYPOINT)
+    ]
+    world.run(0.3)
+    assert [each.answer for each in sent] == [(ACCEPTED, 1)] * 2
+    assert len(world.tasks()) == 1
+
+
 def test_without_a_place_it_is_a_pause(world: World) -> None:
     world.client.move(2)
     world.run(2)
