@@ -116,6 +116,7 @@ class ModeRequests:
         elif not self._is_mission(vehicle, mode):
             vehicle.client_asks_mode(mode, client.key, now=now)
             vehicle.requests.forward(packet)
+            vehicle.requests.ask_to_show(now=now)
         elif self._is_to_be_armed_first(vehicle):
             self._mark(vehicle, client, submitter, now=now)
         else:

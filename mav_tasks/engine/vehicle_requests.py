@@ -23,6 +23,10 @@ from mav_tasks.settings import Watch
 
 ASK_WHICH = 5  # times that a vehicle is asked for its AUTOPILOT_VERSION
 ASK_WHICH_EACH = 3.0  # s
+SHOW = 0.25  # s in which a heartbeat that was asked for is to come; the next one is not far
+ASK_TO_SHOW = 3  # times in a row that a vehicle may leave that unanswered
+#: commands after which clients wait to see in a heartbeat what they asked for
+SHOWN = frozenset({MavCmd.DO_SET_MODE, MavCmd.DO_SET_STANDARD_MODE, MavCmd.COMPONENT_ARM_DISARM})
 
 
 class VehicleRequests:
@@ -51,6 +55,7 @@ class VehicleRequests:
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
+        self._shows = ASK_TO_SHOW  # times more that it is asked for a heartbeat
         self._versions_asked = 0
         self._ask_version_at = now
         #: whether the vehicle has said which one it is
@@ -76,6 +81,14 @@ class VehicleRequests:
     def forward(self, packet: Packet) -> None:
         """Pass on a client's packet that no answer is kept for."""
         self._outlet.inject(packet)
+
+    def ask_to_show(self, *, now: float) -> None:
+        """Have it show its mode and arming at once: whoever changed them waits for a heartbeat."""
+        if not self._shows:
+            return
+        request = self._message_request(m.Heartbeat.id)
+        self._sender.request(request, now=now, give_up_after=SHOW)
+        self.flush(now=now)
 
     def relay(
         self,
@@ -153,8 +166,7 @@ class VehicleRequests:
             return
         self._versions_asked += 1
         self._ask_version_at = now + ASK_WHICH_EACH
-        wanted = m.AutopilotVersion.id
-        request = m.CommandLong(*self._target, MavCmd.REQUEST_MESSAGE, 0, wanted, 0, 0, 0, 0, 0, 0)
+        request = self._message_request(m.AutopilotVersion.id)
         self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
 
@@ -197,19 +209,38 @@ class VehicleRequests:
         answers, self._answers = self._answers, []
         return answers
 
+    def _message_request(self, wanted: int) -> m.CommandLong:
+        return m.CommandLong(*self._target, MavCmd.REQUEST_MESSAGE, 0, wanted, 0, 0, 0, 0, 0, 0)
+
     def _dispatch(self, answer: Answered, *, now: float) -> None:
+        result = None if answer.ack is None else answer.ack.result
         if answer.origin is not None:
             self._answers.append(answer)
         elif is_request_of(answer):
             self.control.answered(answer, now=now)
         elif answer.command in self._performed:
-            if answer.ack is None or answer.ack.result != MavResult.ACCEPTED:
+            if result != MavResult.ACCEPTED:
                 self._unperformed.append(answer)
+        elif answer.command == MavCmd.REQUEST_MESSAGE:
+            self._note_shown(answer)
         elif answer.command == MavCmd.SET_MESSAGE_INTERVAL:
-            ack = answer.ack
-            self.intervals.answered(
-                accepted=None if ack is None else ack.result == MavResult.ACCEPTED
-            )
+            accepted = None if result is None else result == MavResult.ACCEPTED
+            self.intervals.answered(accepted=accepted)
+        if answer.command in SHOWN and result == MavResult.ACCEPTED:
+            self.ask_to_show(now=now)
+
+    def _note_shown(self, answer: Answered) -> None:
+        """One that does not send heartbeats on request is not asked again and again.
+
+        Until its unanswered request is given up, those of clients wait.
+        """
+        request = answer.request
+        if not isinstance(request, m.CommandLong) or request.param1 != m.Heartbeat.id:
+            return
+        if answer.ack is None:
+            self._shows -= 1
+        else:
+            self._shows = ASK_TO_SHOW if answer.ack.result == MavResult.ACCEPTED else 0
 
     def _prepare_last_words(self) -> tuple[Outgoing, ...]:
         queue: list[Outgoing] = []

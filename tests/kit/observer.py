@@ -41,11 +41,12 @@ TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
 
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
+SHOW = "show"  # the request for a heartbeat
 SETPOINTS = ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT")
 MOTION = (*SETPOINTS, "SET_ATTITUDE_TARGET", "SET_ACTUATOR_CONTROL_TARGET", "FOLLOW_TARGET")
 BY_HAND = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE")
 MOVING_COMMANDS = (16, 17, 18, 19, 20, 21, 22, 34, 115, 192, 209, 213, 300)
-STOP, PAUSE_CONTINUE, SET_MODE, ARM = 54003, 193, 176, 400
+STOP, PAUSE_CONTINUE, SET_MODE, ARM, REQUEST = 54003, 193, 176, 400, 512
 REPOSITION = 192
 ACK, ACCEPTED = 77, 0
 NO_PLACE = 0x7FFFFFFF
@@ -230,8 +231,12 @@ class Observer:
     # what a test may ask
 
     def sent_since(self, at: float) -> list[str]:
-        """Give what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ..."""
-        return [self._name(message) for t, message in self.driven if t >= at]
+        """Give what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ...
+
+        That it asks for a heartbeat now and then is left out.
+        """
+        names = [self._name(message) for t, message in self.driven if t >= at]
+        return [name for name in names if name != SHOW]
 
     # rules
 
@@ -404,6 +409,8 @@ class Observer:
             return {self.ways.hold: "HOLD", self.ways.ours: "GUIDED"}.get(mode, f"mode{mode}")
         if message.command == ARM:
             return "arm" if message.param1 else "disarm"
+        if message.command == REQUEST and not message.param1:
+            return SHOW
         return "stay" if _is_to_stay(message) else str(message.command)
 
     def _violation(self, now: float, text: str) -> None:

@@ -21,7 +21,7 @@ from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, Mode, Persona
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
-from tests.kit.client import ACK, FakeClient
+from tests.kit.client import ACK, REQUEST, FakeClient
 from tests.kit.observer import ARDUPILOT_WAYS, PX4_WAYS, Observer
 from tests.kit.store import LateStore
 
@@ -29,6 +29,7 @@ E = TypeVar("E")
 
 LOOK = 0.02  # s of virtual time between two looks at what a test waits for
 STANDS = 0.01  # m/s and rad/s
+COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
 
 
 MODE_COMMAND, SETPOINT = 76, 84  # COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED
@@ -64,9 +65,11 @@ class World(VirtualWorld):
         rovers: int = 1,
         body: Callable[[Pose], Body] = kinematic_body,
         persona: Persona = PROMPT,
+        shows_on_request: bool = True,
     ) -> None:
         self.seed = seed
         self.watched = ObservedNet(seed=seed, conditions=conditions or Conditions())
+        self.watched.shows_on_request = shows_on_request
         super().__init__(self.watched)
         if isinstance(store, LateStore):
             store.clock = lambda: self.now
@@ -293,6 +296,8 @@ class ObservedNet(MemoryNet):
         self.observers: dict[str, Observer] = {}
         self.is_server_away = False
         self._unread: list[tuple[str, str, bytes]] = []
+        #: whether rovers are reached by requests for a heartbeat; else they show each second only
+        self.shows_on_request = True
         #: loses (source, target, datagram) for which it says so
         self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
 
@@ -302,7 +307,8 @@ class ObservedNet(MemoryNet):
             self.observers[target].sent(self.now, data)
         elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
             self.observers[f"rover{data[5]}"].answered(self.now, data)
-        if self.loses(source, target, data):
+        hidden = not self.shows_on_request and asks_for_heartbeat(data)
+        if hidden or self.loses(source, target, data):
             return
         super().send(source, target, data)
 
@@ -330,6 +336,12 @@ class ObservedNet(MemoryNet):
                 elif source == name or source not in self.observers:
                     observer.heard(self.now, data)
         self._unread.clear()
+
+
+def asks_for_heartbeat(data: bytes) -> bool:
+    """Whether a packet is a REQUEST_MESSAGE of HEARTBEAT, whose number is zero."""
+    is_request = data[7] == MODE_COMMAND and data[COMMAND_ID] == REQUEST.to_bytes(2, "little")
+    return is_request and not any(data[10:14])
 
 
 def at(north: float, east: float) -> dict[str, Any]:

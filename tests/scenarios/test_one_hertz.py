@@ -1,4 +1,4 @@
-"""A real ArduPilot says its mode and arming once a second and no sooner: nothing old is believed.
+"""An autopilot may say its mode and arming once a second and no sooner: nothing old is believed.
 
 The last HEARTBEAT may be a second old, so what it shows can be from before our last request.
 """
@@ -18,7 +18,7 @@ from tests.scenarios.conftest import MakeWorld
 
 @pytest.fixture
 def world(make_world: MakeWorld) -> World:
-    return make_world(persona=ARDUPILOT)
+    return make_world(persona=ARDUPILOT, shows_on_request=False)
 
 
 def test_three_tasks_are_driven_and_the_rover_is_handed_back(world: World) -> None:
@@ -139,7 +139,7 @@ def test_a_rover_armed_by_hand_while_its_mode_is_asked_for_is_not_driven(world: 
 @pytest.mark.parametrize("seed", range(8))
 def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.08, loss=0.1, duplication=0.05)
-    world = make_world(seed=seed, conditions=bad, persona=ARDUPILOT)
+    world = make_world(seed=seed, conditions=bad, persona=ARDUPILOT, shows_on_request=False)
     patient = tuple(k * 0.5 for k in range(10))
     world.client.move(0.6, repeats=patient, nonce=1)
     world.run(1.0)

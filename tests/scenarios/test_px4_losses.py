@@ -15,10 +15,9 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.px4 import PROMPT_PX4, SET_MODE
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import MODE_COMMAND, World
+from tests.kit.world import COMMAND_ID, MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
-COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
 HEARTBEAT = 0
 
 
@@ -78,7 +77,14 @@ def test_once_a_takeover_is_told_it_does_not_drive_on(
     make_world: MakeWorld, lost: float, persona: Persona
 ) -> None:
     conditions = Conditions(delay=0.15)
-    world = driving(make_world, speed=2.0, lost=lost, persona=persona, conditions=conditions)
+    world = driving(
+        make_world,
+        speed=2.0,
+        lost=lost,
+        persona=persona,
+        conditions=conditions,
+        shows_on_request=False,
+    )
     world.run(0.4)
     end = world.now + lost + 0.15  # just long enough for the failsafe
     world.watched.loses = lambda source, target, data: target == "rover1" and world.now < end
