@@ -8,7 +8,8 @@
     │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
     │   ├── InsecureLinkError a link beyond loopback without a key
     │   ├── StoreError        a store that cannot be opened or read at start
-    │   └── PlanFileError     a mission file that cannot be read or understood
+    │   ├── PlanFileError     a mission file that cannot be read or understood
+    │   └── SettingError      a value that a setting cannot have
     ├── Rejection             a request refused: reason code and words for the client
     └── IllegalTransition     our own mistake: a move that the lifecycle table lacks
 
@@ -48,6 +49,10 @@ class PlanFileError(UsageError):
 
     The text names the part of the file first: "item 3: latitude 91 not in -90..90".
     """
+
+
+class SettingError(UsageError):
+    """A value that a setting cannot have; the text names the setting and its range."""
 
 
 class Rejection(MavTasksError):

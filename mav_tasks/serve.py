@@ -6,7 +6,7 @@ import logging
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -72,6 +72,8 @@ def serve(
         for link in vehicle_links:
             _say(f"vehicles on {link.name}, waiting for the first heartbeat")
         _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
+        if restored is not None and restored.parameters:
+            _say(f"parameters set before: {_in_words(restored.parameters)}")
         sys.stdout.flush()
         return asyncio.run(_run(settings, journal, restored, client_links, vehicle_links))
 
@@ -121,6 +123,10 @@ async def _run(
     engine = Engine(settings, now=now, restored=restored)  # what the store gave back
     tame_collector()
     return await Runner(engine, store, clients=clients, vehicles=vehicles).run()
+
+
+def _in_words(parameters: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in sorted(parameters.items()))
 
 
 def _say(words: str) -> None:

@@ -30,6 +30,8 @@ from mav_tasks.engine.mission_reports import MissionReports
 from mav_tasks.engine.mode_requests import ModeRequests
 from mav_tasks.engine.motion_gate import may_pass, passed, withheld
 from mav_tasks.engine.operator_watch import OperatorWatch
+from mav_tasks.engine.parameters import MESSAGES as PARAMETER_MESSAGES
+from mav_tasks.engine.parameters import ParameterDesk
 from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
@@ -42,6 +44,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer, target_of
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.services.command_receiver import command_of
+from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, ServerStopped
@@ -60,6 +63,8 @@ class Engine:
     """The task server without its sockets, its clock and its disk."""
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
+        kept = {} if restored is None else restored.parameters
+        configured, (settings, _) = settings, with_all(settings, kept)
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._journal: list[Event] = []
@@ -80,6 +85,14 @@ class Engine:
         if restored is not None:
             recollection.restore(restored.tasks, now=now)
         self._submissions = Submissions(self._gcs, self._book, recollection, settings)
+        self._parameters = ParameterDesk(
+            self._gcs,
+            self._vehicles,
+            self._book,
+            self._submissions,
+            settings=configured,
+            kept=kept,
+        )
         stored = {} if restored is None else restored.plans
         self._plans = Plans(self._book, self._fleet, settings, restored=stored)
         self._desks = MissionDesks(
@@ -126,7 +139,7 @@ class Engine:
             case StoreFailed():
                 self._submissions.store_failed()
             case SettingsChanged(settings=settings):
-                self._apply(settings)
+                self._apply(self._parameters.configured(settings))
             case WallClock(offset=offset):
                 self._fleet.room.set_wall_offset(offset, now=now)
             case Shutdown():
@@ -238,6 +251,8 @@ class Engine:
         elif packet.message_id not in CLAIMED:
             if isinstance(message, m.Heartbeat):
                 self._operator.receive(message, now=now)
+            elif isinstance(message, PARAMETER_MESSAGES):
+                self._parameters.receive(client, packet, message, now=now)
             self._forward(client, received, now=now)
 
     def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
@@ -265,6 +280,9 @@ class Engine:
 
     def _settle(self, *, now: float) -> None:
         """Bring vehicles' answers to clients, and what happened to clients and the journal."""
+        settings = self._parameters.take_change()
+        if settings is not None:
+            self._apply(settings)
         for system_id in self._fleet.room.take_woken():
             woken = self._vehicles.get(system_id)
             if woken is not None:

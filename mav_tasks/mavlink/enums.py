@@ -169,6 +169,20 @@ class MavMissionType(IntEnum):
     ALL = 255
 
 
+class MavParamType(IntEnum):
+    """How a parameter's value is written."""
+
+    REAL32 = 9
+
+
+class MavParamError(IntEnum):
+    """Why a parameter was not told or set."""
+
+    DOES_NOT_EXIST = 1
+    VALUE_OUT_OF_RANGE = 2
+    PERMISSION_DENIED = 3
+
+
 class MavLandedState(IntEnum):
     """MAV_LANDED_STATE."""
 

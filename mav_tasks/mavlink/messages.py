@@ -44,6 +44,7 @@ MissionRequestPartialList = d.MAVLink_mission_request_partial_list_message
 MissionRequestList = d.MAVLink_mission_request_list_message
 MissionSetCurrent = d.MAVLink_mission_set_current_message
 MissionWritePartialList = d.MAVLink_mission_write_partial_list_message
+ParamError = d.MAVLink_param_error_message
 ParamRequestList = d.MAVLink_param_request_list_message
 ParamRequestRead = d.MAVLink_param_request_read_message
 ParamSet = d.MAVLink_param_set_message

@@ -6,6 +6,7 @@ from typing import Any
 from mav_tasks.store.codec import Encoder, dumps
 from mav_tasks.tasks.events import (
     Event,
+    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
@@ -45,6 +46,7 @@ class Batch:
         self.advanced: dict[int, tuple[Any, ...]] = {}  # advanced, id
         self.withdrawn: list[tuple[int]] = []
         self.plans: dict[tuple[int, int], tuple[Any, ...]] = {}  # vehicle, kind, plan_id, source
+        self.parameters: dict[str, tuple[Any, ...]] = {}  # name, value
         self.vehicles: dict[tuple[str, int], Any] = {}  # column and vehicle -> value
         for number, event in enumerate(events, first):
             row = encoder.row(event, offset=offset)
@@ -84,5 +86,7 @@ class Batch:
             case PlanStored():
                 row = (event.vehicle, event.kind, event.plan_id, event.source)
                 self.plans[event.vehicle, event.kind] = row
+            case ParameterSet():
+                self.parameters[event.name] = (event.name, event.value)
             case VehicleSpeedSet():
                 self.vehicles["speed", event.vehicle] = event.speed

@@ -98,6 +98,10 @@ class Database:
                 connection.executemany(
                     "INSERT OR REPLACE INTO plans VALUES (?, ?, ?, ?)", batch.plans.values()
                 )
+            if batch.parameters:
+                connection.executemany(
+                    "INSERT OR REPLACE INTO parameters VALUES (?, ?)", batch.parameters.values()
+                )
             if batch.withdrawn:
                 self._withdraw(batch.withdrawn)
             for (column, vehicle), value in batch.vehicles.items():

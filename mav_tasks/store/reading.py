@@ -46,6 +46,7 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
                 tasks.append(_changed(task, rows, later, offset) if any(later) else task)
         vehicles = connection.execute("SELECT vehicle, paused, uid, speed FROM vehicles").fetchall()
         plans = connection.execute("SELECT vehicle, kind, plan_id, source FROM plans").fetchall()
+        parameters = connection.execute("SELECT name, value FROM parameters").fetchall()
         return Restored(
             tasks=tuple(tasks),
             next_id=next_id,
@@ -53,6 +54,7 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
             uids={row[0]: row[2] for row in vehicles if row[2] is not None},
             speeds={row[0]: row[3] for row in vehicles if row[3] is not None},
             plans={(row[0], row[1]): (row[2], row[3]) for row in plans if row[2]},
+            parameters={name: value for name, value in parameters if value is not None},
             ended_well=ended_well,
             idle=idle,
             wall_offset=offset,

@@ -44,6 +44,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
             " plan_id INTEGER NOT NULL, source TEXT NOT NULL, PRIMARY KEY (vehicle, kind))"
         ),
     ),
+    ("CREATE TABLE parameters (name TEXT PRIMARY KEY, value REAL)",),
 )
 
 

@@ -206,6 +206,20 @@ class VehicleSpeedSet:
 
 
 @dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """A setting was changed by a client, in the unit of its parameter; None: as configured."""
+
+    name: str
+    value: float | None
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        value = "as configured" if self.value is None else f"{self.value:g}"
+        return f"parameter {self.name}: {value}, by {self.actor}"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleSeen:
     """A vehicle was found, or is heard again."""
 
@@ -260,6 +274,7 @@ Event = (
     | QueueContinued
     | VehicleIdentified
     | VehicleSpeedSet
+    | ParameterSet
     | VehicleSeen
     | VehicleNoted
     | ServerStopped

@@ -14,8 +14,9 @@ class Restored:
     ``tasks`` are in the order of their ids, ``next_id`` was never given to any. ``paused`` are the
     queues that stood, with the reason, ``uids`` the vehicles' unique ids and ``speeds`` their
     default speeds in m/s, each by system id; ``plans`` by system id and kind are (id, source) as
-    PlanStored has them. ``ended_well``: the last run closed its store;
-    ``idle`` is the seconds since it last wrote. ``wall_offset`` is UTC less monotonic time.
+    PlanStored has them, ``parameters`` the last value of each by name. ``ended_well``: the last run
+    closed its store; ``idle`` is the seconds since it last wrote. ``wall_offset`` is UTC less
+    monotonic time.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -24,6 +25,7 @@ class Restored:
     uids: Mapping[int, str] = field(default_factory=dict)
     speeds: Mapping[int, float] = field(default_factory=dict)
     plans: Mapping[tuple[int, int], tuple[int, str]] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
     ended_well: bool = True
     idle: float = 0.0
     wall_offset: float = 0.0

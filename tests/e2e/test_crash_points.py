@@ -43,6 +43,7 @@ class Story:
     acknowledged: dict[int, int] = field(default_factory=dict)  # nonce -> task
     sent: dict[int, tuple[int, tuple[float, ...]]] = field(default_factory=dict)
     stopped: bool = False
+    told_speed: float | None = None  # the parameter TSK_SPEED, after it was set
 
     def submit(self, command: int, *params: float, after: int = 0, delay: float = 0) -> int:
         """Submit with a nonce; gives the id, 0 if the server was gone before it answered."""
@@ -149,6 +150,12 @@ def faster(story: Story) -> None:
     story.ask(SPEED, 1, 0.8, -1)
 
 
+def tuned(story: Story) -> None:
+    waiting(story)
+    story.link.mav.param_set_send(1, 191, b"TSK_SPEED", 0.8, 9)
+    story.told_speed = speed_told(story, within=2)
+
+
 def cleared(story: Story) -> None:
     waiting(story)
     story.ask(54011, 0)
@@ -178,6 +185,7 @@ WRITES: dict[str, Callable[[Story], None]] = {
     "QueueContinued": continued,
     "TaskModified": modified,
     "VehicleSpeedSet": faster,
+    "ParameterSet": tuned,
     "TaskAdvanced": go_to,
 }
 #: what the server is killed in the middle of, from outside
@@ -265,6 +273,10 @@ def check(
     if before.stopped:  # it never waits for the disk: before that it is a pause as any crash is
         kept = (R.STOPPED, R.RESTARTED) if point.startswith("before") else (R.STOPPED,)
         assert queue(after)[0] in kept
+    if point.endswith("ParameterSet"):
+        after.link.mav.param_request_read_send(1, 191, b"TSK_SPEED", -1)
+        is_set = before.told_speed is not None or point.startswith("after")
+        assert speed_told(after, within=3) == (0.8 if is_set else 0.5)
     if any(found is not None and found[0] is S.HELD for found in states.values()):
         wait_until(lambda: beat(after) == 4, within=3, what="the rover in HOLD")
     if nothing_may_run(states, queue(after)[0]):
@@ -281,6 +293,14 @@ def nothing_may_run(states: dict[int, Any], paused: R) -> bool:
 
 def words(states: dict[int, Any]) -> str:
     return ", ".join(f"{task} {s[0].name} {s[1].name}" for task, s in states.items()) or "-"
+
+
+def speed_told(story: Story, *, within: float) -> float | None:
+    try:
+        found = story.link.recv_match(type="PARAM_VALUE", blocking=True, timeout=within)
+    except ConnectionError:
+        return None
+    return None if found is None else round(found.param_value, 3)
 
 
 def truth(stand: Stand) -> tuple[float, float, float]:

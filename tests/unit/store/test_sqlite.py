@@ -13,6 +13,7 @@ from mav_tasks.store.schema import APPLICATION_ID, MIGRATIONS, migrate
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
+    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
@@ -135,6 +136,10 @@ def test_what_is_known_of_vehicles_comes_back(path: Path) -> None:
         PlanStored(1, 0, 17, "items", "client", 3.0),
         PlanStored(2, 1, 5, "fence", "client", 3.0),
         PlanStored(2, 1, 0, "", "client", 4.0),
+        ParameterSet("TSK_SPEED", 0.7, "client", 4.0),
+        ParameterSet("TSK_SPEED", 0.8, "client", 5.0),
+        ParameterSet("TSK_QUOTA", 20.0, "client", 5.0),
+        ParameterSet("TSK_QUOTA", None, "client", 6.0),
     ]
     with opened(path) as store:
         for event in events:
@@ -143,6 +148,7 @@ def test_what_is_known_of_vehicles_comes_back(path: Path) -> None:
         found = store.load()
         assert (found.paused, found.uids, found.speeds) == ({1: R.STOPPED}, {1: "uid-1"}, {1: 0.75})
         assert found.plans == {(1, 0): (17, "items")}
+        assert found.parameters == {"TSK_SPEED": 0.8}
 
 
 def test_times_are_those_of_the_process_that_loads(path: Path) -> None:

@@ -1,0 +1,171 @@
+"""The server's own settings as parameters of its component inside each vehicle's system.
+
+They are the same for all vehicles, kept over a restart, and have effect at once. The vehicle's own
+parameters are its affair: messages about those go on to it.
+"""
+
+from collections.abc import Mapping
+
+from mav_tasks.engine.gcs_client import GcsClient
+from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.submissions import Submissions
+from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection, SettingError
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST
+from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import param_receiver
+from mav_tasks.services.param_receiver import HASH_CHECK, name_in
+from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import ParameterSet
+
+MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
+ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
+
+
+class ParameterDesk:
+    """Answers about the server's parameters, and the settings that follow from them."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        *,
+        settings: Settings,
+        kept: Mapping[str, float],
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._configured = settings
+        self._kept = dict(kept)
+        self._pending: dict[str, float] = {}  # set, and not durable yet
+        self._settings, _ = with_all(settings, self._kept)
+        self._is_changed = False
+
+    def configured(self, settings: Settings) -> Settings:
+        """Take settings as configured anew; gives them with what was set by parameter."""
+        self._configured = settings
+        self._settings, _ = with_all(settings, self._kept)
+        return self._settings
+
+    def take_change(self) -> Settings | None:
+        """Give the settings once after each change that is in force now."""
+        is_changed, self._is_changed = self._is_changed, False
+        return self._settings if is_changed else None
+
+    def receive(
+        self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
+    ) -> None:
+        """Answer what is, or is also, for the task servers inside the vehicles addressed."""
+        vehicles = [v for v in self._vehicles if message.target_system in (BROADCAST, v.system_id)]
+        for vehicle in vehicles:
+            component = message.target_component
+            if component in (BROADCAST, vehicle.server_component):
+                self._answer(client, vehicle, packet, message, now=now)
+            elif component == AUTOPILOT and _begins(message):
+                self._list(client, vehicle)
+
+    def _answer(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        packet: Packet,
+        message: ParamMessage,
+        *,
+        now: float,
+    ) -> None:
+        is_meant = message.target_component != BROADCAST
+        match message:
+            case m.ParamRequestList():
+                self._list(client, vehicle)
+            case m.ParamRequestRead() if _begins(message):
+                self._list(client, vehicle)
+            case m.ParamRequestRead() if is_meant or name_in(message) in PARAMETERS:
+                answer = param_receiver.read(self._values(), message, to=packet.source)
+                client.outlet.send(answer, vehicle.server_address)
+            case m.ParamSet() if is_meant or name_in(message) in PARAMETERS:
+                self._set(client, vehicle, packet, message, now=now)
+
+    def _values(self) -> dict[str, float]:
+        return {name: each.value(self._settings) for name, each in PARAMETERS.items()}
+
+    def _list(self, client: GcsClient, vehicle: Vehicle) -> None:
+        for value in param_receiver.all_values(self._values()):
+            client.outlet.send(value, vehicle.server_address)
+
+    def _set(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        packet: Packet,
+        message: m.ParamSet,
+        *,
+        now: float,
+    ) -> None:
+        """It has effect, and is told to everybody, once it is durable."""
+        name, value = name_in(message), as_sent(message.param_value)
+        actor = str(client.submitter(packet.source))
+
+        def refuse(text: str, why: int, *, now: float) -> None:
+            error = param_receiver.error(message, why, to=packet.source)
+            client.outlet.send(error, vehicle.server_address)
+            if name in PARAMETERS:  # to clients that do not know the error, the old value says it
+                told = param_receiver.value_of(self._values(), name)
+                client.outlet.send(told, vehicle.server_address)
+            client.tell(text, MavSeverity.WARNING, vehicle.server_address, now=now)
+
+        if name not in PARAMETERS:
+            refuse(f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
+            return
+        try:
+            if message.param_type != MavParamType.REAL32:
+                raise SettingError(f"{name}: its type is REAL32")
+            expected, _ = with_all(self._configured, self._kept | self._pending)
+            changed(expected, name, value)
+            self._submissions.check_open()
+        except SettingError as error:
+            refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            return
+        except Rejection as refusal:
+            refuse(refusal.text, MavParamError.PERMISSION_DENIED, now=now)
+            return
+        before = self._kept.get(name)
+
+        def accept(*, now: float) -> None:
+            del now
+            self._take(name, value)
+
+        def give_up(*, now: float) -> None:
+            self._pending.pop(name, None)
+            self._book.record(ParameterSet(name, before, actor, now))
+            words = f"{name} was not stored in time: not set"
+            refuse(words, MavParamError.PERMISSION_DENIED, now=now)
+
+        self._pending[name] = value
+        self._book.record(ParameterSet(name, value, actor, now))
+        self._submissions.when_durable(accept, give_up, now=now)
+
+    def _take(self, name: str, value: float) -> None:
+        if self._pending.get(name) == value:
+            del self._pending[name]
+        self._kept[name] = value
+        self._settings, _ = with_all(self._configured, self._kept)
+        self._is_changed = True
+        told = param_receiver.value_of(self._values(), name)
+        for vehicle in self._vehicles:
+            for client in self._gcs:
+                if client.is_heard and client.knows(vehicle.system_id):
+                    client.outlet.send(told, vehicle.server_address)
+
+
+def _begins(message: ParamMessage) -> bool:
+    """Whether a client with a cache begins so; it may leave the list of all out, then."""
+    return isinstance(message, m.ParamRequestRead) and name_in(message) == HASH_CHECK

@@ -1,0 +1,208 @@
+"""The server's settings as parameters of its component, and the rover's own beside them."""
+
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.services.parameter_table import PARAMETERS
+from mav_tasks.settings import Driving, Settings
+from mav_tasks.tasks.events import ParameterSet
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import FakeClient
+from tests.kit.store import LateStore, PromptSqliteStore
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+ROVER, SERVER = (1, 1), (1, 191)
+REAL32, INT32 = 9, 6
+NOT_THERE, OUT_OF_RANGE, NOT_ALLOWED = 1, 2, 3  # MAV_PARAM_ERROR
+
+
+def ask_all(component: int, *, system: int = 1) -> Any:
+    return common.MAVLink_param_request_list_message(system, component)
+
+
+def ask(component: int, name: str = "", index: int = -1) -> Any:
+    return common.MAVLink_param_request_read_message(1, component, name.encode(), index)
+
+
+def put(name: str, value: float, *, component: int = 191, type_: int = REAL32) -> Any:
+    return common.MAVLink_param_set_message(1, component, name.encode(), value, type_)
+
+
+def told(client: FakeClient, source: tuple[int, int] = SERVER) -> list[tuple[str, float]]:
+    """(name, value) of each PARAM_VALUE from a source, in order."""
+    found = [client.decoded(p) for p in client.of_id(22) if p.source == source]
+    return [(each.param_id, round(each.param_value, 6)) for each in found]
+
+
+def errors(client: FakeClient) -> list[tuple[str, int]]:
+    """(name, error) of each PARAM_ERROR."""
+    return [(each.param_id, each.error) for each in client.of_type("PARAM_ERROR")]
+
+
+@pytest.mark.parametrize(
+    ("component", "ours", "the_rovers"), [(0, True, True), (1, False, True), (191, True, False)]
+)
+def test_a_list_is_of_who_is_asked(
+    world: World, component: int, ours: bool, the_rovers: bool
+) -> None:
+    world.client.send(ask_all(component))
+    world.run(0.5)
+    assert bool(told(world.client)) is ours
+    assert bool(told(world.client, ROVER)) is the_rovers
+    if ours:
+        values = [world.client.decoded(p) for p in world.client.of_id(22) if p.source == SERVER]
+        assert [each.param_id for each in values] == list(PARAMETERS)
+        assert [each.param_index for each in values] == list(range(len(PARAMETERS)))
+        assert {each.param_count for each in values} == {len(PARAMETERS)}
+        assert {each.param_type for each in values} == {REAL32}
+        assert ("TSK_SPEED", 0.5) in told(world.client)
+
+
+def test_every_vehicles_server_lists_them(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.send(ask_all(0, system=0))
+    world.run(0.5)
+    assert len(told(world.client, (1, 191))) == len(told(world.client, (2, 191))) > 0
+
+
+def test_one_is_read_by_name_and_by_number(world: World) -> None:
+    world.client.send(ask(191, "TSK_SPEED_MAX"))
+    world.client.send(ask(191, index=0))
+    world.client.send(ask(0, "TSK_QUOTA"))
+    world.run(0.2)
+    assert told(world.client) == [("TSK_SPEED_MAX", 2.0), ("TSK_SPEED", 0.5), ("TSK_QUOTA", 500.0)]
+
+
+def test_of_one_that_is_not_there_the_client_is_told_so(world: World) -> None:
+    world.client.send(ask(191, "TSK_NONE"))
+    world.client.send(ask(191, index=99))
+    world.client.send(put("TSK_NONE", 1.0))
+    world.run(0.2)
+    assert errors(world.client) == [
+        ("TSK_NONE", NOT_THERE),
+        ("", NOT_THERE),
+        ("TSK_NONE", NOT_THERE),
+    ]
+    assert told(world.client) == []
+    assert "TSK_NONE: no such parameter" in world.client.texts()
+
+
+def test_who_begins_with_a_digest_gets_the_list(make_world: MakeWorld) -> None:
+    """A ground station that finds the rover's parameters in its cache never asks for a list."""
+    world = make_world()
+    world.client.send(ask(0, "_HASH_CHECK"))
+    world.run(0.2)
+    assert len(told(world.client)) == len(PARAMETERS)
+
+
+def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:
+    other = world.add_client("other")
+    other.send(ask(191, "TSK_SPEED"))
+    world.client.send(put("TSK_SPEED", 0.8))
+    world.run(0.2)
+    assert told(world.client) == [("TSK_SPEED", 0.8)]
+    assert told(other)[-1] == ("TSK_SPEED", 0.8)
+    world.client.move(3)
+    world.until(lambda: world.truth.forward_speed > 0.75, within=10)
+    world.until_idle(tasks=1)
+
+
+def test_a_lower_limit_slows_down_what_is_being_driven(world: World) -> None:
+    world.client.move(10, speed=1.5)
+    world.until(lambda: world.truth.forward_speed > 1.4, within=10)
+    world.client.send(put("TSK_SPEED_MAX", 0.6))
+    world.run(3)
+    assert world.truth.forward_speed < 0.65
+    assert world.state(1)[0] is S.EXECUTING
+
+
+@pytest.mark.parametrize(
+    ("message", "says"),
+    [
+        (put("TSK_SPEED", 50.0), "TSK_SPEED 50: not in 0.05..10"),
+        (put("TSK_SPEED", nan), "TSK_SPEED nan: not in 0.05..10"),
+        (put("TSK_SPEED", 3.0), "TSK_SPEED 3 is more than TSK_SPEED_MAX 2"),
+        (put("TSK_SPEED", 1.0, type_=INT32), "TSK_SPEED: its type is REAL32"),
+    ],
+)
+def test_a_bad_value_changes_nothing_and_is_named(world: World, message: Any, says: str) -> None:
+    world.client.send(message)
+    world.run(0.2)
+    assert errors(world.client) == [("TSK_SPEED", OUT_OF_RANGE)]
+    assert told(world.client) == [("TSK_SPEED", 0.5)]
+    assert says in " ".join(world.client.texts())
+    assert world.events(ParameterSet) == []
+
+
+def test_a_restart_keeps_what_was_set(make_world: MakeWorld, tmp_path: Path) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    store = PromptSqliteStore(path, wall_offset=1.8e9)
+    world = make_world(store=store)
+    world.client.send(put("TSK_SPEED_MAX", 4.0))
+    world.client.send(put("TSK_SPEED", 3.0))
+    world.run(0.5)
+    world.end_server()
+    store.close()
+    again = PromptSqliteStore(path, wall_offset=1.8e9)
+    world.start_server(again, again.load())
+    world.run(3)
+    world.client.received.clear()
+    world.client.send(ask(191, "TSK_SPEED"))
+    world.run(0.2)
+    assert told(world.client) == [("TSK_SPEED", 3.0)]
+    assert world.server.engine.snapshot(now=world.now).vehicles
+    again.close()
+
+
+def test_it_is_not_told_before_it_is_stored(make_world: MakeWorld) -> None:
+    store = LateStore(delay=0.2)
+    world = make_world(store=store)
+    world.client.send(put("TSK_SPEED", 0.8))
+    world.run(0.1)
+    assert told(world.client) == []
+    world.run(0.3)
+    assert told(world.client) == [("TSK_SPEED", 0.8)]
+
+
+def test_what_is_not_stored_in_time_is_not_set(make_world: MakeWorld) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    store.delay = 5.0
+    world.client.send(put("TSK_SPEED", 0.8))
+    world.run(0.6)
+    assert told(world.client) == [("TSK_SPEED", 0.5)]
+    assert errors(world.client) == [("TSK_SPEED", NOT_ALLOWED)]
+    assert [event.value for event in world.events(ParameterSet)] == [0.8, None]
+
+
+def test_it_comes_before_what_is_configured(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(driving=Driving(speed=0.3)))
+    world.client.send(ask(191, "TSK_SPEED"))
+    world.client.send(put("TSK_SPEED", 0.8))
+    world.run(0.2)
+    assert told(world.client) == [("TSK_SPEED", 0.3), ("TSK_SPEED", 0.8)]
+
+
+def test_the_rovers_own_parameters_are_the_rovers(world: World) -> None:
+    world.client.send(put("WP_SPEED", 3.0, component=1))
+    world.client.send(ask(1, "SYSID_THISMAV"))
+    world.client.send(ask(1, "TSK_SPEED"))
+    world.run(0.3)
+    assert dict(told(world.client, ROVER)) == {"WP_SPEED": 3.0, "SYSID_THISMAV": 1.0}
+    assert told(world.client) == []
+    assert world.rover.autopilot.parameters["WP_SPEED"] == 3.0
+
+
+def test_where_the_rover_has_a_191_itself_they_are_at_the_next(world: World) -> None:
+    mav = common.MAVLink(None, srcSystem=1, srcComponent=191)
+    beat = common.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+    world.from_vehicle_side(beat.pack(mav), peer="rover1")
+    world.run(0.1)
+    world.client.send(ask_all(192))
+    world.run(0.3)
+    assert len(told(world.client, (1, 192))) == len(PARAMETERS)
