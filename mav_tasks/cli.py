@@ -2,6 +2,7 @@
 
 import os
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -86,6 +87,54 @@ def sim(context: typer.Context) -> None:
     sys.stdout.flush()
     # The simulated rover is a program of its own: nothing of the server is in its process.
     os.execv(sys.executable, [sys.executable, "-m", "rover_sim", *context.args])
+
+
+@app.command("qgc-actions")
+def qgc_actions(
+    custom: Annotated[
+        bool, typer.Option("--custom", help="The older format, of QGroundControl 4.3 and 4.4.")
+    ] = False,
+    action: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LABEL=COMMAND,P1,...", help="One more button; repeatable."),
+    ] = None,
+    only: Annotated[
+        bool, typer.Option("--only", help="The buttons of --action, and no others.")
+    ] = False,
+    component: Annotated[
+        int, typer.Option(min=1, max=255, help="Of the task server, if it is another.")
+    ] = 191,
+    install: Annotated[
+        bool,
+        typer.Option("--install", help="Write both formats to where QGroundControl looks."),
+    ] = False,
+    documents: Annotated[
+        str | None,
+        typer.Option(metavar="FOLDER", help="For --install: instead of your documents folder."),
+    ] = None,
+) -> None:
+    """Print QGroundControl's actions file: buttons for the task commands."""
+    from mav_tasks import qgc_actions as files  # noqa: PLC0415
+
+    actions = [] if only else list(files.ACTIONS)
+    actions += [files.parse_action(text) for text in action or []]
+    if not actions:
+        raise UsageError("--only: give at least one --action")
+    if not install:
+        file_type = files.CUSTOM_ACTIONS if custom else files.MAVLINK_ACTIONS
+        sys.stdout.write(files.file_of(actions, file_type=file_type, component=component))
+        return
+    for path in files.install(_documents(documents), actions, component=component):
+        sys.stdout.write(f"wrote {path}\n")
+    sys.stdout.write("Choose it in QGroundControl: Application Settings, Fly View\n")
+
+
+def _documents(folder: str | None) -> Path:
+    if folder is not None:
+        return Path(folder)
+    from platformdirs import user_documents_path  # noqa: PLC0415
+
+    return user_documents_path()
 
 
 def main() -> None:

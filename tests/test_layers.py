@@ -59,7 +59,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
-    "mav_tasks.cli": frozenset({"mav_tasks.serve", "mav_tasks.errors"}),
+    "mav_tasks.qgc_actions": frozenset({"mav_tasks.mavlink", "mav_tasks.errors"}),
+    "mav_tasks.cli": frozenset({"mav_tasks.serve", "mav_tasks.qgc_actions", "mav_tasks.errors"}),
     "rover_sim": frozenset({"mav_tasks.mavlink", "mav_tasks.links"}),
 }
 

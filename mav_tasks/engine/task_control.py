@@ -82,8 +82,12 @@ class TaskControl:
         return 0
 
     def _release(self, asked: Asked, *, now: float) -> int:
-        task = self._find(asked, _task_id(asked.command))
+        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
         how = whole(asked.command, 2, "how", high=SKIP, default=None)
+        begun = asked.vehicle.tasks.begun
+        if task_id == 0 and (begun is None or begun.state is not TaskState.HELD):
+            raise Rejection(R.NOT_FOUND, "no task is held")
+        task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
         if task.state is not TaskState.HELD:
             raise Rejection(R.WRONG_STATE, f"task {task.id} is not held, it is {_words(task)}")
         if how == SKIP:

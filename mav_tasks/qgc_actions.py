@@ -1,0 +1,119 @@
+"""QGroundControl's actions files: buttons of its fly view that send a command.
+
+QGroundControl 5 reads "MavlinkActions", 4.3 and 4.4 "CustomActions"; what is in them is the same.
+A button asks for no numbers, and JSON has no NaN: so each action says all seven parameters.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mav_tasks.errors import UsageError
+from mav_tasks.mavlink.enums import MavCmd, MavComponent
+
+#: file types, each also the name of the folder in which QGroundControl looks for such a file
+MAVLINK_ACTIONS, CUSTOM_ACTIONS = "MavlinkActions", "CustomActions"
+FILE_TYPES = (MAVLINK_ACTIONS, CUSTOM_ACTIONS)
+FILE_NAME = "mav-tasks.json"
+PRIORITY = 5.0  # a parameter that is left out is 0, and that is the lowest
+MAX_COMMAND = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One button: what is on it, and the command with its parameters."""
+
+    label: str
+    description: str
+    command: int
+    params: tuple[float, ...]
+
+
+def _task(
+    label: str, description: str, command: MavCmd, *params: float, priority: float = PRIORITY
+) -> Action:
+    first = (*params, 0.0, 0.0, 0.0)[:3]
+    return Action(label, description, command, (*first, 0.0, 0.0, 0.0, priority))
+
+
+ACTIONS = (
+    _task("Forward 1 m", "Queue: drive 1 m ahead", MavCmd.TASK_MOVE, 1.0),
+    _task("Back 1 m", "Queue: drive 1 m backwards", MavCmd.TASK_MOVE, -1.0),
+    _task("Right 90", "Queue: turn 90 degrees clockwise on the spot", MavCmd.TASK_ROTATE, 90.0),
+    _task("Left 90", "Queue: turn 90 degrees anticlockwise", MavCmd.TASK_ROTATE, -90.0),
+    Action("STOP", "Stop at once, until continued", MavCmd.TASK_STOP, (0.0,)),
+    Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
+    Action("Continue", "Continue; ends a STOP", MavCmd.DO_PAUSE_CONTINUE, (1.0,)),
+    Action("Cancel task", "Call off the running task", MavCmd.TASK_CANCEL, (0.0,)),
+    Action("Clear queue", "Call off all that wait", MavCmd.TASK_CLEAR, (0.0,)),
+    Action("Held: again", "Do the held task again from here", MavCmd.TASK_RELEASE, (0.0, 0.0)),
+    Action("Held: rest", "Do what is left of the held task", MavCmd.TASK_RELEASE, (0.0, 1.0)),
+    Action("Held: skip", "Leave the held task out", MavCmd.TASK_RELEASE, (0.0, 2.0)),
+)
+
+
+def parse_action(text: str) -> Action:
+    """Read ``LABEL=COMMAND,param1,...,param7``; UsageError says what is wrong with it.
+
+    What is left out of a task's command is as not given: 0, and the usual priority.
+    """
+    label, equals, rest = text.partition("=")
+    command, *given = rest.split(",")
+    if not label or not equals or not command.isdecimal() or not 0 < int(command) <= MAX_COMMAND:
+        raise UsageError(f"--action {text}: expected LABEL=COMMAND,param1,...,param7")
+    try:
+        params = [float(value) for value in given]
+    except ValueError as error:
+        raise UsageError(
+            f"--action {text}: {str(error).rpartition(': ')[2]} is no number"
+        ) from error
+    if len(params) > 7 or not all(abs(value) < float("inf") for value in params):
+        raise UsageError(f"--action {text}: expected seven finite parameters at the most")
+    is_task = int(command) in (MavCmd.TASK_MOVE, MavCmd.TASK_ROTATE, MavCmd.TASK_DRIVE)
+    if is_task and len(params) < 7:
+        params = [*(params + [0.0] * 6)[:6], PRIORITY]
+    return Action(label, f"Command {command}", int(command), tuple(params))
+
+
+def file_of(
+    actions: Sequence[Action],
+    *,
+    file_type: str = MAVLINK_ACTIONS,
+    component: int = MavComponent.ONBOARD_COMPUTER,
+) -> str:
+    """Give the text of an actions file."""
+    entries = [
+        {
+            "label": action.label,
+            "description": action.description,
+            "mavCmd": int(action.command),
+            "compId": int(component),
+            **{
+                f"param{number}": value
+                for number, value in enumerate((*action.params, *[0.0] * 7)[:7], 1)
+            },
+        }
+        for action in actions
+    ]
+    file = {"version": 1, "fileType": file_type, "actions": entries}
+    return json.dumps(file, indent=2) + "\n"
+
+
+def install(documents: Path, actions: Sequence[Action], *, component: int) -> list[Path]:
+    """Write both files to where QGroundControl looks, below ``documents``; gives their paths.
+
+    UsageError says why one cannot be written.
+    """
+    written = []
+    for file_type in FILE_TYPES:
+        path = documents / "QGroundControl" / file_type / FILE_NAME
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(
+                file_of(actions, file_type=file_type, component=component), encoding="utf-8"
+            )
+        except OSError as error:
+            raise UsageError(f"{path}: {error.strerror}") from error
+        written.append(path)
+    return written
