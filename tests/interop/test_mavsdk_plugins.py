@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.services.parameter_table import PARAMETERS
 from tests.interop.scripts.heard import STREAMS
 from tests.kit.processes import stand
 from tests.kit.scripts import each_case, run_script
@@ -22,6 +23,12 @@ def test_fence_parameters_and_own_setpoints_work_as_without_a_server(
         said = run_script(f"{face}plugins", running, persona=persona, loss=loss)
         for line in ("fence [4]", "fences 0", "parameters True True", "moves", "stands"):
             assert line in said, said
+        if not face:
+            assert f"of the server {len(PARAMETERS)}" in said
+            assert "TSK_SPEED 0.75" in said
+        if not face and not loss:
+            assert "TSK_SPEED VALUE_OUT_OF_RANGE" in said
+            assert "TSK_NONE DOES_NOT_EXIST" in said
         assert "task 1" not in running.server.text, "none of it is a task"
 
 

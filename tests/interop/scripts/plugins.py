@@ -1,18 +1,22 @@
 """What a MAVSDK script does besides missions: a fence, parameters, setpoints of its own."""
 
 import time
+from contextlib import suppress
 from typing import Any
 
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.geofence import Geofence
 from mavsdk.plugins.offboard import Offboard
 from mavsdk.plugins.offboard.offboard import VelocityBodyYawspeed
-from mavsdk.plugins.param import Param
+from mavsdk.plugins.param import Param, ParamError
+from mavsdk.plugins.param.param import ProtocolVersion
 
 from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.common import arm, connected, wait_for
 from tests.interop.scripts.facts import LEAD
 from tests.interop.scripts.plans import fence
+
+SERVER = 191  # its component
 
 
 def geofence(here: Circumstances, system: Any, home: Any) -> None:
@@ -39,6 +43,21 @@ def parameters(here: Circumstances, system: Any) -> None:
     here.attempt(plugin.set_param_int, integer, before)
 
 
+def parameters_of_the_server(here: Circumstances, system: Any) -> None:
+    plugin = Param(system)
+    with suppress(ParamError):  # MAVSDK 4.1 says UNKNOWN, and has done it
+        plugin.select_component(SERVER, ProtocolVersion.V1)
+    here.attempt(plugin.set_param_float, "TSK_SPEED", 0.75)
+    print("TSK_SPEED", here.attempt(plugin.get_param_float, "TSK_SPEED"))
+    print("of the server", len(here.attempt(plugin.get_all_params).float_params))
+    if not here.is_lossy:  # an error that may be tried again comes eight times
+        for name, value in (("TSK_SPEED", 50.0), ("TSK_NONE", 1.0)):
+            try:
+                plugin.set_param_float(name, value)
+            except ParamError as error:
+                print(name, error.result.name)
+
+
 def setpoints(here: Circumstances, system: Any, telemetry: Any) -> None:
     arm(here, Action(system), telemetry)
     plugin = Offboard(system)
@@ -56,6 +75,7 @@ def main() -> None:
     with connected() as (here, system, telemetry, home):
         geofence(here, system, home)
         parameters(here, system)
+        parameters_of_the_server(here, system)
         setpoints(here, system, telemetry)
 
 
