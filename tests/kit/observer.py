@@ -64,6 +64,7 @@ class Ways(NamedTuple):
     manual: frozenset[int]
     arms_in_hold: bool
     sub_modes: bool  # DO_SET_MODE names main and sub mode
+    given_back: frozenset[int]  # modes by which a client has the server drive: return, mission
 
     def mode_of(self, message: Any) -> int:
         """Give the mode that a DO_SET_MODE asks for, -1 for nonsense."""
@@ -74,9 +75,16 @@ class Ways(NamedTuple):
         return int(message.param2) << 16 | int(message.param3) << 24
 
 
-ARDUPILOT_WAYS = Ways(15, 4, frozenset({0}), arms_in_hold=False, sub_modes=False)
+ARDUPILOT_WAYS = Ways(
+    15, 4, frozenset({0}), arms_in_hold=False, sub_modes=False, given_back=frozenset({10, 11})
+)
 PX4_WAYS = Ways(
-    6 << 16, 4 << 16 | 3 << 24, frozenset({1 << 16, 3 << 16}), arms_in_hold=True, sub_modes=True
+    6 << 16,
+    4 << 16 | 3 << 24,
+    frozenset({1 << 16, 3 << 16}),
+    arms_in_hold=True,
+    sub_modes=True,
+    given_back=frozenset({4 << 16 | 4 << 24, 4 << 16 | 5 << 24}),
 )
 
 
@@ -143,8 +151,8 @@ class Observer:
             self._asked.append((peer, data))
         if kind in COMMANDS:
             self._see_command_of_client(now, message)
-        elif kind == "SET_MODE" and message.custom_mode == self.ways.hold:
-            self.taken_over = False
+        elif kind == "SET_MODE":
+            self._see_wish_of_client(message.custom_mode)
         elif kind in BY_HAND and _off_centre(message):
             self._take_over(now, zeros=1)
 
@@ -249,7 +257,11 @@ class Observer:
             self._check_stop(now)
             self._before_continue = self.stopped, self.taken_over
             self.stopped = self.taken_over = False
-        elif message.command == SET_MODE and self.ways.mode_of(message) == self.ways.hold:
+        elif message.command == SET_MODE:
+            self._see_wish_of_client(self.ways.mode_of(message))
+
+    def _see_wish_of_client(self, mode: int) -> None:
+        if mode == self.ways.hold or mode in self.ways.given_back:
             self.taken_over = False
 
     def _see_heartbeat(self, now: float, message: Any) -> None:
