@@ -1,0 +1,248 @@
+"""The parameters of every component of one vehicle: how they are read, and what is missed."""
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from tests.kit.qgc.core import AUTOPILOT, Core
+from tests.kit.qgc.timers import Timer
+from tests.kit.qgc.vehicle import APM, PX4
+from tests.kit.qgc.wire import Message
+
+LIST_EACH, LIST_TRIES = 5.0, 5  # s [1.4], [11.1]
+HASH_WAIT = 1.0  # s [1.4]
+FTP_WAIT, FTP_TRIES = 1.0, 3  # s; assumed: "silence costs FTP retries"
+MISSING_WAIT = 3.0  # s without a value; assumed
+BATCH, READ_TRIES = 10, 5  # [1.4]
+SET_WAIT = 3.0  # s; assumed
+UNNUMBERED = 65535
+HASH = "_HASH_CHECK"
+PACKED_FILE = b"@PARAM/param.pck?withdefaults=1"
+OPEN_FILE, NAK, ACK = 4, 129, 128
+
+NO_ANSWER = (
+    "Vehicle {} did not respond to request for parameters. This will cause QGroundControl to be"
+    " unable to display its full user interface."
+)
+NOT_ALL = "QGroundControl was unable to retrieve the full set of parameters from vehicle {}."
+SETUP = "One or more vehicle components require setup prior to flight."
+MISSING = (
+    "Parameters are missing from firmware. You may be running a version of firmware which is not"
+    " fully supported or your firmware has a bug in it. Missing params: {}"
+)
+
+#: what must be there at connect [11.2], [11.3]
+NEEDED = {
+    PX4: ("SYS_AUTOSTART", "COM_RC_IN_MODE", "CAL_GYRO0_ID", "CAL_ACC0_ID"),
+    APM: (
+        *(f"RCMAP_{name}" for name in ("ROLL", "PITCH", "THROTTLE", "YAW")),
+        *(f"RC{n}_{what}" for n in (1, 2, 3, 4) for what in ("MIN", "MAX", "TRIM")),
+        *("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
+        *("INS_ACCOFFS_X", "INS_ACCOFFS_Y", "INS_ACCOFFS_Z"),
+        "FRAME_CLASS",
+    ),
+}
+
+
+@dataclass(slots=True)
+class Component:
+    """What is known of one component's parameters."""
+
+    count: int
+    values: dict[str, float] = field(default_factory=dict)
+    missing: set[int] = field(default_factory=set)
+    tries: int = 0
+
+    def __post_init__(self) -> None:
+        self.missing = set(range(self.count))
+
+
+class Parameters:
+    """Reads all parameters once, and edits single ones."""
+
+    def __init__(self, core: Core, firmware: str, ready: Callable[[], None]) -> None:
+        self._core = core
+        self._firmware = firmware
+        self._ready = ready
+        self.components: dict[int, Component] = {}
+        self.is_ready = False
+        self._asks_file = False
+        self._asks_hash = False
+        self._has_asked = False
+        self._list_tries = 0
+        self._timer: Timer | None = None
+        self._sets: dict[tuple[int, str], Timer] = {}
+
+    def load(self) -> None:
+        """Begin: by file from ArduPilot, by the digest from PX4, else by the list [1.4]."""
+        if self._firmware == APM:
+            self._asks_file = True
+            self._ask_file(1)
+        elif self._firmware == PX4 and self._core.profile.checks_hash:
+            self._asks_hash = True
+            self._core.send(
+                mavlink.MAVLink_param_request_read_message(
+                    self._core.system, AUTOPILOT, HASH.encode(), -1
+                )
+            )
+            self._wait(HASH_WAIT, self._ask_list)
+        else:
+            self._ask_list()
+
+    def value(self, name: str, component: int = AUTOPILOT) -> float | None:
+        """Give a parameter, None if there is none of that name."""
+        known = self.components.get(component)
+        return None if known is None else known.values.get(name)
+
+    def set(self, name: str, value: float, type_: int, *, component: int = AUTOPILOT) -> None:
+        """Edit one; the echo is what ends it [11.5]."""
+        wire = value if self._firmware == APM or type_ == 9 else _as_float(value, type_)
+        self._core.send(
+            mavlink.MAVLink_param_set_message(
+                self._core.system, component, name.encode(), wire, type_
+            )
+        )
+        self._sets[component, name] = self._core.timers.after(
+            SET_WAIT, lambda: self._core.popup(f"Parameter write failed: {component} {name}")
+        )
+
+    def receive(self, message: Message, component: int) -> None:
+        """Take a PARAM_VALUE of any component of the vehicle."""
+        name: str = message.param_id
+        if self._asks_file:
+            return  # [1.4]
+        if name == HASH:
+            if self._asks_hash:
+                self._ask_list()  # nothing is kept from another day: it never matches
+            return
+        if message.param_index == UNNUMBERED and not self._has_asked:
+            return  # [1.4]
+        known = self.components.get(component)
+        if known is None:
+            known = self.components[component] = Component(message.param_count)
+        known.values[name] = self._value(message)
+        known.missing.discard(message.param_index)
+        timer = self._sets.pop((component, name), None)
+        if timer is not None:
+            timer.cancel()
+        if not self.is_ready:
+            self._list_tries = 0
+            if all(not each.missing for each in self.components.values()) and (
+                AUTOPILOT in self.components
+            ):
+                self._end()
+            else:
+                self._wait(MISSING_WAIT, self._ask_missing)
+
+    def receive_file(self, message: Message) -> None:
+        """Take an answer about the packed file: whatever it says, the list is asked for [11.3]."""
+        if not self._asks_file or message.payload[5] != OPEN_FILE:
+            return
+        if message.payload[3] == NAK:
+            self._asks_file = False
+            self._ask_list()
+        elif message.payload[3] == ACK:
+            raise NotImplementedError("parameters by file")
+
+    def _ask_file(self, tries: int) -> None:
+        if tries > FTP_TRIES:
+            self._asks_file = False
+            self._ask_list()
+            return
+        payload = [tries, 0, 0, OPEN_FILE, len(PACKED_FILE), 0, 0, 0, 0, 0, 0, 0, *PACKED_FILE]
+        payload += [0] * (251 - len(payload))
+        self._core.send(
+            mavlink.MAVLink_file_transfer_protocol_message(0, self._core.system, AUTOPILOT, payload)
+        )
+        self._wait(FTP_WAIT, lambda: self._ask_file(tries + 1))
+
+    def _ask_list(self) -> None:
+        self._asks_hash = False
+        self._has_asked = True
+        if self._list_tries >= LIST_TRIES:
+            if self._firmware in NEEDED:  # generic: no popup [1.4]
+                self._core.popup(NO_ANSWER.format(self._core.system))
+            return
+        self._list_tries += 1
+        self._core.send(mavlink.MAVLink_param_request_list_message(self._core.system, 0))
+        self._wait(LIST_EACH, self._ask_list)
+
+    def _ask_missing(self) -> None:
+        wanted = [
+            (component, index)
+            for component, known in self.components.items()
+            for index in sorted(known.missing)
+        ]
+        if AUTOPILOT not in self.components:
+            self._ask_list()
+            return
+        batch = wanted[:BATCH]
+        for component in {component for component, _ in batch}:
+            known = self.components[component]
+            known.tries += 1
+            if known.tries > READ_TRIES * (1 + known.count // BATCH):
+                self._core.popup(NOT_ALL.format(self._core.system))
+                return
+        for component, index in batch:
+            self._core.send(
+                mavlink.MAVLink_param_request_read_message(self._core.system, component, b"", index)
+            )
+        self._wait(MISSING_WAIT, self._ask_missing)
+
+    def _end(self) -> None:
+        self.is_ready = True
+        if self._timer is not None:
+            self._timer.cancel()
+        self._check_setup()
+        self._ready()
+
+    def _check_setup(self) -> None:
+        """Two popups, the second one a second later [11.2]; none for generic [11.4]."""
+        needed = NEEDED.get(self._firmware, ())
+        missing = [name for name in needed if self.value(name) is None]
+        either = self.value("CAL_MAG0_ID"), self.value("SYS_HAS_MAG")
+        if self._firmware == PX4 and either == (None, None):
+            missing.append("SYS_HAS_MAG")
+        if missing or not self._is_set_up():
+            self._core.popup(SETUP)
+        if missing:
+            words = MISSING.format(", ".join(missing))
+            self._core.timers.after(1.0, lambda: self._core.popup(words))
+
+    def _is_set_up(self) -> bool:
+        value = self.value
+        if self._firmware == PX4:
+            return (
+                all(value(name) for name in ("SYS_AUTOSTART", "CAL_GYRO0_ID", "CAL_ACC0_ID"))
+                and value("COM_RC_IN_MODE") == 1
+                and (value("SYS_HAS_MAG") == 0 or bool(value("CAL_MAG0_ID")))
+            )
+        if self._firmware == APM:
+            radio = [value(f"RC{n}_{what}") for n in (1, 2, 3, 4) for what in ("MIN", "MAX")]
+            return (
+                all(value(f"INS_ACCOFFS_{axis}") for axis in "XYZ")
+                and bool(value("FRAME_CLASS"))
+                and any(each not in (1100, 1900, 1500) for each in radio)
+            )
+        return True
+
+    def _value(self, message: Message) -> float:
+        """ArduPilot casts, the others put the bytes of an integer into the float [1.4]."""
+        if self._firmware == APM or message.param_type == 9:
+            return float(message.param_value)
+        layout = {5: "<I", 6: "<i"}.get(message.param_type)
+        if layout is None:
+            return float(message.param_value)
+        return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
+
+    def _wait(self, seconds: float, call: Callable[[], None]) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._core.timers.after(seconds, call)
+
+
+def _as_float(value: float, type_: int) -> float:
+    layout = {5: "<I", 6: "<i"}[type_]
+    return float(struct.unpack("<f", struct.pack(layout, int(value)))[0])

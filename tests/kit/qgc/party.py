@@ -1,0 +1,73 @@
+"""The station on a memory net, as a party of a virtual world."""
+
+from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.links.memory import MemoryNet
+from tests.kit.qgc.client import Qgc
+from tests.kit.qgc.guided import Operator
+from tests.kit.qgc.plan_master import PlanMaster
+from tests.kit.qgc.profile import Profile
+from tests.kit.qgc.session import Session
+
+
+class QgcParty:
+    """One station with an endpoint of its own."""
+
+    def __init__(
+        self, net: MemoryNet, name: str, profile: Profile, *, server: str = CLIENT_LINK
+    ) -> None:
+        self.name = name
+        self.qgc = Qgc(profile, now=net.now)
+        self._link = net.link(name)
+        self._server = server
+        self._flush()
+
+    def __repr__(self) -> str:
+        return f"QgcParty({self.name}, {self.qgc!r})"
+
+    @property
+    def vehicle(self) -> Session:
+        """The only vehicle."""
+        (session,) = self.qgc.vehicles.values()
+        return session
+
+    @property
+    def operator(self) -> Operator:
+        """The buttons for the only vehicle; what they send leaves with the next step of time."""
+        return self.vehicle.operator
+
+    @property
+    def plans(self) -> PlanMaster:
+        """The plan view."""
+        return self.vehicle.plans
+
+    @property
+    def popups(self) -> list[str]:
+        """The texts of all popups so far."""
+        return [each.text for each in self.qgc.screen.popups]
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the initial connection is complete."""
+        return bool(self.qgc.vehicles) and self.vehicle.connecting.is_complete
+
+    def check(self) -> None:
+        """Raise if anything was shown that must not be, or a loss that was none."""
+        complaints = self.qgc.screen.complaints
+        assert not complaints, f"{self.name}: {complaints}"
+        assert not self.qgc.lost, f"{self.name}: seems to have lost {self.qgc.lost}"
+        assert self.qgc.wire.bad == 0, f"{self.name}: {self.qgc.wire.bad} times no packet"
+
+    def next_deadline(self) -> float | None:
+        """Give when ``turn`` has something to do, unless something arrives before."""
+        return self.qgc.next_deadline()
+
+    def turn(self, *, now: float) -> None:
+        """Read what has arrived, do what is due, send what follows."""
+        for _, data in self._link.receive(len(self._link.arrived)):
+            self.qgc.receive(data, now=now)
+        self.qgc.handle_deadline(now=now)
+        self._flush()
+
+    def _flush(self) -> None:
+        for data in self.qgc.take_packets():
+            self._link.send(self._server, data)

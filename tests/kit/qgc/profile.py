@@ -1,0 +1,63 @@
+"""What differs between the versions of QGroundControl that people run."""
+
+from dataclasses import dataclass, replace
+
+HOME_POSITION, EXTENDED_SYS_STATE = 242, 245
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """One version; times in seconds."""
+
+    name: str
+    ack_timeout: float  # [2.2]; looked at each half second
+    restarts_timer: bool  # a repeated command has the whole time again; [11.1]: 4.x does not
+    in_progress: str  # [2.4]: "restarts" the time, is "kept" without, or is "final"
+    asks_protocol_version: bool  # [1.3]: of PX4 and generic; without an answer all is MAVLink 1
+    asks_modes: bool  # [1.3] AVAILABLE_MODES
+    asks_gimbals: bool  # [1.3] of each component; [11.1]: 4.x does not
+    checks_hash: bool  # [1.4] PX4's _HASH_CHECK before the list; [11.1]: 4.x does not
+    hears_mavlink1: bool  # [1.1]: master hears nothing but heartbeats in it
+    tries_states_again: bool  # [1.3]: a silent state of the connection is tried a second time
+    parameters_given_up: float | None  # [1.4]: s until it goes on without; None: never
+    streams_at_once: bool  # [1.2] the data streams of ArduPilot; [11.3]: 4.x one each half second
+    intervals: tuple[int, ...]  # [1.2], [11.3]: asked of ArduPilot once a second
+    repositions: bool  # [2.5]: sends ArduPilot DO_REPOSITION for "go to"; 4.2 an item only
+    sets_item_by_command: bool  # [2.5], [11.4]
+
+
+V4 = Profile(
+    name="v4",
+    ack_timeout=3.0,
+    restarts_timer=False,
+    in_progress="kept",
+    asks_protocol_version=True,
+    asks_modes=False,
+    asks_gimbals=False,
+    checks_hash=False,
+    hears_mavlink1=True,
+    tries_states_again=False,
+    parameters_given_up=None,
+    streams_at_once=False,
+    intervals=(HOME_POSITION,),
+    repositions=True,
+    sets_item_by_command=False,
+)
+V42 = replace(V4, name="v4.2", in_progress="final", repositions=False)
+MASTER = Profile(
+    name="master",
+    ack_timeout=1.2,
+    restarts_timer=True,
+    in_progress="restarts",
+    asks_protocol_version=False,
+    asks_modes=True,
+    asks_gimbals=True,
+    checks_hash=True,
+    hears_mavlink1=False,
+    tries_states_again=True,
+    parameters_given_up=120.0,
+    streams_at_once=True,
+    intervals=(HOME_POSITION, EXTENDED_SYS_STATE),
+    repositions=True,
+    sets_item_by_command=True,
+)
