@@ -48,6 +48,11 @@ class Qgc:
         """Do what is due."""
         self._timers.handle_deadline(now=now)
 
+    @property
+    def has_packets(self) -> bool:
+        """Whether there is something to send."""
+        return bool(self._outgoing)
+
     def take_packets(self) -> list[bytes]:
         """Hand over what is to be sent, in order."""
         taken, self._outgoing = self._outgoing, []

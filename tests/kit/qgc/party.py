@@ -17,6 +17,7 @@ class QgcParty:
     ) -> None:
         self.name = name
         self.qgc = Qgc(profile, now=net.now)
+        self._net = net
         self._link = net.link(name)
         self._server = server
         self._flush()
@@ -26,7 +27,8 @@ class QgcParty:
 
     @property
     def vehicle(self) -> Session:
-        """The only vehicle."""
+        """The only vehicle; what is done to it now is done at the time that it is now."""
+        self.qgc.handle_deadline(now=self._net.now)
         (session,) = self.qgc.vehicles.values()
         return session
 
@@ -59,7 +61,7 @@ class QgcParty:
 
     def next_deadline(self) -> float | None:
         """Give when ``turn`` has something to do, unless something arrives before."""
-        return self.qgc.next_deadline()
+        return self._net.now if self.qgc.has_packets else self.qgc.next_deadline()
 
     def turn(self, *, now: float) -> None:
         """Read what has arrived, do what is due, send what follows."""
