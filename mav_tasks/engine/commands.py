@@ -13,6 +13,7 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import (
     CHANGE_MODE,
+    OUR_COMMANDS,
     bad,
     becomes_task,
     place_in,
@@ -40,8 +41,6 @@ from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
 
-#: command ids set aside for tasks
-OUR_COMMANDS = range(54000, 54050)
 #: commands that a vehicle follows in the mode in which we drive it: a second source
 MOVING = frozenset(
     {

@@ -47,6 +47,8 @@ NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT, which has no NaN there
 LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
 MAX_WAIT = 86_400.0  # s
 MAX_DELAY = 31_536_000.0  # s, a year
+#: command ids set aside for tasks
+OUR_COMMANDS = range(54000, 54050)
 CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
 MAX_FLAGS = 0xFFFFFF  # of a bit mask in a float32
 MIN_SPEED = 0.01  # m/s; slower, a drive of a metre takes minutes and is taken for being stuck

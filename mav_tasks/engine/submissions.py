@@ -6,7 +6,7 @@ from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import wish_of
+from mav_tasks.engine.goals import OUR_COMMANDS, wish_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -64,7 +64,8 @@ class Submissions:
     def submit(self, asked: Asked, *, now: float) -> None:
         """Take in the task that a command asks for; Rejection says why not."""
         command, vehicle = asked.command, asked.vehicle
-        asked.client.uses_dialect = True
+        # a stock ground station cannot read TASK_STATUS: to it that is a packet lost
+        asked.client.uses_dialect |= command.command in OUR_COMMANDS
         submitter = asked.client.submitter(asked.packet.source)
         wish = wish_of(
             command,
@@ -196,7 +197,7 @@ class Submissions:
         """The submission is durable: acknowledge it with the task's id, and tell of it."""
         for each in self._undecided.pop(task.id):
             each.answer(MavResult.ACCEPTED, task.id)
-            each.client.statuses.changed(task.id)
+            _note(each, task.id)
         words = f"Task {task.id} queued: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, asked.vehicle.server_address, now=now)
 
@@ -219,10 +220,16 @@ class Submissions:
                 askers.append(asked)
             return
         asked.answer(MavResult.ACCEPTED, known.task_id)
-        asked.client.statuses.changed(known.task_id)  # it names the nonce; an ack does not
+        _note(asked, known.task_id)  # it names the nonce; an ack does not
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL):
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
             task = self._book.get(known.task_id)
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"same {what} again: still task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def _note(asked: Asked, task_id: TaskId) -> None:
+    """Have a client that reads it told of a task's state."""
+    if asked.client.uses_dialect:
+        asked.client.statuses.changed(task_id)

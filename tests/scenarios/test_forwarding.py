@@ -1,6 +1,7 @@
 """Clients see the rover as if nothing stood between, and hear nothing that is not for them."""
 
 from itertools import pairwise
+from math import nan
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -18,6 +19,7 @@ from tests.kit.client import (
     HOLD,
     IDS,
     REQUEST,
+    RTL,
     SET_INTERVAL,
     SET_MODE,
     TASK_STATUS,
@@ -356,6 +358,18 @@ def test_messages_of_our_dialect_go_only_to_clients_that_use_it(world: World) ->
     world.until_idle(tasks=1)
     assert not [p for p in stock.received if p.message_id in OUR_MESSAGES]
     assert len(world.client.statuses(1)) > 10
+
+
+@pytest.mark.parametrize(
+    ("command", "params"), [(192, (-1, 1, 0, nan, -35.36325, 149.16524)), (SET_MODE, (1, RTL))]
+)
+def test_standard_commands_do_not_make_a_client_use_our_dialect(
+    world: World, command: int, params: tuple[float, ...]
+) -> None:
+    sent = world.client.command(command, *params, target=(1, 1))
+    world.run(3)
+    assert sent.task_id == 1
+    assert not [p for p in world.client.received if p.message_id in OUR_MESSAGES]
 
 
 def test_a_stream_of_statuses_has_the_rate_that_was_asked_for(world: World) -> None:

@@ -149,7 +149,7 @@ def test_delays_and_loiters_stand_and_takeoff_is_nothing(world: World) -> None:
     world.until_idle(tasks=2)
     assert takeoff.answer == (ACCEPTED, 0)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
-    assert world.client.statuses(1)[-1].execution_time == pytest.approx(2.0, abs=0.3)
+    assert world.task(1).progress.execution_time == pytest.approx(2.0, abs=0.3)
     assert world.pose()[0] == pytest.approx(0.5, abs=0.03)
 
 
