@@ -8,6 +8,7 @@ from rover_sim.commands import (
     CommandParts,
     CommandTable,
 )
+from rover_sim.home_command import HomeCommand
 from rover_sim.message_commands import MessageCommands
 from rover_sim.modes import Mode
 from rover_sim.setpoints import GLOBAL_FRAMES, read_place
@@ -30,6 +31,7 @@ def ardupilot_commands(parts: CommandParts) -> CommandTable:
     return CommandTable(
         actions={
             **asking.actions(),
+            **HomeCommand(parts, refusal=MavResult.FAILED).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,
             MavCmd.NAV_RETURN_TO_LAUNCH: commands.return_to_launch,

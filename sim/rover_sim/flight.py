@@ -160,6 +160,12 @@ class FlightControl:
             self._rules.choose(self.mode)
             self._outbox.say(MavSeverity.INFO, self._rules.arming_text(armed=armed))
 
+    def set_home(self, place: Destination | None) -> None:
+        """Put home at a place; None: where the rover is."""
+        self._home_due = place is None
+        if place is not None:
+            self.home = place
+
     def set_sticks(self, speed: float, yaw_rate: float) -> None:
         """Drive by hand; has an effect only in MANUAL and POSITION."""
         self._sticks = Demand(speed, yaw_rate)

@@ -11,6 +11,7 @@ from rover_sim.commands import (
     CommandTable,
 )
 from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7
+from rover_sim.home_command import HomeCommand
 from rover_sim.message_commands import MessageCommands
 from rover_sim.modes import Mode
 from rover_sim.setpoints import Destination
@@ -33,6 +34,7 @@ def px4_commands(parts: CommandParts) -> CommandTable:
     return CommandTable(
         actions={
             **asking.actions(),
+            **HomeCommand(parts, refusal=MavResult.DENIED).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,
             MavCmd.NAV_RETURN_TO_LAUNCH: commands.return_to_launch,

@@ -1,0 +1,46 @@
+"""DO_SET_HOME: the same on every make but for the refusing result. After the sources, not observed.
+
+The altitude that is named changes nothing here: the world is flat.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mav_tasks.mavlink import messages
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from rover_sim.commands import Action, Command, CommandParts
+from rover_sim.setpoints import read_place
+
+HERE = 1.0  # param1
+
+
+@dataclass(frozen=True, slots=True)
+class HomeCommand:
+    """Sets home to where the rover is, or to a place."""
+
+    parts: CommandParts
+    refusal: MavResult
+
+    def actions(self) -> Mapping[int, Action]:
+        """Give the part of a table that is this command."""
+        return {MavCmd.DO_SET_HOME: self._set_home}
+
+    def _set_home(self, command: Command, now: float) -> MavResult:
+        if command.params[0] == HERE:
+            self.parts.flight.set_home(None)
+            return MavResult.ACCEPTED
+        latitude, longitude = command.place or _as_degE7(command.degrees)
+        place = read_place(latitude, longitude, self.parts.origin)
+        if place is None:
+            return self.refusal
+        self.parts.flight.set_home(place)
+        self.parts.send_now(messages.HomePosition.id, now)
+        return MavResult.ACCEPTED
+
+
+def _as_degE7(degrees: tuple[float, float] | None) -> tuple[int, int]:
+    """Give the place of a COMMAND_LONG; 0/0, which is none, for what is no number."""
+    if degrees is None or not all(math.isfinite(value) for value in degrees):
+        return 0, 0
+    return round(degrees[0] * 1e7), round(degrees[1] * 1e7)
