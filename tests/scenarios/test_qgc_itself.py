@@ -68,7 +68,7 @@ class TestConnecting:
     @both
     @pytest.mark.parametrize("autopilot", [APM_AUTOPILOT, 12, GENERIC_AUTOPILOT])
     def test_to_a_good_vehicle_is_quick_and_silent(self, profile: Profile, autopilot: int) -> None:
-        pair = Pair(profile, autopilot=autopilot).connected(within=1.5)
+        pair = Pair(profile, autopilot=autopilot).connected(within=2.5)
         pair.run(20)
         pair.party.check()
 

@@ -1,0 +1,39 @@
+"""A station in a whole world: server, rover and station, as an operator finds them."""
+
+from math import inf
+
+from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.qgc.party import QgcParty
+from tests.kit.qgc.profile import Profile
+from tests.kit.world import World
+
+CONNECTED_WITHIN = 2.0  # s; a real one needs 0.42 with everything answered at once [11.1]
+
+
+def join(world: World, profile: Profile, name: str = "qgc") -> QgcParty:
+    """Let a station dial in, connect, and see where the rover is."""
+    party = QgcParty(world.net, name, profile)
+    world.join(party)
+    world.until(lambda: party.is_connected, within=CONNECTED_WITHIN)
+    state = party.vehicle.state
+    world.until(lambda: state.place and state.home, within=CONNECTED_WITHIN)
+    return party
+
+
+def place(north: float, east: float) -> tuple[int, int]:
+    """Give a place in degE7, from metres."""
+    return DEFAULT_ORIGIN.to_global(north, east)
+
+
+def degrees(north: float, east: float) -> tuple[float, float]:
+    """Give a place in degrees, from metres."""
+    x, y = place(north, east)
+    return x / 1e7, y / 1e7
+
+
+def slowest_ack(party: QgcParty) -> float:
+    """Give how long the slowest ack took, s; inf if one never came."""
+    return max(
+        (inf if sent.acked_at is None else sent.took for sent in party.vehicle.commands.sent),
+        default=0.0,
+    )

@@ -1,0 +1,167 @@
+"""Plans of QGroundControl: sent, driven to the end, read, replaced while driving, removed."""
+
+from math import hypot
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
+from tests.kit.qgc.joined import join, place, slowest_ack
+from tests.kit.qgc.party import QgcParty
+from tests.kit.qgc.plan_master import RUNS, Plan
+from tests.kit.qgc.profile import MASTER, V4, Profile
+from tests.kit.world import PROMPT, World
+from tests.scenarios.conftest import MakeWorld
+
+FENCE = [place(n, e) for n, e in ((-9, -9), (-9, 9), (9, 9), (9, -9))]
+FIRST = Plan(place(0, 0), [place(1.5, 0), place(1.5, 1)], fence=FENCE, rally=[place(0, 0.5)])
+NEXT = FIRST._replace(waypoints=[place(0.5, 1)], speed=0.4)
+ALL_WELL = {0: True, 1: True, 2: True}
+
+each_guided = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+each_make = pytest.mark.parametrize(
+    "persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name
+)
+each_slow = pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
+each_version = pytest.mark.parametrize("profile", [V4, MASTER], ids=lambda p: p.name)
+
+
+def is_near(world: World, north: float, east: float) -> bool:
+    """Whether the rover stands where a plan ends; a PX4 one slides a little."""
+    return hypot(world.truth.north - north, world.truth.east - east) < 0.1
+
+
+def upload(world: World, party: QgcParty, plan: Plan) -> None:
+    """Send a plan and wait until the plan view says it is done."""
+    party.plans.upload(plan)
+    world.until(lambda: party.plans.is_done, within=5)
+    assert party.plans.outcome == ALL_WELL, party.popups
+
+
+def assert_read_back(party: QgcParty, plan: Plan, firmware: str) -> None:
+    managers = party.plans.managers
+    sent = plan.mission(firmware), plan.fence_items(), plan.rally_items()
+    for kind, items in enumerate(sent):
+        known = managers[kind].known
+        assert known is not None
+        assert [item.key for item in known] == [item.key for item in items]
+
+
+@each_version
+@each_guided
+def test_from_the_upload_to_the_removal(
+    make_world: MakeWorld, persona: Persona, profile: Profile
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, profile)
+    upload(world, party, FIRST)
+    assert "start" in party.operator.offers
+    party.operator.start()
+    world.until_state(1, S.EXECUTING, within=15)
+    world.until(lambda: world.truth.north > 0.5, within=20)
+    assert party.operator.offers >= {"emergency stop", "return", "go to", "pause"}
+    upload(world, party, NEXT)
+    assert world.state(1)[0] is S.EXECUTING, "another plan does not disturb the one that is driven"
+    world.until_state(1, S.COMPLETED, within=60)
+    assert is_near(world, 1.5, 1.0)
+    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
+    world.until_state(2, S.COMPLETED, within=60)
+    assert is_near(world, 0.5, 1.0)
+    party.plans.download()
+    world.until(lambda: party.plans.is_done, within=5)
+    assert_read_back(party, NEXT, party.vehicle.state.firmware)
+    party.plans.remove()
+    world.until(lambda: party.plans.is_done, within=5)
+    assert party.plans.outcome == ALL_WELL
+    party.plans.download()
+    world.until(lambda: party.plans.is_done, within=5)
+    assert [manager.known for manager in party.plans.managers.values()] == [()] * 3
+    party.check()
+    assert slowest_ack(party) < profile.ack_timeout / 2
+    assert world.state(1)[0] is world.state(2)[0] is S.COMPLETED
+
+
+@each_make
+def test_of_a_whole_field_with_fence_and_rally_points(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, MASTER)
+    field = [place(i % 10 * 0.5, i // 10 * 0.5) for i in range(100)]
+    upload(world, party, FIRST._replace(waypoints=field))
+    another = join(world, V4, "another")
+    assert_read_back(another, FIRST._replace(waypoints=field), party.vehicle.state.firmware)
+    party.check()
+    another.check()
+
+
+@each_slow
+def test_a_rover_that_shows_its_mode_once_a_second_starts_without_a_popup(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    upload(world, party, FIRST)
+    party.operator.start()
+    world.until_state(1, S.EXECUTING, within=20)
+    world.run(4)
+    assert party.qgc.count_sent("SET_MODE") <= 1
+    party.check()
+
+
+@each_version
+@each_guided
+def test_is_interrupted_and_gone_on_with(
+    make_world: MakeWorld, persona: Persona, profile: Profile
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, profile)
+    upload(world, party, FIRST._replace(waypoints=[place(3, 0), place(3, 3)]))
+    party.operator.start()
+    world.until(lambda: world.truth.north > 0.7, within=30)
+    party.operator.pause_all()
+    world.run(3)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    # an ArduPilot rover says in HOLD that it is on standby: for the station it does not fly
+    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
+    world.until(lambda: world.truth.north > 2.0, within=20)
+    assert world.state(1)[0] is S.EXECUTING
+    party.operator.set_item(2 if persona is PROMPT else 1)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert is_near(world, 3.0, 3.0)
+    assert len(world.tasks()) == 1
+    party.check()
+
+
+@each_guided
+def test_is_not_held_up_by_the_mode_that_is_shown(make_world: MakeWorld, persona: Persona) -> None:
+    """The rover's own mission mode is shown for a moment only: else a next plan is refused."""
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    upload(world, party, FIRST)
+    party.operator.start()
+    world.until_state(1, S.EXECUTING, within=15)
+    world.run(1.3)
+    assert not party.vehicle.state.is_in_mission_mode
+    upload(world, party, NEXT)
+    assert RUNS not in party.popups
+    party.check()
+
+
+@each_make
+def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    party.plans.upload(FIRST._replace(waypoints=[place(1, 0), place(30_000, 0), place(1, 1)]))
+    world.until(lambda: party.plans.is_done, within=5)
+    number = 2 if persona is PROMPT else 1
+    (popup,) = party.popups
+    assert popup.startswith("Mission transfer failed. Error: ")
+    assert popup.endswith(f"Item #{number} Command: 16")
+    assert party.plans.outcome == {0: False, 1: True, 2: True}
+    assert world.tasks() == ()
+    assert party.qgc.screen.violations == []
