@@ -6,6 +6,7 @@ from random import Random
 
 import pytest
 
+from mav_tasks.engine.inputs import LinkChanged, LinkSide
 from mav_tasks.in_memory import CLIENT_LINK
 from rover_sim.personas import Persona
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
@@ -89,6 +90,38 @@ class TestOne:
         assert losses.visible[AUTOPILOT] > 10
         assert party.qgc.lost == +losses.visible
         assert party.popups == []
+
+
+@each_version
+def test_one_that_listens_is_spoken_to_first(make_world: MakeWorld, profile: Profile) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    party = QgcParty(world.net, "listening", profile, dials=False)
+    world.join(party)
+    speaking = LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=True, peers=("listening",))
+    world.server.pump.handle(speaking, now=world.now)
+    world.until(lambda: party.is_connected, within=4)
+    world.run(10)
+    party.check()
+
+
+@each_version
+def test_two_rovers_are_two_vehicles(make_world: MakeWorld, profile: Profile) -> None:
+    world = make_world(rovers=2)
+    party = QgcParty(world.net, "qgc", profile)
+    world.join(party)
+    sessions = party.qgc.vehicles
+    world.until(
+        lambda: len(sessions) == 2 and all(s.connecting.is_complete for s in sessions.values()),
+        within=5,
+    )
+    pressed = [sessions[number].operator.action(512, 148) for number in (2, 1)]
+    world.run(5)
+    assert [each.result for each in pressed] == [0, 0]
+    party.check()
+    sessions[2].operator.action(54000, 1.0, component=191)
+    world.run(3)
+    assert [task.vehicle for task in world.tasks()] == [2]
+    assert party.qgc.screen.complaints == []
 
 
 @each_make

@@ -4,9 +4,11 @@ from math import hypot
 
 import pytest
 
+from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.mission import ITEM_INT, REQUEST_INT
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
 from tests.kit.qgc.joined import join, place, slowest_ack
 from tests.kit.qgc.party import QgcParty
@@ -33,10 +35,10 @@ def is_near(world: World, north: float, east: float) -> bool:
     return hypot(world.truth.north - north, world.truth.east - east) < 0.1
 
 
-def upload(world: World, party: QgcParty, plan: Plan) -> None:
+def upload(world: World, party: QgcParty, plan: Plan, *, within: float = 5) -> None:
     """Send a plan and wait until the plan view says it is done."""
     party.plans.upload(plan)
-    world.until(lambda: party.plans.is_done, within=5)
+    world.until(lambda: party.plans.is_done, within=within)
     assert party.plans.outcome == ALL_WELL, party.popups
 
 
@@ -165,3 +167,26 @@ def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
     assert party.plans.outcome == {0: False, 1: True, 2: True}
     assert world.tasks() == ()
     assert party.qgc.screen.violations == []
+
+
+@each_version
+@pytest.mark.parametrize("lost", [ITEM_INT, REQUEST_INT])
+def test_what_is_lost_of_an_upload_is_asked_for_again_in_time(
+    make_world: MakeWorld, profile: Profile, lost: int
+) -> None:
+    """A station waits for 1.5 s and never sends again by itself."""
+    world = make_world()
+    party = join(world, profile)
+    seen = 0
+
+    def loses(source: str, target: str, data: bytes) -> bool:
+        nonlocal seen
+        if CLIENT_LINK not in (source, target) or data[7] != lost or data[0] != 0xFD:
+            return False
+        seen += 1
+        return seen % 3 == 0
+
+    world.watched.loses = loses
+    upload(world, party, FIRST._replace(waypoints=[place(n, 0) for n in range(8)]), within=30)
+    assert seen > 12
+    assert party.qgc.screen.complaints == []

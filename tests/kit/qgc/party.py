@@ -13,10 +13,16 @@ class QgcParty:
     """One station with an endpoint of its own."""
 
     def __init__(
-        self, net: MemoryNet, name: str, profile: Profile, *, server: str = CLIENT_LINK
+        self,
+        net: MemoryNet,
+        name: str,
+        profile: Profile,
+        *,
+        server: str = CLIENT_LINK,
+        dials: bool = True,
     ) -> None:
         self.name = name
-        self.qgc = Qgc(profile, now=net.now)
+        self.qgc = Qgc(profile, now=net.now, dials=dials)
         self._net = net
         self._link = net.link(name)
         self._server = server

@@ -41,7 +41,7 @@ class VehicleState:
 
     def __init__(self, heartbeat: Message, *, now: float) -> None:
         self.firmware = FIRMWARE.get(heartbeat.autopilot, GENERIC)
-        self.heard_at = now
+        self.heard_at = self.beat_at = now
         self.landed_state = 0  # unknown
         self.place: Place | None = None
         self.relative_altitude = nan
@@ -71,9 +71,10 @@ class VehicleState:
             return self.armed and self.status in (ACTIVE, CRITICAL, EMERGENCY)
         return self.landed_state in NOT_LANDED
 
-    def receive(self, name: str, message: Message) -> None:
+    def receive(self, name: str, message: Message, *, now: float) -> None:
         """Take a message of component 1."""
         if name == "HEARTBEAT":
+            self.beat_at = now
             self._take_heartbeat(message)
         elif name == "EXTENDED_SYS_STATE":
             self.landed_state = message.landed_state
