@@ -57,39 +57,38 @@ class Losses:
 
 @each_version
 @each_make
-class TestOne:
-    def test_connects_and_stays_without_a_complaint(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = join(world, profile)
-        world.run(20)
-        party.check()
-        asked = [
-            message.mission_type
-            for _, name, message in party.qgc.sent
-            if name == "MISSION_REQUEST_LIST"
-        ]
-        assert asked == [0, 1, 2], "all three types, each asked once"
-        assert party.qgc.count_sent("PARAM_REQUEST_LIST") == 1
-        assert party.vehicle.parameters.components[1].missing == set()
-        assert slowest_ack(party) < ACK_IN_TIME
-        assert not party.qgc.wire.sends_mavlink1
-        assert party.qgc.wire.received[TASK_SERVER] > 15
-        assert party.qgc.screen.notices == []
+def test_it_connects_and_stays_without_a_complaint(
+    make_world: MakeWorld, persona: Persona, profile: Profile
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, profile)
+    world.run(20)
+    party.check()
+    asked = [
+        message.mission_type
+        for _, name, message in party.qgc.sent
+        if name == "MISSION_REQUEST_LIST"
+    ]
+    assert asked == [0, 1, 2], "all three types, each asked once"
+    assert party.qgc.count_sent("PARAM_REQUEST_LIST") == 1
+    assert party.vehicle.parameters.components[1].missing == set()
+    assert slowest_ack(party) < ACK_IN_TIME
+    assert not party.qgc.wire.sends_mavlink1
+    assert party.qgc.wire.received[TASK_SERVER] > 15
+    assert party.qgc.screen.notices == []
 
-    def test_sees_no_loss_but_what_was_lost(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = QgcParty(world.net, "qgc", profile)
-        losses = Losses(world, "qgc", share=0.05, seed=7)
-        world.join(party)
-        world.until(lambda: party.is_connected, within=30)
-        world.run(25)
-        assert losses.visible[AUTOPILOT] > 10
-        assert party.qgc.lost == +losses.visible
-        assert party.popups == []
+
+@each_make
+def test_it_sees_no_loss_but_what_was_lost(make_world: MakeWorld, persona: Persona) -> None:
+    world = make_world(persona=persona)
+    party = QgcParty(world.net, "qgc", V4)
+    losses = Losses(world, "qgc", share=0.05, seed=7)
+    world.join(party)
+    world.until(lambda: party.is_connected, within=30)
+    world.run(25)
+    assert losses.visible[AUTOPILOT] > 10
+    assert party.qgc.lost == +losses.visible
+    assert party.popups == []
 
 
 @each_version
