@@ -460,11 +460,12 @@ class TestTexts:
         pair.run(0.1)
         assert pair.popups == ([text] if is_popup else [])
 
-    def test_pieces_are_joined(self) -> None:
+    @pytest.mark.parametrize("length", [51, 74, 99, 100, 149])
+    def test_pieces_are_joined(self, length: int) -> None:
         pair = Pair().connected()
-        text = "The mission leads over the fence at item 3, and that is told in two pieces"
+        text = ("The mission leads over the fence at item 3. " * 4)[:length].strip()
         pair.stub.say(3, text)
-        pair.run(0.1)
+        pair.run(1.1)
         assert pair.popups == [text]
 
 

@@ -59,6 +59,11 @@ class Texts:
         if len(text.encode()) < 50:
             self._finish(component, now)
 
+    def give_up(self, component: int, message_id: int, *, now: float) -> None:
+        """Show what has come of a text whose end did not come."""
+        if self._open.get(component, (0, 0))[0] == message_id:
+            self._finish(component, now)
+
     def _finish(self, component: int, now: float) -> None:
         opened = self._open.pop(component, None)
         pieces = self._pieces.pop(component, None)

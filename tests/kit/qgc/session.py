@@ -14,6 +14,7 @@ from tests.kit.qgc.vehicle import PX4, VehicleState
 from tests.kit.qgc.wire import Heard, Message
 
 SILENT_AFTER = 3.5  # s [1.1]
+TEXT_WAIT = 1.0  # s for the rest of a text; assumed
 GIMBAL_MANAGER, GIMBAL_TRIES = 280, 6  # [1.3]
 LOST, BACK = "Communication lost", "Communication regained"
 
@@ -65,7 +66,7 @@ class Session:
             case "FILE_TRANSFER_PROTOCOL":
                 self.parameters.receive_file(message)
             case "STATUSTEXT":
-                self._texts.receive(message, component, now=self._core.timers.now)
+                self._take_text(message, component)
             case (
                 "MISSION_COUNT"
                 | "MISSION_ITEM_INT"
@@ -74,6 +75,14 @@ class Session:
                 | "MISSION_ACK"
             ):
                 self.plans.receive(name, message)
+
+    def _take_text(self, message: Message, component: int) -> None:
+        timers = self._core.timers
+        self._texts.receive(message, component, now=timers.now)
+        if message.id:
+            timers.after(
+                TEXT_WAIT, lambda: self._texts.give_up(component, message.id, now=timers.now)
+            )
 
     def _heard(self) -> None:
         now = self._core.timers.now
