@@ -9,23 +9,18 @@ import pytest
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
 from mav_tasks.in_memory import CLIENT_LINK
 from rover_sim.personas import Persona
-from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
-from tests.kit.qgc.joined import join, place, slowest_ack
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.qgc.joined import each_make, each_version, join, place, slowest_ack
 from tests.kit.qgc.party import QgcParty
 from tests.kit.qgc.plan_master import Plan
 from tests.kit.qgc.profile import MASTER, V4, Profile
 from tests.kit.qgc.session import BACK, LOST
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import PROMPT, World
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 ACK_IN_TIME = 0.6  # s; the least patient one waits 1.2
 AUTOPILOT, TASK_SERVER = (1, 1), (1, 191)
-
-each_make = pytest.mark.parametrize(
-    "persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name
-)
-each_version = pytest.mark.parametrize("profile", [V4, MASTER], ids=lambda p: p.name)
 
 
 class Losses:

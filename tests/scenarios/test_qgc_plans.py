@@ -9,8 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.mission import ITEM_INT, REQUEST_INT
-from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
-from tests.kit.qgc.joined import join, place, slowest_ack
+from tests.kit.qgc.joined import each_guided, each_make, each_version, join, place, slowest_ack
 from tests.kit.qgc.party import QgcParty
 from tests.kit.qgc.plan_master import RUNS, Plan
 from tests.kit.qgc.profile import MASTER, V4, Profile
@@ -22,12 +21,7 @@ FIRST = Plan(place(0, 0), [place(1.5, 0), place(1.5, 1)], fence=FENCE, rally=[pl
 NEXT = FIRST._replace(waypoints=[place(0.5, 1)], speed=0.4)
 ALL_WELL = {0: True, 1: True, 2: True}
 
-each_guided = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
-each_make = pytest.mark.parametrize(
-    "persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name
-)
 each_slow = pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
-each_version = pytest.mark.parametrize("profile", [V4, MASTER], ids=lambda p: p.name)
 
 
 def is_near(world: World, north: float, east: float) -> bool:

@@ -2,12 +2,26 @@
 
 from math import inf
 
+import pytest
+
 from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
 from tests.kit.qgc.party import QgcParty
-from tests.kit.qgc.profile import Profile
-from tests.kit.world import World
+from tests.kit.qgc.profile import MASTER, V4, Profile
+from tests.kit.world import PROMPT, World
 
 CONNECTED_WITHIN = 2.0  # s; a real one needs 0.42 with everything answered at once [11.1]
+
+each_make = pytest.mark.parametrize(
+    "persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name
+)
+#: makes that the station can guide [1.5]
+each_guided = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+each_version = pytest.mark.parametrize("profile", [V4, MASTER], ids=lambda p: p.name)
+#: for what is the same in both versions
+each_pair = pytest.mark.parametrize(
+    ("persona", "profile"), [(PROMPT, V4), (PROMPT_PX4, MASTER)], ids=lambda p: p.name
+)
 
 
 def join(world: World, profile: Profile, name: str = "qgc") -> QgcParty:
