@@ -4,11 +4,14 @@ Without these its silence in the others would say nothing. Times and texts are t
 one, seen at a stub.
 """
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from mav_tasks.in_memory import CLIENT_LINK
+from tests.kit import qgc
 from tests.kit.qgc import parameters
 from tests.kit.qgc.pair import Pair
 from tests.kit.qgc.profile import MASTER, V4, Profile
@@ -183,3 +186,12 @@ def test_a_version_that_hears_only_heartbeats_in_mavlink_1() -> None:
     assert not MASTER.hears_mavlink1
     pair = Pair(replace(V4, hears_mavlink1=False)).connected()
     pair.party.check()
+
+
+def test_it_is_made_of_nothing_of_the_servers() -> None:
+    """What the server misunderstands would else be misunderstood on both sides alike."""
+    joins_them = {"party.py", "pair.py", "stub.py", "joined.py"}
+    files = [path for path in Path(qgc.__path__[0]).glob("*.py") if path.name not in joins_them]
+    assert len(files) > 12
+    for path in files:
+        assert not re.search(r"(import|from) (mav_tasks|rover_sim)", path.read_text()), path.name
