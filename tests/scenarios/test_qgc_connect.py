@@ -208,7 +208,6 @@ def test_a_task_command_as_an_action_shows_no_loss(make_world: MakeWorld) -> Non
     party.check()
 
 
-@pytest.mark.xfail(reason="the server has no parameters yet")
 @each_version
 def test_the_servers_own_parameters_are_a_component_of_their_own(
     make_world: MakeWorld, profile: Profile

@@ -127,7 +127,6 @@ def test_a_rover_that_has_driven_may_be_sent_to_a_place(
     assert party.operator.offers >= {"go to", "emergency stop"}
 
 
-@pytest.mark.xfail(reason="the server waits for the rover's own heartbeat, up to a second")
 @pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
 def test_a_mode_is_shown_at_once_also_of_a_rover_that_shows_it_once_a_second(
     make_world: MakeWorld, persona: Persona
