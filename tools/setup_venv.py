@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 VENV_PYTHON = VENV / "bin" / "python"
 LOCK = ROOT / "tools" / "lock" / "requirements.txt"
+LOCK_WITHOUT_DEPENDENCIES = ROOT / "tools" / "lock" / "without_dependencies.txt"
 DIALECT = ROOT / "mav_tasks" / "mavlink" / "_dialect.py"
 #: What the environment was made from. Written last; "unfinished" while a new one is being made.
 STAMP = VENV / ".mav-tasks-setup"
@@ -30,6 +31,7 @@ UNFINISHED = "unfinished\n"
 INPUTS = (
     "pyproject.toml",
     "tools/lock/requirements.txt",
+    "tools/lock/without_dependencies.txt",
     "tools/setup_venv.py",
     "tools/hatch_build.py",
     "tools/build_dialect.py",
@@ -57,11 +59,15 @@ def set_up() -> None:
         elif _read_stamp():
             STAMP.write_text(UNFINISHED, encoding="utf-8")
         _run(
-            "2/3 installing the pinned packages (minutes, the first time)",
+            "2/4 installing the pinned packages (minutes, the first time)",
             _pip_install("-r", str(LOCK)),
         )
         _run(
-            "3/3 installing mav-tasks itself, editable, with its MAVLink dialect",
+            "3/4 installing what is pinned without its dependencies",
+            _pip_install("--no-deps", "-r", str(LOCK_WITHOUT_DEPENDENCIES)),
+        )
+        _run(
+            "4/4 installing mav-tasks itself, editable, with its MAVLink dialect",
             _pip_install("--no-deps", "--no-build-isolation", "--editable", str(ROOT)),
         )
         # pip does not compile what is editable; the dialect is large enough to notice.
@@ -89,7 +95,7 @@ def _usable_version() -> str | None:
 
 
 def _create() -> None:
-    _say(f"1/3 creating {VENV.name} with Python {platform.python_version()}")
+    _say(f"1/4 creating {VENV.name} with Python {platform.python_version()}")
     _remove_old()
     VENV.mkdir()
     STAMP.write_text(UNFINISHED, encoding="utf-8")
