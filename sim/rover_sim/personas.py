@@ -24,6 +24,8 @@ from rover_sim.px4_parameters import PX4_PARAMETERS, Bytewise
 from rover_sim.px4_rules import Px4Rules
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
+FENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot's is healthy unless it is breached
+
 
 @dataclass(frozen=True, slots=True)
 class Persona:
@@ -38,6 +40,7 @@ class Persona:
     firmware_hash: bytes  # AUTOPILOT_VERSION.flight_custom_version, 8 bytes
     announces_changes: bool  # a HEARTBEAT at once when mode or arming changes, or only each second
     heeds_component: bool  # passes over what is for another component of its system
+    also_healthy: int  # SYS_STATUS: sensors that are said to be healthy, though they are not there
     landed_state_armed: MavLandedState  # EXTENDED_SYS_STATE while armed
     no_mission_total: int  # MISSION_CURRENT.total where no mission is stored
     lacks: frozenset[int]  # ids of messages that others can send
@@ -79,6 +82,7 @@ ARDUPILOT = Persona(
     firmware_hash=b"3fc7011a",
     announces_changes=False,  # observed: 1 Hz
     heeds_component=False,
+    also_healthy=FENCE,
     landed_state_armed=MavLandedState.ON_GROUND,
     no_mission_total=0,
     lacks=frozenset({messages.ProtocolVersion.id, messages.PositionTargetLocalNed.id}),
@@ -130,6 +134,7 @@ PX4 = Persona(
     firmware_hash=b"99c40407",
     announces_changes=False,  # 1 Hz
     heeds_component=True,
+    also_healthy=0,
     landed_state_armed=MavLandedState.IN_AIR,  # its rover land detector: armed is not landed
     no_mission_total=65535,
     lacks=frozenset(),

@@ -97,8 +97,9 @@ class Telemetry:
         )
 
     def _sys_status(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        healthy = SENSORS | self._persona.also_healthy
         return m.SysStatus(
-            SENSORS, SENSORS, SENSORS, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
+            SENSORS, SENSORS, healthy, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
         )  # load 10 %, 12.6 V, 5 A, 100 %
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:

@@ -13,6 +13,8 @@ from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from tests.unit.rover_sim.rig import GUIDED, Rig, body_velocity
 
+GEOFENCE = 0x100000  # MAV_SYS_STATUS_SENSOR
+
 STREAMED = {
     m.Heartbeat,
     m.SysStatus,
@@ -161,3 +163,10 @@ def test_a_deaf_rover_talks_but_does_not_obey() -> None:
     rig.send(m.CommandLong(1, 1, 176, 0, 1, GUIDED, 0, 0, 0, 0, 0))
     rig.run(1.1)
     assert rig.last(m.Heartbeat).custom_mode != GUIDED
+
+
+def test_a_fence_that_is_not_there_is_healthy() -> None:
+    """As ArduPilot says it; MAVProxy announces "fence breach" of any other rover."""
+    status = Rig().last(m.SysStatus)
+    assert not status.onboard_control_sensors_present & GEOFENCE
+    assert status.onboard_control_sensors_health & GEOFENCE
