@@ -1,0 +1,239 @@
+"""The real MAVProxy (PyPI), unmodified, drives a rover through the server from its command line."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tests.kit.mavproxy import Logged, MavProxy, mavproxy
+from tests.kit.processes import Stand, stand, wait_until
+
+pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(120)]
+
+HOME = (-35.363262, 149.165237)
+METRE = 9e-6  # degrees of latitude, about
+SOUTH, NORTH = -35.3637, -35.3628
+WEST, EAST = 149.1648, 149.1657
+WAYPOINT, FENCE_CORNER, RALLY_POINT = 16, 5001, 5100
+OUR_DIALECT = range(54000, 54050)  # the ids of its messages
+TASK_SHOWN = r"COMMAND_ACK \{command : %d, result : 0, .*result_param2 : (\d+),"
+
+
+def test_an_ardupilot_rover(tmp_path: Path) -> None:
+    with (
+        stand(tmp_path) as running,
+        mavproxy(running.client_port, tmp_path, "--target-system", "1") as it,
+    ):
+        connect(it)
+        telemetry(it)
+        parameters(it)
+        assert it.complaints() == []
+        assert it.link()["lost"] == "0"
+        restart(it)
+        arm(it)
+        stop(it, running)
+        plans(it, tmp_path)
+        mission(it, running)
+        tasks(it, running)
+        places(it, running)
+        ending(it)
+        assert it.complaints(but="AP: .* fence|DO_REPOSITION: DENIED") == []
+        assert_nothing_lost(it)
+
+
+@pytest.mark.parametrize("persona", ["px4", "generic"])
+def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
+    """Its modes by number, and the tasks' texts not shown: see tests/kit/mavproxy.py."""
+    with (
+        stand(tmp_path, persona=persona) as running,
+        mavproxy(running.client_port, tmp_path) as it,
+    ):
+        connect(it)
+        it.ask("status GLOBAL_POSITION_INT", "lat : -353632620, lon : 1491652370, .*hdg : 0")
+        change(it, "COM_OF_LOSS_T", 1.5)
+        if persona == "px4":  # integers bytewise are MAVProxy's for a PX4 only
+            change(it, "COM_FLTMODE1", -7)
+        it.ask("long DO_SET_MODE 1 4 3", "DO_SET_MODE: ACCEPTED")
+        it.ask("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
+        it.wait_for("^ARMED")
+        assert it.ask("long 54000 20 0 0 0 0 0 nan", TASK_SHOWN % 54000)[1] == "1"
+        running.server.wait_for("task 1 of vehicle 1: move 20 m, priority 5")
+        wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
+        it.ask("long 54003", TASK_SHOWN % 54003)
+        running.server.wait_for("task 1 killed: stop")
+        it.ask("resume", "DO_PAUSE_CONTINUE: ACCEPTED")
+        if persona == "px4":
+            load(it, "wp", [(3, WAYPOINT, 0.0, *place) for place in PLACES], tmp_path)
+            it.ask("long DO_SET_MODE 1 4 4", "DO_SET_MODE: ACCEPTED")
+            it.wait_for("waypoint 1", within=15)
+            running.server.wait_for("task 2 completed")
+            assert place(running) == pytest.approx((2.0, 0.0), abs=0.4)
+        lat, lon = PLACES[1]
+        it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
+        running.server.wait_for(r"task (\d) of vehicle 1: go to(.|\n)*task \1 executing")
+        it.ask("disarm", "COMPONENT_ARM_DISARM: ACCEPTED")
+        it.wait_for("^DISARMED")
+        assert it.complaints(but="fence breach") == []
+        assert_nothing_lost(it)
+
+
+def connect(it: MavProxy) -> None:
+    it.wait_for(r"Received \d+ parameters", within=15)
+    it.wait_for("Detected vehicle 1:1 on")
+    it.wait_for("Detected vehicle 1:191 on")
+
+
+def assert_nothing_lost(it: MavProxy) -> None:
+    """What it takes for lost is what it cannot read: see tests/kit/mavproxy.py."""
+    link = it.link()
+    count = int(link["packets"])
+    it.type("set flushlogs True")
+    wait_until(lambda: len(it.heard()) >= count, within=5, what="the log")
+    heard = it.heard()[:count]
+    readable = [packet for packet in heard if packet.message_id not in OUR_DIALECT]
+    assert link["state"] == "OK"
+    assert [missing(heard, component_id) for component_id in (1, 191)] == [0, 0]
+    assert missing(readable, 1) == 0
+    assert missing(readable, 191) == int(link["lost"])
+
+
+def missing(heard: list[Logged], component_id: int) -> int:
+    """How many numbers are left out between a component's packets."""
+    numbers = [p.seq for p in heard if (p.system_id, p.component_id) == (1, component_id)]
+    assert len(numbers) > 10
+    return sum((late - early - 1) % 256 for early, late in pairwise(numbers))
+
+
+def telemetry(it: MavProxy) -> None:
+    it.ask("mode", "Available modes: .* STEERING, HOLD")  # those of an ArduPilot rover
+    it.ask("status GLOBAL_POSITION_INT", "lat : -353632620, lon : 1491652370, .*hdg : 0")
+    it.ask("status HOME_POSITION", "latitude : -353632620, longitude : 1491652370")
+
+
+def parameters(it: MavProxy) -> None:
+    assert shown(it, "WP_SPEED") == 5.0
+    change(it, "WP_SPEED", 3.0)
+    it.ask("param fetch WP_SPEED", r"WP_SPEED = 3\.0")
+    it.ask("param fetch", r"Received \d+ parameters")
+    assert shown(it, "WP_SPEED") == 3.0
+
+
+def shown(it: MavProxy, name: str) -> float:
+    """What it has as the value of a parameter."""
+    return float(it.ask(f"param show {name}", rf"^{name} +(\S+)$")[1])
+
+
+def change(it: MavProxy, name: str, value: float) -> None:
+    """Set a parameter: sent a moment later, and shown once the rover has confirmed it."""
+    it.type(f"param set {name} {value:g}")
+    wait_until(lambda: shown(it, name) == value, within=5, what=f"{name} = {value}")
+
+
+def restart(it: MavProxy) -> None:
+    it.ask("reboot", "PREFLIGHT_REBOOT_SHUTDOWN: ACCEPTED")
+    it.wait_for("AP: Vehicle 1 restarted")
+    it.wait_for_mode("MANUAL")
+    it.ask("mode GUIDED", "DO_SET_MODE: ACCEPTED")
+    it.wait_for_mode("GUIDED")
+
+
+def arm(it: MavProxy) -> None:
+    it.ask("mode HOLD", "DO_SET_MODE: ACCEPTED")
+    it.wait_for_mode("HOLD")
+    it.ask("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
+    it.wait_for("^ARMED")
+
+
+def stop(it: MavProxy, running: Stand) -> None:
+    it.ask("setspeed 1.5", "DO_CHANGE_SPEED: ACCEPTED")
+    assert it.ask("long 54000 20", TASK_SHOWN % 54000)[1] == "1"
+    wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
+    it.ask("long 54003", TASK_SHOWN % 54003)
+    it.wait_for("AP: Task 1 killed: stop")
+    it.wait_for_mode("HOLD")
+    wait_until(lambda: running.speed() < 0.05, within=10, what="the rover standing")
+    it.ask("resume", "DO_PAUSE_CONTINUE: ACCEPTED")
+
+
+def plans(it: MavProxy, folder: Path) -> None:
+    way = [(0, WAYPOINT, 0.0, *HOME), *((3, WAYPOINT, 0.0, *place) for place in PLACES)]
+    load(it, "wp", way, folder)
+    assert "AP: Task 2 ready to be started: plan of 3 items" in it.text
+    it.ask("wp set 2", "DO_SET_MISSION_CURRENT: ACCEPTED")
+    it.wait_for("waypoint 2")
+    it.ask("wp set 1", "waypoint 1")
+    corners = [(SOUTH, WEST), (SOUTH, EAST), (NORTH, EAST), (NORTH, WEST)]
+    load(it, "fence", [(3, FENCE_CORNER, 4.0, *corner) for corner in corners], folder)
+    load(it, "rally", [(3, RALLY_POINT, 0.0, *HOME)], folder)
+
+
+#: 1 m and 2 m north
+PLACES = [(round(HOME[0] + metres * METRE, 6), HOME[1]) for metres in (1, 2)]
+
+
+def load(
+    it: MavProxy, plan: str, items: list[tuple[int, int, float, float, float]], folder: Path
+) -> None:
+    """Upload a file of the QGC WPL 110 format, and find it in the list that is downloaded."""
+    lines = [
+        f"{seq}\t{int(seq == 0)}\t{frame}\t{command}\t{first}\t0\t0\t0\t{lat}\t{lon}\t0\t1\n"
+        for seq, (frame, command, first, lat, lon) in enumerate(items)
+    ]
+    file = folder / f"{plan}.txt"
+    file.write_text("".join(["QGC WPL 110\n", *lines]), encoding="ascii")
+    it.ask(f"{plan} load {file}", rf"Sent all {len(items)} ")
+    it.wait_for(r"Got MISSION_ACK: TYPE_\w+: ACCEPTED")
+    it.ask(f"{plan} list", rf"Saved {len(items)} ")
+    listed = re.findall(r"^(\d+) (\d) (-[\d.]+) ([\d.]+) .* p1=([\d.]+) ", it.answer, re.MULTILINE)
+    for item, (frame, command, first, lat, lon) in zip(listed, items, strict=True):
+        expected = (command, frame, lat, lon, first)
+        assert tuple(map(float, item)) == pytest.approx(expected, rel=0, abs=2e-7)
+
+
+def mission(it: MavProxy, running: Stand) -> None:
+    it.ask("mode AUTO", "DO_SET_MODE: ACCEPTED")
+    it.wait_for("AUTO> ")
+    it.wait_for("AP: Task 2 started")
+    it.wait_for("waypoint 2", within=15)
+    it.wait_for("AP: Task 2 done", within=15)
+    assert place(running) == pytest.approx((2.0, 0.0), abs=0.3)
+
+
+def tasks(it: MavProxy, running: Stand) -> None:
+    assert it.ask("long 54000 0.6 0 0 0 0 0 8", TASK_SHOWN % 54000)[1] == "3"
+    it.wait_for("AP: Task 3 started")
+    it.ask("pause", "DO_PAUSE_CONTINUE: ACCEPTED")
+    it.wait_for("AP: Task 3 paused: operator")
+    it.ask("long DO_PAUSE_CONTINUE 1", "DO_PAUSE_CONTINUE: ACCEPTED")
+    it.wait_for("AP: Task 3 done", within=15)
+    assert place(running) == pytest.approx((2.6, 0.0), abs=0.3)
+
+
+def places(it: MavProxy, running: Stand) -> None:
+    lat, lon = PLACES[1]
+    it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
+    it.wait_for("AP: Task 4 queued: go to")
+    it.wait_for("AP: Task 4 done", within=15)
+    assert place(running) == pytest.approx((3.0, 0.0), abs=0.3)
+    it.ask(f"guided {NORTH + METRE} {lon} 0", "DO_REPOSITION: DENIED")
+    it.wait_for("AP: .* fence")
+    it.ask("mode RTL", "RTL> ")
+    it.wait_for("AP: Task 5 queued: return home")
+    it.wait_for("AP: Task 5 started")
+    it.ask("mode HOLD", "AP: Task 5 paused: operator")
+    it.wait_for_mode("HOLD")
+
+
+def ending(it: MavProxy) -> None:
+    for plan, items in (("wp", "MISSION"), ("fence", "FENCE"), ("rally", "RALLY")):
+        it.ask(f"{plan} clear", f"Got MISSION_ACK: TYPE_{items}: ACCEPTED")
+        it.ask(f"{plan} list", "Requesting 0 ")
+    it.ask("disarm", "COMPONENT_ARM_DISARM: ACCEPTED")
+    it.wait_for("^DISARMED")
+
+
+def place(running: Stand) -> tuple[float, float]:
+    """Where the rover truly is, m north and east of its start."""
+    first, last = running.truth()[0], running.truth()[-1]
+    return last["north"] - first["north"], last["east"] - first["east"]
