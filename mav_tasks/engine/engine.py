@@ -42,7 +42,8 @@ from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer, target_of
-from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.mavlink.packet import Packet, split_datagram
+from mav_tasks.services import file_transfer
 from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
@@ -253,7 +254,18 @@ class Engine:
                 self._operator.receive(message, now=now)
             elif isinstance(message, PARAMETER_MESSAGES):
                 self._parameters.receive(client, packet, message, now=now)
+            elif isinstance(message, m.FileTransferProtocol):
+                self._refuse_file(client, packet, message)
             self._forward(client, received, now=now)
+
+    def _refuse_file(
+        self, client: GcsClient, packet: Packet, message: m.FileTransferProtocol
+    ) -> None:
+        vehicle = self._vehicles.get(message.target_system)
+        if vehicle is not None and target_of(message) == vehicle.server_address:
+            refusal = file_transfer.refusal(message, to=packet.source)
+            if refusal is not None:
+                client.outlet.send(refusal, vehicle.server_address)
 
     def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
         """Pass a client's packet to the vehicles that it is for; what is for us ends here."""

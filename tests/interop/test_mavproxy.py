@@ -2,10 +2,12 @@
 
 import re
 from itertools import pairwise
+from math import isclose
 from pathlib import Path
 
 import pytest
 
+from mav_tasks.services.parameter_table import PARAMETERS
 from tests.kit.mavproxy import Logged, MavProxy, mavproxy
 from tests.kit.processes import Stand, stand, wait_until
 
@@ -28,6 +30,7 @@ def test_an_ardupilot_rover(tmp_path: Path) -> None:
         connect(it)
         telemetry(it)
         parameters(it)
+        parameters_of_the_server(it)
         assert it.complaints() == []
         assert it.link()["lost"] == "0"
         restart(it)
@@ -119,6 +122,19 @@ def parameters(it: MavProxy) -> None:
     assert shown(it, "WP_SPEED") == 3.0
 
 
+def parameters_of_the_server(it: MavProxy) -> None:
+    """The same commands, once its component is chosen."""
+    it.ask("vehicle 1:191", "Set vehicle 1:191")
+    it.ask("param fetch", r"Requested parameter list \(ftp\)")
+    it.ask("param fetch", r"Requested parameter list$")  # that was refused meanwhile
+    it.wait_for(rf"Received {len(PARAMETERS)} parameters")
+    assert shown(it, "TSK_SPEED") == 0.5
+    change(it, "TSK_SPEED", 0.8)
+    it.ask("param fetch TSK_SPEED", r"TSK_SPEED = 0\.8")
+    it.ask("vehicle 1:0", "Set vehicle 1:0")
+    it.ask("param show WP_SPEED", "^WP_SPEED")
+
+
 def shown(it: MavProxy, name: str) -> float:
     """What it has as the value of a parameter."""
     return float(it.ask(f"param show {name}", rf"^{name} +(\S+)$")[1])
@@ -127,7 +143,7 @@ def shown(it: MavProxy, name: str) -> float:
 def change(it: MavProxy, name: str, value: float) -> None:
     """Set a parameter: sent a moment later, and shown once the rover has confirmed it."""
     it.type(f"param set {name} {value:g}")
-    wait_until(lambda: shown(it, name) == value, within=5, what=f"{name} = {value}")
+    wait_until(lambda: isclose(shown(it, name), value, rel_tol=1e-6), within=5, what=name)
 
 
 def restart(it: MavProxy) -> None:

@@ -8,8 +8,9 @@ What is good to know of release 1.8.75, found by trying and in its source:
 - A COMMAND_ACK is shown by name, "Got COMMAND_ACK: DO_SET_MODE: ACCEPTED"; one for a command number
   that it has no name for as the whole message, which brings ``result_param2``.
 - ``long NUMBER …`` fills what is not given with 0, so a task has priority 0; "nan" can be said.
-- It asks for parameters by file transfer first, and by PARAM_REQUEST_LIST once that is refused;
-  unanswered it tries for 11 s. It does not say that a ``param set`` worked, only if it did not.
+- It asks for parameters by file transfer first, and by PARAM_REQUEST_LIST once that is refused, by
+  itself if it has none yet, else when told again; unanswered it tries for 11 s.
+- It does not say that a ``param set`` worked, only if it did not.
 - Coordinates of ``wp``, ``fence`` and ``guided`` are cut to 1e-7 degrees, not rounded: 149.1657
   goes out as 149.1656999.
 - ``mode NAME`` works for ArduPilot only: of a PX4's modes it has a table of triples, and takes one

@@ -538,3 +538,41 @@ def test_keys_are_not_set_through_the_server(world: World) -> None:
     world.run(0.1)
     assert IDS["PING"] in towards
     assert IDS["SETUP_SIGNING"] not in towards
+
+
+# files
+
+
+@pytest.mark.parametrize("component", [1, 191])
+def test_a_file_that_nobody_has_is_refused_once_by_who_was_asked(
+    world: World, component: int
+) -> None:
+    asked = [
+        0xFF,
+        0x01,
+        7,
+        4,
+        3,
+        0,
+        0,
+        *b"\0\0\0\0\0a/b",
+    ]  # number 511, session 7, open for reading
+    payload = asked + [0] * (251 - len(asked))
+    other = world.add_client("other", system_id=245)
+    world.run(0.2)
+    world.client.send(common.MAVLink_file_transfer_protocol_message(0, 1, component, payload))
+    world.run(0.5)
+    (packet,) = world.client.of_id(110)
+    answer = world.client.decoded(packet)
+    assert packet.source == (1, component)
+    assert (answer.target_system, answer.target_component) == (255, 190)
+    assert list(answer.payload[:13]) == [0x00, 0x02, 7, 129, 1, 4, 0, 0, 0, 0, 0, 0, 10]
+    assert not list(other.of_id(110))
+
+
+def test_what_answers_no_request_of_ours_is_not_answered(world: World) -> None:
+    for opcode in (128, 129):
+        payload = [1, 0, 7, opcode] + [0] * 247
+        world.client.send(common.MAVLink_file_transfer_protocol_message(0, 1, 191, payload))
+    world.run(0.5)
+    assert not list(world.client.of_id(110))

@@ -1,0 +1,26 @@
+"""MAVLink FTP, the server's side, as far as saying no. Pure.
+
+MAVLink guide, "File Transfer Protocol". There are no files here. MAVProxy looks for a
+component's parameters in a file first, and waits 11 s for an answer before it asks in another way.
+"""
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+
+NETWORK = 0
+ACK, NAK = 128, 129
+FILE_NOT_FOUND = 10
+#: offsets in the payload: session after a 16-bit sequence number, then the opcode
+SESSION, OPCODE = 2, 3
+
+
+def refusal(request: m.FileTransferProtocol, *, to: Address) -> m.FileTransferProtocol | None:
+    """Give the NAK that answers a request: its session, the next number; None for an answer."""
+    payload = request.payload
+    opcode = payload[OPCODE]
+    if opcode in (ACK, NAK):
+        return None
+    seq = (payload[0] | payload[1] << 8) + 1 & 0xFFFF
+    header = [seq & 0xFF, seq >> 8, payload[SESSION], NAK, 1, opcode]
+    answer = [*header, *(0,) * 6, FILE_NOT_FOUND]
+    return m.FileTransferProtocol(NETWORK, *to, answer + [0] * (len(payload) - len(answer)))
