@@ -11,6 +11,7 @@ from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
+from mav_tasks.services.interval_requester import WANTED
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -47,6 +48,18 @@ class Displays:
         client.thinner.set_interval(vehicle.system_id, message_id, interval_us)
         for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
             vehicle.requests.intervals.wish(wished_id, interval)
+
+    def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
+        """REQUEST_DATA_STREAM: as SET_MESSAGE_INTERVAL for each message of the group.
+
+        The vehicle is asked only for what it is known to have: it says no aloud to anything else.
+        """
+        rate = message.req_message_rate if message.start_stop else 0
+        for vehicle in self._vehicles.addressed_by(message.target_system):
+            client.thinner.set_group(vehicle.system_id, message.req_stream_id, rate)
+            for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
+                if wished_id in WANTED:
+                    vehicle.requests.intervals.wish(wished_id, interval)
 
     def show_interval(self, asked: Asked) -> None:
         """GET_MESSAGE_INTERVAL: what this client gets."""

@@ -55,9 +55,8 @@ from mav_tasks.tasks.restored import Restored
 
 EVERYBODY = Address(0, 0)
 SETUP_SIGNING = 256
-#: never forwarded: the server decides what vehicles send and how often each client gets it, and
-#: no client may change a vehicle's keys
-CLAIMED = frozenset({m.RequestDataStream.id, SETUP_SIGNING})
+#: never forwarded: no client may change a vehicle's keys
+CLAIMED = frozenset({SETUP_SIGNING})
 
 
 class Engine:
@@ -100,7 +99,7 @@ class Engine:
             self._gcs, self._vehicles, self._book, self._submissions, self._plans, settings
         )
         self._reports = MissionReports(self._gcs, self._vehicles, self._book, self._plans, settings)
-        displays = Displays(self._gcs, self._vehicles, self._book)
+        self._displays = Displays(self._gcs, self._vehicles, self._book)
         self._modes = ModeRequests(self._gcs, self._book, self._submissions, self._plans, settings)
         self._commands = Commands(
             self._gcs,
@@ -110,10 +109,10 @@ class Engine:
             self._plans,
             self._modes,
             TaskControl(self._book, settings),
-            displays,
+            self._displays,
             settings,
         )
-        self._publisher = Publisher(self._gcs, self._vehicles, self._book, displays)
+        self._publisher = Publisher(self._gcs, self._vehicles, self._book, self._displays)
         self._operator = OperatorWatch()
         self._stop_by: float | None = None
         self._stopped = False
@@ -245,6 +244,8 @@ class Engine:
             vehicle = self._vehicles.get(message.target_system)
             if vehicle is not None:
                 self._modes.heard(client, vehicle, packet, int(message.custom_mode), now=now)
+        elif isinstance(message, m.RequestDataStream):
+            self._displays.set_streams(client, message)
         elif isinstance(message, MESSAGES) and self._desks.receive(
             client, packet, message, now=now
         ):

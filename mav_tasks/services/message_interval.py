@@ -1,4 +1,5 @@
-"""Rates of telemetry: thinning for one client. MAVLink guide: SET_MESSAGE_INTERVAL.
+"""Rates of telemetry: thinning for one client. MAVLink guide: SET_MESSAGE_INTERVAL, and the older
+REQUEST_DATA_STREAM that MAVProxy sends, QGroundControl to ArduPilot too.
 
 The server owns the rates on the vehicle links; what a client asks for is met by leaving messages
 out of what is forwarded to it.
@@ -40,6 +41,20 @@ STREAMED = frozenset(
     }
 )
 
+#: What REQUEST_DATA_STREAM names at once, by MAV_DATA_STREAM: as ArduPilot's rovers have it.
+GROUPS: dict[int, frozenset[int]] = {
+    0: STREAMED,  # ALL
+    1: frozenset({26, 27, 29, 105, 116, 129}),  # RAW_SENSORS
+    2: frozenset(  # EXTENDED_STATUS
+        {m.SysStatus.id, m.MissionCurrent.id, m.GpsRawInt.id, 62, m.PositionTargetGlobalInt.id}
+    ),
+    3: frozenset({35, 36, 65}),  # RC_CHANNELS
+    6: frozenset({m.GlobalPositionInt.id, m.LocalPositionNed.id}),  # POSITION
+    10: frozenset({m.Attitude.id, 31}),  # EXTRA1
+    11: frozenset({m.VfrHud.id}),  # EXTRA2
+    12: frozenset({m.SystemTime.id, m.BatteryStatus.id, 132, 230, 241}),  # EXTRA3
+}
+
 STOPPED = -1  # SET_MESSAGE_INTERVAL param2: send no more
 DEFAULT = 0  # SET_MESSAGE_INTERVAL param2: back to the default rate
 LONGEST_US = 2**31 - 1  # what MESSAGE_INTERVAL can say
@@ -64,6 +79,15 @@ class Thinner:
             self._intervals[key] = None
         else:
             self._intervals[key] = min(interval_us, LONGEST_US) / 1e6
+
+    def set_group(self, system_id: int, group: int, rate: float) -> None:
+        """Take a client's wish for a MAV_DATA_STREAM: messages a second of each kind, 0 for none.
+
+        The latest wish for a message counts, by whatever means.
+        """
+        interval_us = 1e6 / rate if rate > 0 else STOPPED
+        for message_id in GROUPS.get(group, ()):
+            self.set_interval(system_id, message_id, interval_us)
 
     def interval_us(self, system_id: int, message_id: int) -> int:
         """Give the interval in force, in microseconds; STOPPED if none."""

@@ -36,6 +36,15 @@ DATA_STREAM, PARAM_VALUE = 66, 22
 OUR_MESSAGES = range(54000, 54050)
 
 
+ALL_STREAMS, POSITIONS, ATTITUDES = 0, 6, 10
+
+
+def data_stream(
+    stream: int, rate: int, *, component: int = 1, start: int = 1
+) -> common.MAVLink_message:
+    return common.MAVLink_request_data_stream_message(1, component, stream, rate, start)
+
+
 def packed(message: object, system_id: int, component_id: int, *, seq: int = 0) -> bytes:
     mav = common.MAVLink(None, system_id, component_id)
     mav.seq = seq
@@ -129,6 +138,25 @@ def test_each_client_has_its_own_intervals(world: World) -> None:
     assert rate(fast, ATTITUDE, since, world.now) == pytest.approx(10, abs=0.6)
 
 
+def test_each_client_has_its_own_data_streams(world: World) -> None:
+    """The older way to ask, MAVProxy's: it does so of each component again and again."""
+    slow, none, usual = world.client, world.add_client("none"), world.add_client("usual")
+    world.run(0.1)
+    for component in (1, 191):
+        slow.send(data_stream(ALL_STREAMS, 4, component=component))
+    slow.send(data_stream(POSITIONS, 2))
+    none.send(data_stream(ATTITUDES, 4, start=0))
+    world.run(3)
+    since = world.now
+    world.run(10)
+    rates = {
+        message_id: [rate(client, message_id, since, world.now) for client in (slow, none, usual)]
+        for message_id in (ATTITUDE, POSITION)
+    }
+    assert rates[ATTITUDE] == [pytest.approx(4, abs=0.3), 0, pytest.approx(10, abs=0.6)]
+    assert rates[POSITION] == [pytest.approx(wish, abs=0.6) for wish in (2, 10, 10)]
+
+
 def test_an_interval_can_be_asked_for(world: World) -> None:
     world.client.command(SET_INTERVAL, ATTITUDE, 40_000, target=(1, 1))
     world.client.command(GET_INTERVAL, ATTITUDE, target=(1, 1))
@@ -152,10 +180,11 @@ def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
 
 
 def test_a_request_for_data_streams_does_not_reach_the_rover(world: World) -> None:
-    world.client.send(common.MAVLink_request_data_stream_message(1, 1, 0, 1, 1))
+    other = world.add_client("other", system_id=245)
+    world.client.send(data_stream(ALL_STREAMS, 1))
     world.run(3)
     assert DATA_STREAM not in [packet.kind for packet in world.observer.reached]
-    assert rate(world.client, POSITION, world.now - 2, world.now) > 8
+    assert rate(other, POSITION, world.now - 2, world.now) > 8
 
 
 def test_parameters_can_be_listed_through_the_server(world: World) -> None:

@@ -7,6 +7,7 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services.message_interval import (
     DEFAULT,
+    GROUPS,
     MAX_WISHES,
     STOPPED,
     STREAMED,
@@ -113,3 +114,20 @@ def test_wishes_of_one_client_are_bounded() -> None:
     for message_id in range(10 * MAX_WISHES):
         thinner.set_interval(1, message_id, 1e6)
     assert len(thinner.wishes(1)) == MAX_WISHES
+
+
+def test_a_group_of_messages_has_its_rate_until_one_is_asked_for_by_itself() -> None:
+    thinner = Thinner(default_interval=0.1)
+    thinner.set_group(1, 10, 4)
+    assert thinner.interval_us(1, ATTITUDE) == 250_000
+    assert thinner.interval_us(1, m.VfrHud.id) == 100_000
+    thinner.set_interval(1, ATTITUDE, 40_000)
+    assert thinner.interval_us(1, ATTITUDE) == 40_000
+    thinner.set_group(1, 0, 0)
+    assert {thinner.interval_us(1, message_id) for message_id in STREAMED} == {STOPPED}
+    thinner.set_group(1, 99, 4)
+    assert thinner.interval_us(1, ATTITUDE) == STOPPED
+
+
+def test_what_groups_name_is_thinned() -> None:
+    assert set().union(*GROUPS.values()) == STREAMED
