@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.kit.mavproxy import mavproxy
 from tests.kit.processes import stand
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,6 +22,21 @@ COMMANDS = {
     "mav-tasks sim": "tests/e2e/test_by_hand.py",
     "mav-tasks serve": "tests/e2e/test_by_hand.py",
 }
+
+
+#: what MAVProxy says after each of the lines shown
+MAVPROXY_ANSWERS = (
+    "AP: Task 1 done",
+    "MISSION_ACK: TYPE_MISSION: ACCEPTED",
+    "AP: Task 2 done",
+    "Set vehicle",
+    "",
+    "Set vehicle",
+)
+WAY = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t-35.363262\t149.165237\t584\t1
+1\t0\t3\t16\t0\t0\t0\t0\t-35.363253\t149.165237\t0\t1
+"""
 
 
 def blocks(language: str, text: str = README) -> list[str]:
@@ -57,6 +73,23 @@ def test_example_runs(example: str, printed: str, tmp_path: Path) -> None:
         )
     assert done.returncode == 0, done.stderr
     assert printed in done.stdout.lower()
+
+
+def test_mavproxy_lines_do_what_they_say(tmp_path: Path) -> None:
+    (tmp_path / "way.txt").write_text(WAY, encoding="ascii")
+    command = re.search(r"`mavproxy\.py --master udpout:127\.0\.0\.1:14560 (.*?)`", README)
+    assert command is not None
+    (lines,) = blocks("mavproxy")
+    with (
+        stand(tmp_path) as it,
+        mavproxy(it.client_port, tmp_path, *command[1].split()) as session,
+    ):
+        session.wait_for(r"Received \d+ parameters\n.*mav\.parm", within=15)
+        for line, answer in zip(lines.splitlines(), MAVPROXY_ANSWERS, strict=True):
+            session.ask(line, answer, within=20)
+            if line.startswith("param set"):  # it says nothing, and sends it a moment later
+                it.server.wait_for("parameter {2}: {3}".format(*line.split()))
+        assert session.complaints() == []
 
 
 def test_every_path_named_exists() -> None:
