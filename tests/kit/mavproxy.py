@@ -53,6 +53,7 @@ COMPLAINT = re.compile(
     r"|unknown|unable|invalid|duplicate|\bbad\b|not (?:available|found)|can't",
     re.IGNORECASE,
 )
+PATIENCE = 10.0  # s, for an answer
 PROMPT_WITHIN = 0.1  # s, after a line
 #: Often there is something behind it on its line.
 PROMPT = re.compile(r"^[\w()]+> ", re.MULTILINE)
@@ -98,7 +99,7 @@ class MavProxy:
         self._mark = len(self._heard)
         os.write(self._terminal, f"{line}\n".encode())
 
-    def wait_for(self, pattern: str, *, within: float = 5.0) -> re.Match[str]:
+    def wait_for(self, pattern: str, *, within: float = PATIENCE) -> re.Match[str]:
         """Wait until it has said something that matches since the last line typed."""
         return wait_until(
             lambda: re.search(pattern, self.answer, re.MULTILINE),
@@ -106,12 +107,12 @@ class MavProxy:
             what=lambda: f"{pattern!r} in:\n{self.text}",
         )
 
-    def ask(self, line: str, pattern: str, *, within: float = 5.0) -> re.Match[str]:
+    def ask(self, line: str, pattern: str, *, within: float = PATIENCE) -> re.Match[str]:
         """Type a line and wait for an answer that matches."""
         self.type(line)
         return self.wait_for(pattern, within=within)
 
-    def wait_for_mode(self, name: str, *, within: float = 5.0) -> None:
+    def wait_for_mode(self, name: str, *, within: float = PATIENCE) -> None:
         """Wait until the prompt shows a mode."""
 
         def is_shown() -> bool:
