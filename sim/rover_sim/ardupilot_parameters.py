@@ -35,7 +35,21 @@ def _rc_channels() -> Iterable[Parameter]:
         yield Parameter(f"RC{channel}_TRIM", 1500, INT16)
 
 
-# The first 24 keep QGroundControl from complaining at connect; the others steer this simulator.
+def _setup_pages() -> Iterable[Parameter]:
+    for number in range(1, 7):
+        yield Parameter(f"MODE{number}", 0, INT8)
+    # No rover has these; QGroundControl 4 asks for them all the same, by the copter's names.
+    for number in range(1, 7):
+        yield Parameter(f"FLTMODE{number}", 0, INT8)
+    for compass in ("", "2", "3"):
+        yield Parameter(f"COMPASS_USE{compass}", 1, INT8)
+        for axis in "XYZ":
+            yield Parameter(f"COMPASS_OFS{compass}_{axis}", 0.0)
+
+
+# The first 24 keep QGroundControl from complaining at connect, the setup pages' when those are
+# opened; the others steer this simulator. Rover 4.6 has no WPNAV_SPEED (a copter's) and no WP_SPD
+# (4.7's): QGroundControl therefore offers no "Change speed" for it, as for the real one.
 ARDUPILOT_PARAMETERS: tuple[Parameter, ...] = (
     Parameter("SYSID_THISMAV", 1, INT16),
     Parameter("RCMAP_ROLL", 1, INT8),
@@ -59,4 +73,8 @@ ARDUPILOT_PARAMETERS: tuple[Parameter, ...] = (
     Parameter("WP_SPEED", 5.0),
     Parameter("CRUISE_SPEED", 5.0),
     Parameter("ARMING_CHECK", 1, INT32),
+    Parameter("BATT_MONITOR", 4, INT8),  # voltage and current
+    Parameter("COMPASS_DEC", 0.0),
+    Parameter("MODE_CH", 8, INT8),
+    *_setup_pages(),
 )

@@ -47,6 +47,7 @@ class Bytewise:
 
 # COM_OF_LOSS_T, COM_OBL_RC_ACT, MAV_SYS_ID and RD_MAX_SPEED steer this simulator; the others keep
 # QGroundControl from complaining, at connect and in its setup pages. In order, as PX4 lists them.
+# MPC_XY_VEL_MAX, for which QGroundControl offers "Change speed", is a multicopter's: not here.
 PX4_PARAMETERS: tuple[Parameter, ...] = (
     Parameter("BAT1_N_CELLS", 3, INT32),
     Parameter("BAT1_V_CHARGED", 4.05),
