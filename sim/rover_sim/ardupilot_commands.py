@@ -27,6 +27,7 @@ def ardupilot_commands(parts: CommandParts) -> CommandTable:
         unknown_message=MavResult.FAILED,
         bad_interval=MavResult.DENIED,
         bad_interval_text="No ap_message for mavlink id ({})",
+        by_index={},
     )
     return CommandTable(
         actions={

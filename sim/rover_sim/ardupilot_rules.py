@@ -72,6 +72,10 @@ class ArduPilotRules:
             return "Arm: AHRS: not using configured AHRS type"
         return None
 
+    def intended(self, mode: Mode) -> Mode:
+        """Give the present mode: a failsafe here changes what is wanted."""
+        return mode
+
     def choose(self, mode: Mode) -> None:
         """Nothing hangs on who wanted a mode."""
 

@@ -10,6 +10,7 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Message
+from rover_sim.available_modes import available_modes
 from rover_sim.body import BodyState
 from rover_sim.commands import CommandParts, CommandReceiver
 from rover_sim.dispatch import Handler
@@ -168,6 +169,7 @@ class Autopilot:
             now=up_at,
         )
         self._flight.faults = self._faults
+        missions.go_to = self._go_to_item
         self._telemetry = Telemetry(
             persona=persona,
             system_id=self.address.system_id,
@@ -185,6 +187,7 @@ class Autopilot:
             outbox=outbox,
             send_now=self._send,
             reboot=lambda now: self.reboot(now=now),
+            modes=available_modes(persona.offered_modes, persona.modes),
         )
         self._commands = CommandReceiver(persona.commands(commands), outbox)
         self._handlers = self._make_handlers()
@@ -210,6 +213,10 @@ class Autopilot:
         if message is not None:
             self._outbox.send(message)
         return True
+
+    def _go_to_item(self, place: Destination, now: float) -> bool:
+        flight = self._flight
+        return flight.can_reposition and flight.reposition(place, now=now)
 
     def _announce(self, now: float) -> None:
         """A heartbeat at once when mode or arming changed, if this autopilot does so."""

@@ -45,6 +45,7 @@ class CommandParts:
     outbox: Outbox
     send_now: Callable[[int, float], bool]  # a message by id; False if unknown
     reboot: Callable[[float], None]
+    modes: tuple[messages.AvailableModes, ...]  # those on offer; none: it knows no such list
 
 
 class CommandTable(NamedTuple):

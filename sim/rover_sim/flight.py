@@ -55,6 +55,11 @@ class FlightControl:
         return self._modes.numbers[self.mode]
 
     @property
+    def intended_custom_mode(self) -> int:
+        """The number of the mode that somebody asked for, as CURRENT_MODE has it."""
+        return self._modes.numbers[self._rules.intended(self.mode)]
+
+    @property
     def system_status(self) -> MavState:
         """MAV_STATE, as HEARTBEAT has it."""
         return self._rules.system_status(self.mode, armed=self.armed)

@@ -77,6 +77,10 @@ class FlightRules(Protocol):
         """Give the text with which arming is refused; None: it may be."""
         ...
 
+    def intended(self, mode: Mode) -> Mode:
+        """Give what somebody asked for last, which a failsafe does not change."""
+        ...
+
     def choose(self, mode: Mode) -> None:
         """Note what somebody asked for, also when it is the present mode."""
         ...

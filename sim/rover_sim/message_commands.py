@@ -16,13 +16,14 @@ class MessageCommands:
     unknown_message: MavResult  # to REQUEST_MESSAGE
     bad_interval: MavResult  # to SET_MESSAGE_INTERVAL
     bad_interval_text: str | None  # said beside it, with the message's id in it
+    by_index: Mapping[int, Action]  # REQUEST_MESSAGE of what needs more than an id, by id
 
     def actions(self) -> Mapping[int, Action]:
         """Give the part of a table that is these commands."""
         return {
             MavCmd.SET_MESSAGE_INTERVAL: self._set_message_interval,
             MavCmd.GET_MESSAGE_INTERVAL: self._get_message_interval,
-            MavCmd.REQUEST_MESSAGE: lambda command, now: self._send(as_id(command.params[0]), now),
+            MavCmd.REQUEST_MESSAGE: self._request_message,
             MavCmd.REQUEST_AUTOPILOT_CAPABILITIES: self._request_capabilities,
             MavCmd.GET_HOME_POSITION: lambda _, now: self._send(messages.HomePosition.id, now),
         }
@@ -42,6 +43,11 @@ class MessageCommands:
         interval_us = self.parts.streams.interval_us(message_id)
         self.parts.outbox.send(messages.MessageInterval(message_id & 0xFFFF, interval_us))
         return MavResult.ACCEPTED
+
+    def _request_message(self, command: Command, now: float) -> MavResult:
+        message_id = as_id(command.params[0])
+        action = self.by_index.get(message_id)
+        return action(command, now) if action else self._send(message_id, now)
 
     def _request_capabilities(self, _command: Command, now: float) -> MavResult:
         return self._send(messages.AutopilotVersion.id, now)

@@ -28,6 +28,7 @@ class MissionConventions:
     home_is_item_0: bool  # what is uploaded there is replaced, and not driven to
     has_ids: bool  # opaque ids in MISSION_ACK, MISSION_COUNT and MISSION_CURRENT
     goes_on: bool  # AUTO goes on where it was left, rather than beginning anew
+    takes_guided_items: bool  # a lone item with current = 2 is a place to go to now, in GUIDED
 
 
 NAVIGATION = frozenset({16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115})
@@ -58,6 +59,7 @@ ARDUPILOT_MISSIONS = MissionConventions(
     home_is_item_0=True,
     has_ids=False,
     goes_on=False,
+    takes_guided_items=True,
 )
 
 #: PX4 1.15: an opaque id for each list, silence to what it did not ask for
@@ -77,4 +79,5 @@ PX4_MISSIONS = MissionConventions(
     home_is_item_0=False,
     has_ids=True,
     goes_on=True,
+    takes_guided_items=False,
 )

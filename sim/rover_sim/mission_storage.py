@@ -3,7 +3,7 @@
 MAVLink guide, "Mission Protocol"; what it leaves open is in the persona's ``MissionConventions``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from struct import pack
 from zlib import crc32
@@ -19,6 +19,7 @@ from rover_sim.route import Route, Waypoint
 from rover_sim.setpoints import Destination
 
 NAV_WAYPOINT = 16
+GUIDED_ITEM = 2  # MISSION_ITEM.current
 
 Item = messages.MissionItemInt | messages.MissionItem
 Request = messages.MissionRequestInt | messages.MissionRequest
@@ -46,6 +47,7 @@ class MissionStorage:
         self._stored: _Upload | None = None  # the last one that came to its end
         self.current = 0  # where AUTO goes on, for makes that go on
         self.complete = False  # AUTO came to its end
+        self.go_to: Callable[[Destination, float], bool] = lambda _place, _now: False
         self.handlers: Mapping[int, Handler] = {
             messages.MissionCount.id: self._handle_count,
             messages.MissionItemInt.id: self._handle_item,
@@ -135,7 +137,9 @@ class MissionStorage:
 
     def _handle_item(self, message: Item, sender: Address, now: float) -> None:
         upload = self._upload
-        if upload is None or upload.partner != sender:
+        if self._conventions.takes_guided_items and message.current == GUIDED_ITEM:
+            self._go_to(message, sender, now)
+        elif upload is None or upload.partner != sender:
             self._handle_stray_item(message, sender)
         elif message.seq != len(upload.items):
             if self._conventions.wrong_sequence is not None:
@@ -150,6 +154,15 @@ class MissionStorage:
                 self._store(upload)
             else:
                 self._ask(upload, now)
+
+    def _go_to(self, item: Item, sender: Address, now: float) -> None:
+        """Older ground stations say "go to" so; no item of a plan has that mark."""
+        refusal = self._refusal(item, MISSION)
+        if refusal is None:
+            latitude, longitude = _place_of(item)
+            place = Destination(*self._origin.to_local(round(latitude), round(longitude)))
+            refusal = None if self.go_to(place, now) else MavMissionResult.ERROR
+        self._ack(sender, MISSION, refusal or MavMissionResult.ACCEPTED)
 
     def _handle_stray_item(self, message: Item, sender: Address) -> None:
         """The last item again: a make with ids takes the ack for lost, and repeats it."""

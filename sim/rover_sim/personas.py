@@ -13,6 +13,7 @@ from mav_tasks.mavlink.enums import MavAutopilot, MavLandedState, MavModeFlag
 from rover_sim.ardupilot_commands import ardupilot_commands
 from rover_sim.ardupilot_parameters import ARDUPILOT_PARAMETERS, Cast
 from rover_sim.ardupilot_rules import ArduPilotRules
+from rover_sim.available_modes import PX4_OFFERED, OfferedMode
 from rover_sim.commands import CommandParts, CommandTable
 from rover_sim.flight_rules import FlightParts, FlightRules
 from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, PX4_MISSIONS, MissionConventions
@@ -34,6 +35,7 @@ class Persona:
     name: str
     autopilot: MavAutopilot
     modes: ModeNumbers
+    offered_modes: tuple[OfferedMode, ...]  # AVAILABLE_MODES; none: it does not know that list
     mode_flags: Mapping[Mode, int]  # HEARTBEAT.base_mode, but for "armed"
     capabilities: int  # AUTOPILOT_VERSION.capabilities
     flight_sw_version: int  # AUTOPILOT_VERSION: major, minor, patch, type, a byte each
@@ -69,6 +71,7 @@ ARDUPILOT = Persona(
         },
         first=Mode.INITIALISING,
     ),
+    offered_modes=(),
     mode_flags={
         Mode.INITIALISING: MavModeFlag.CUSTOM_MODE_ENABLED,
         Mode.MANUAL: MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED,
@@ -85,7 +88,13 @@ ARDUPILOT = Persona(
     also_healthy=FENCE,
     landed_state_armed=MavLandedState.ON_GROUND,
     no_mission_total=0,
-    lacks=frozenset({messages.ProtocolVersion.id, messages.PositionTargetLocalNed.id}),
+    lacks=frozenset(
+        {
+            messages.ProtocolVersion.id,
+            messages.PositionTargetLocalNed.id,
+            messages.CurrentMode.id,
+        }
+    ),
     streams=ARDUPILOT_STREAMS,
     rules=ArduPilotRules,
     commands=ardupilot_commands,
@@ -119,6 +128,7 @@ PX4 = Persona(
         },
         first=Mode.HOLD,  # as a SITL without sticks
     ),
+    offered_modes=PX4_OFFERED,
     mode_flags={
         Mode.MANUAL: STICKS,
         Mode.POSITION: STICKS | MavModeFlag.STABILIZE_ENABLED | MavModeFlag.GUIDED_ENABLED,

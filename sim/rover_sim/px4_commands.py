@@ -4,11 +4,13 @@ import math
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavCmd, MavModeFlag, MavResult, MavSeverity
+from rover_sim.available_modes import MISSION, SAFE_RECOVERY
 from rover_sim.commands import (
     DO_SET_MISSION_CURRENT,
     Command,
     CommandParts,
     CommandTable,
+    as_id,
 )
 from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7
 from rover_sim.home_command import HomeCommand
@@ -16,6 +18,8 @@ from rover_sim.message_commands import MessageCommands
 from rover_sim.modes import Mode
 from rover_sim.setpoints import Destination
 
+DO_SET_STANDARD_MODE = 262  # MAV_CMD
+STANDARD_MODES = {SAFE_RECOVERY: Mode.RTL, MISSION: Mode.AUTO}  # the rest are for aircraft
 CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS
 NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT, for NaN
 MISTAKEN_NAN = 0x7FF80000  # a float's NaN, sent as an integer
@@ -30,6 +34,10 @@ def px4_commands(parts: CommandParts) -> CommandTable:
         unknown_message=MavResult.DENIED,
         bad_interval=MavResult.FAILED,
         bad_interval_text=None,
+        by_index={
+            messages.AvailableModes.id: commands.send_modes,
+            messages.MessageInterval.id: commands.send_interval,
+        },
     )
     return CommandTable(
         actions={
@@ -37,6 +45,7 @@ def px4_commands(parts: CommandParts) -> CommandTable:
             **HomeCommand(parts, refusal=MavResult.DENIED).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,
+            DO_SET_STANDARD_MODE: commands.do_set_standard_mode,
             MavCmd.NAV_RETURN_TO_LAUNCH: commands.return_to_launch,
             MavCmd.NAV_TAKEOFF: commands.refuse_to_fly,
             MavCmd.NAV_LAND: commands.refuse_to_fly,
@@ -85,6 +94,31 @@ class Px4Commands:
         if not base_mode & MavModeFlag.CUSTOM_MODE_ENABLED:
             return MavResult.DENIED
         return _done(self._flight.request_custom_mode(custom_mode, now=now))
+
+    def do_set_standard_mode(self, command: Command, now: float) -> MavResult:
+        """Change the mode to one that every make calls the same."""
+        mode = STANDARD_MODES.get(as_id(command.params[0]))
+        if mode is None:
+            return MavResult.FAILED
+        return _done(self._flight.request_mode(mode, now=now))
+
+    def send_modes(self, command: Command, _now: float) -> MavResult:
+        """Send AVAILABLE_MODES: that of an index from 1, or with 0 all of them."""
+        modes, index = self._parts.modes, as_id(command.params[1])
+        if not 0 <= index <= len(modes):
+            return MavResult.DENIED
+        for message in modes if index == 0 else modes[index - 1 : index]:
+            self._parts.outbox.send(message)
+        return MavResult.ACCEPTED
+
+    def send_interval(self, command: Command, _now: float) -> MavResult:
+        """Send MESSAGE_INTERVAL of the message in param2."""
+        message_id = as_id(command.params[1])
+        if message_id < 0:
+            return MavResult.DENIED
+        interval_us = self._parts.streams.interval_us(message_id)
+        self._parts.outbox.send(messages.MessageInterval(message_id & 0xFFFF, interval_us))
+        return MavResult.ACCEPTED
 
     def return_to_launch(self, _command: Command, now: float) -> MavResult:
         """Enter RTL."""

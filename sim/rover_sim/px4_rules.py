@@ -108,6 +108,11 @@ class Px4Rules:
             return f"Arming denied: {NAMES[mode]} cannot run"
         return None
 
+    def intended(self, mode: Mode) -> Mode:
+        """Give what somebody asked for last."""
+        del mode
+        return self._intended
+
     def choose(self, mode: Mode) -> None:
         """Note what somebody asked for: it ends a failsafe, also in the same mode."""
         self._intended = mode

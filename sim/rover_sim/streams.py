@@ -79,6 +79,7 @@ PX4_STREAMS = StreamTable(
         m.MissionCurrent.id: 1.0,
         m.HomePosition.id: 2.0,
         m.BatteryStatus.id: 2.0,
+        m.CurrentMode.id: 2.0,
         m.GpsGlobalOrigin.id: OFF,
         m.AutopilotVersion.id: OFF,
         m.ProtocolVersion.id: OFF,

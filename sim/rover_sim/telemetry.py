@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavFrame, MavLandedState, MavModeFlag, MavType
 from mav_tasks.mavlink.messages import Message
+from rover_sim.available_modes import standard_mode_of
 from rover_sim.estimate import Estimate
 from rover_sim.flight import FlightControl
 from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
@@ -67,6 +68,7 @@ class Telemetry:
             m.ExtendedSysState.id: self._extended_sys_state,
             m.PositionTargetLocalNed.id: self._position_target_local_ned,
             m.ProtocolVersion.id: self._protocol_version,
+            m.CurrentMode.id: self._current_mode,
         }
 
     def __repr__(self) -> str:
@@ -246,6 +248,11 @@ class Telemetry:
 
     def _protocol_version(self, _estimate: Estimate, _boot_ms: int) -> Message:
         return m.ProtocolVersion(200, 100, 200, (0,) * 8, (0,) * 8)  # MAVLink 2, 1 at least
+
+    def _current_mode(self, _estimate: Estimate, _boot_ms: int) -> Message:
+        flight = self._flight
+        standard = standard_mode_of(flight.mode, self._persona.offered_modes)
+        return m.CurrentMode(standard, flight.custom_mode, flight.intended_custom_mode)
 
 
 def _cm(metres: float) -> int:

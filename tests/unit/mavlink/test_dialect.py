@@ -36,6 +36,17 @@ def test_protocol_version_has_the_public_crc_extra() -> None:
     assert (m.ProtocolVersion.id, m.ProtocolVersion.crc_extra) == (300, 217)
 
 
+def test_what_the_base_lacks_is_as_the_set_that_has_it() -> None:
+    from pymavlink.dialects.v20 import development
+
+    for number in (435, 436, 437):  # AVAILABLE_MODES, CURRENT_MODE, AVAILABLE_MODES_MONITOR
+        ours, theirs = m.ALL[number], development.mavlink_map[number]
+        assert ours.msgname == theirs.msgname
+        assert ours.crc_extra == theirs.crc_extra
+        assert ours.unpacker.format == theirs.unpacker.format
+        assert ours.ordered_fieldnames == theirs.ordered_fieldnames
+
+
 @pytest.mark.parametrize(
     ("message", "extensions"),
     [

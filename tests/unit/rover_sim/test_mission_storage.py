@@ -8,7 +8,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.unit.rover_sim.rig import AUTO, CLIENT, RTL, Rig, velocity
+from tests.unit.rover_sim.rig import AUTO, CLIENT, RTL, Px4Rig, Rig, velocity
 
 OTHER_CLIENT = Address(255, 190)
 
@@ -156,3 +156,23 @@ def test_set_current_on_the_way_home_leaves_it_on_its_way() -> None:
     rig.send(m.MissionSetCurrent(1, 1, 2))
     rig.run(10.0)
     assert math.hypot(rig.truth.north, rig.truth.east) < 0.4
+
+
+def guided_item(north: float, east: float) -> m.MissionItem:
+    x, y = DEFAULT_ORIGIN.to_global(north, east)
+    return m.MissionItem(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, x * 1e-7, y * 1e-7, 0.0)
+
+
+def test_a_lone_item_marked_2_sends_it_there_in_guided() -> None:
+    rig = Rig()
+    rig.ready_to_drive()
+    rig.send(guided_item(3.0, 0.0))
+    assert [ack.type for ack in rig.take(m.MissionAck)] == [MavMissionResult.ACCEPTED]
+    rig.run(6.0)
+    assert rig.truth.north == pytest.approx(3.0, abs=1.0)  # float32 degrees resolve that
+
+
+def test_a_lone_item_marked_2_is_refused_in_another_mode_and_by_px4() -> None:
+    for rig in (Rig(), Px4Rig()):
+        rig.send(guided_item(3.0, 0.0))
+        assert [ack.type for ack in rig.take(m.MissionAck)] == [MavMissionResult.ERROR]

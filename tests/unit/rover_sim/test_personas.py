@@ -10,7 +10,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
 from mav_tasks.mavlink.messages import Message
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import PERSONAS
-from tests.unit.rover_sim.rig import Rig
+from tests.unit.rover_sim.rig import PX4_HOLD, PX4_OFFBOARD, Px4Rig, Rig
 
 A, P, G = "ardupilot", "px4", "generic"
 NAN = math.nan
@@ -53,6 +53,11 @@ TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
     (P, long(MODE, 1, 99), ack(MODE, REJECTED)),
     (P, long(MODE, 0, 4, 3), ack(MODE, DENIED)),
     (P, long(MODE, NAN, NAN, NAN), ack(MODE, DENIED)),
+    (P, long(262, 5), ack(262, ACCEPTED)),  # DO_SET_STANDARD_MODE: safe recovery
+    (P, long(262, 6), ack(262, REJECTED)),  # mission: there is none
+    (P, long(262, 1), ack(262, FAILED)),  # position hold: not for a rover
+    (P, long(262, NAN), ack(262, FAILED)),
+    (A, long(262, 5), ack(262, UNSUPPORTED)),
     (A, long(MODE, 1, 99), ack(MODE, FAILED)),
     # the old message: the whole number for all; PX4 answers as to the command
     (A, m.SetMode(1, 1, 4), ack(11, ACCEPTED)),
@@ -88,7 +93,19 @@ TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
     (P, long(MavCmd.DO_PAUSE_CONTINUE), ack(MavCmd.DO_PAUSE_CONTINUE, UNSUPPORTED)),
     (A, long(512, 397), ack(512, FAILED)),
     (P, long(512, 397), ack(512, DENIED)),
-    (P, long(512, 435), ack(512, DENIED)),
+    (P, long(512, 435, 7), ack(512, DENIED)),  # there are six modes
+    (P, long(512, 435, NAN), ack(512, DENIED)),
+    (P, long(512, 437), ack(512, DENIED)),  # only streamed, and only after a change
+    (A, long(512, 435, 1), ack(512, FAILED)),
+    (A, long(512, 436), ack(512, FAILED)),
+    (P, long(512, 436), [{"custom_mode": 0x03040000, "standard_mode": 0}, *ack(512, ACCEPTED)]),
+    (P, long(512, 244, 0), [{"message_id": 0, "interval_us": 1_000_000}, *ack(512, ACCEPTED)]),
+    (A, long(512, 0), [{"mavpackettype": "HEARTBEAT"}, *ack(512, ACCEPTED)]),
+    (P, long(512, 0), [{"mavpackettype": "HEARTBEAT"}, *ack(512, ACCEPTED)]),
+    (A, long(512, 395), ack(512, FAILED)),
+    (P, long(512, 395), ack(512, DENIED)),
+    (A, long(512, 280), ack(512, FAILED)),
+    (P, long(512, 280), ack(512, DENIED)),
     (P, long(511, 12_000, 1e5), ack(511, FAILED)),
     (P, long(511, 30, 50_000), ack(511, ACCEPTED)),
     (P, long(246, 0), ack(246, ACCEPTED)),
@@ -136,6 +153,39 @@ def test_each_persona_shows_itself() -> None:
         P: (12, 10, "0x3040000", 1),
         G: (0, 10, "0x3040000", 1),
     }
+
+
+@pytest.mark.parametrize("name", [P, G])
+def test_its_modes_can_be_enumerated(name: str) -> None:
+    rig = Rig(persona=PERSONAS[name])
+    rig.take(m.AvailableModes)
+    rig.send(long(512, 435, 0))
+    every = rig.take(m.AvailableModes)
+    rig.send(*[long(512, 435, index) for index in range(1, 7)])
+    one_by_one = rig.take(m.AvailableModes)
+    assert [each.to_dict() for each in one_by_one] == [each.to_dict() for each in every]
+    assert {each.number_modes for each in every} == {6}
+    assert [
+        (each.mode_index, hex(each.custom_mode), each.standard_mode, each.mode_name.rstrip("\0"))
+        for each in every
+    ] == [
+        (1, "0x10000", 0, "Manual"),
+        (2, "0x30000", 0, "Position"),
+        (3, "0x4040000", 6, ""),
+        (4, "0x3040000", 0, "Hold"),
+        (5, "0x5040000", 5, ""),
+        (6, "0x60000", 0, "Offboard"),
+    ]
+
+
+def test_current_mode_tells_what_was_wanted_from_what_a_failsafe_did() -> None:
+    rig = Px4Rig()
+    rig.ready_to_drive()
+    rig.run(2.5)  # no setpoints: the failsafe enters HOLD
+    rig.heard.clear()
+    rig.command(MavCmd.REQUEST_MESSAGE, m.CurrentMode.id)
+    current = rig.last(m.CurrentMode)
+    assert (current.custom_mode, current.intended_custom_mode) == (PX4_HOLD, PX4_OFFBOARD)
 
 
 @pytest.mark.parametrize("name", PERSONAS)

@@ -22,6 +22,7 @@ PER_SECOND = {
     m.MissionCurrent: 1,
     m.HomePosition: 0.5,
     m.BatteryStatus: 0.5,
+    m.CurrentMode: 0.5,
 }
 
 
