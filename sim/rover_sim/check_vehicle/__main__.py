@@ -1,0 +1,113 @@
+"""``python -m rover_sim.check_vehicle URL``: does this vehicle do what is expected of it?
+
+The command line, the link and the signals; what is checked is in ``contract``.
+"""
+
+import argparse
+import json
+import signal
+import sys
+from collections.abc import Sequence
+
+from rover_sim.check_vehicle.context import Options
+from rover_sim.check_vehicle.contract import GROUPS, NothingHeard, check_vehicle
+from rover_sim.check_vehicle.conventions import WAYS
+from rover_sim.check_vehicle.report import Line
+from rover_sim.check_vehicle.wire import BadUrl, MavutilWire, Url, read_url
+
+PASSED, FAILED, USAGE_ERROR, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the checks; give the exit status: 0 all passed, 1 some failed, 2 usage or no vehicle."""
+    parser = make_parser()
+    values = parser.parse_args(arguments)
+    try:
+        url = read_url(values.url)
+    except BadUrl as error:
+        parser.error(str(error))
+    if not 0.0 < values.speed <= 100.0:
+        parser.error("--speed must be above 0, at most 100")
+    if values.system_id is not None and not 1 <= values.system_id <= 255:
+        parser.error("--system-id must lie within 1..255")
+    if unknown := set(values.only) - set(GROUPS):
+        parser.error(f"--only knows {', '.join(GROUPS)}; not {', '.join(unknown)}")
+    if (values.arm or values.drive) and not url.is_local and not values.insecure:
+        parser.error(
+            f"{values.url} is beyond this machine: say --insecure if that vehicle is to be armed"
+        )
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does: at rest
+    return _run(url, values)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Give the command line."""
+    parser = argparse.ArgumentParser(
+        prog="rover_sim.check_vehicle",
+        description="Check what a task server and its clients expect of a MAVLink rover. Nothing"
+        " that lasts is changed and nothing moves, unless you say so.",
+    )
+    add = parser.add_argument
+    add("url", help="udpout:127.0.0.1:14580, udpin:…, tcp:…, tcpin:… or serial:/dev/ttyACM0:57600")
+    add(
+        "--persona",
+        choices=("auto", *WAYS),
+        default="auto",
+        help="the make that it is to be (default: what it says that it is)",
+    )
+    add("--arm", action="store_true", help="arm and disarm it, standing")
+    add("--drive", action="store_true", help="arm it and drive some metres: keep 20 m free")
+    add("--write", action="store_true", help="upload missions and fences, then put back what was")
+    add("--insecure", action="store_true", help="arm or drive also what is beyond this machine")
+    add("--system-id", type=int, help="which vehicle, if there are several")
+    add("--only", nargs="+", default=list(GROUPS), metavar="GROUP", help=", ".join(GROUPS))
+    add("--speed", type=float, default=1.0, help="of a simulated vehicle's time")
+    add("--json", action="store_true", help="print a JSON list in the end instead of lines")
+    return parser
+
+
+def _run(url: Url, values: argparse.Namespace) -> int:
+    options = Options(
+        arm=values.arm, drive=values.drive, write=values.write, persona=values.persona
+    )
+    show = _silent if values.json else _show
+    try:
+        wire = MavutilWire(url, speed=values.speed)
+    except Exception as error:  # noqa: BLE001 - pymavlink's links raise what they like
+        return _complain(f"{values.url}: {error}")
+    try:
+        report = check_vehicle(
+            wire, options, system_id=values.system_id, show=show, groups=tuple(values.only)
+        )
+    except NothingHeard as error:
+        return _complain(str(error))
+    except KeyboardInterrupt:
+        sys.stderr.write("check_vehicle: interrupted\n")
+        return INTERRUPTED
+    finally:
+        wire.close()
+    if values.json:
+        sys.stdout.write(json.dumps(report.as_json(), indent=1) + "\n")
+    else:
+        for line in report.failed:
+            sys.stdout.write(f"{line}\n")
+        sys.stdout.write(f"{report.summary()}\n")
+    return FAILED if report.failed else PASSED
+
+
+def _show(line: Line) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def _silent(_line: Line) -> None:
+    """JSON comes at the end."""
+
+
+def _complain(text: str) -> int:
+    sys.stderr.write(f"check_vehicle: {text}\n")
+    return USAGE_ERROR
+
+
+if __name__ == "__main__":
+    sys.exit(main())
