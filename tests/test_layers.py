@@ -168,6 +168,14 @@ def test_clients_and_vehicles_do_not_know_each_other(module: str) -> None:
 
 
 @pytest.mark.parametrize("module", MODULES)
+def test_the_checker_shares_no_code_with_what_it_checks(module: str) -> None:
+    checker = "rover_sim.check_vehicle"
+    if module.startswith(checker):
+        ours = [each for each in imports_of(MODULES[module]) if layer_of(each) is not None]
+        assert [each for each in ours if not each.startswith(checker)] == []
+
+
+@pytest.mark.parametrize("module", MODULES)
 def test_only_bullet_imports_pybullet(module: str) -> None:
     if module != "rover_sim.bullet":
         assert "pybullet" not in set(imports_of(MODULES[module]))

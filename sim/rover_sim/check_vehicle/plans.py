@@ -134,12 +134,12 @@ def _upload(context: Context, mission_type: int, plan: Sequence[Any]) -> str:
             message = heard.message
             if heard.component != AUTOPILOT or getattr(message, "mission_type", -1) != mission_type:
                 continue
-            if message.get_msgId() in (MISSION_REQUEST, MISSION_REQUEST_INT):
+            if heard.id in (MISSION_REQUEST, MISSION_REQUEST_INT):
                 if message.seq >= len(plan):
                     return f"it asked for item {message.seq} of {len(plan)}"
                 probe.send(_addressed(context, plan[message.seq], message.seq))
                 asked, end = asked + 1, probe.now + STEP_LIMIT
-            elif message.get_msgId() == MISSION_ACK:
+            elif heard.id == MISSION_ACK:
                 if (message.target_system, message.target_component) != OURS:
                     return f"MISSION_ACK for {message.target_system}/{message.target_component}"
                 return "accepted" if message.type == ACCEPTED else f"result {message.type}"

@@ -16,8 +16,9 @@ AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 OURS = (254, 190)  # not 255: an operator's failsafe may count that one's heartbeats
 NO_VEHICLES = {6, 18, 26, 27}  # MAV_TYPE: ground station, onboard computer, gimbal, ADS-B
 ARMED = 128  # MAV_MODE_FLAG
+MAVLINK_2 = 0xFD  # the first byte of a packet
 COMMAND_LIMIT = 1.0  # s for an answer to a command
-AFTERMATH = 0.3  # s in which a second answer would come
+AFTERMATH = 0.2  # s in which a second answer would come
 PATIENCE = 0.05  # s between two looks at the clock
 
 COMMAND_ACK, HEARTBEAT, STATUSTEXT = 77, 0, 253
@@ -27,8 +28,26 @@ class Heard(NamedTuple):
     """A message of the vehicle."""
 
     at: float  # s
-    message: Any
+    message: Any  # one that pymavlink does not know has no fields, but bytes
+    id: int
     component: int
+
+
+class Header(NamedTuple):
+    """What stands before the payload; pymavlink reads it only for messages that it knows."""
+
+    version: int
+    sequence: int
+    system_id: int
+    component: int
+    message_id: int
+
+
+def read_header(packet: bytes) -> Header:
+    """Read a packet's header."""
+    if packet[0] == MAVLINK_2:
+        return Header(2, packet[4], packet[5], packet[6], int.from_bytes(packet[7:10], "little"))
+    return Header(1, packet[2], packet[3], packet[4], packet[5])
 
 
 class Answer(NamedTuple):
@@ -102,7 +121,7 @@ class Probe:
         while self.now < end:
             self.pump()
             for heard in self.log:
-                if heard.message.get_msgId() == HEARTBEAT:
+                if heard.id == HEARTBEAT:
                     return heard
         return None
 
@@ -137,13 +156,13 @@ class Probe:
         return [
             heard
             for heard in self.log[mark:]
-            if heard.component == AUTOPILOT and heard.message.get_msgId() == message_id
+            if heard.component == AUTOPILOT and heard.id == message_id
         ]
 
     def last(self, message_id: int) -> Any:
         """Give the last message of a kind from the autopilot, or None."""
         for heard in reversed(self.log):
-            if heard.component == AUTOPILOT and heard.message.get_msgId() == message_id:
+            if heard.component == AUTOPILOT and heard.id == message_id:
                 return heard.message
         return None
 
@@ -160,7 +179,7 @@ class Probe:
         seen = since
         while True:
             for heard in self.log[seen:]:
-                of_kind = heard.message.get_msgId() == message_id
+                of_kind = heard.id == message_id
                 if of_kind and heard.component == AUTOPILOT and condition(heard.message):
                     return heard.message
             seen = len(self.log)
@@ -206,8 +225,7 @@ class Probe:
         self.send(message)
 
         def of_this(heard: Heard) -> bool:
-            found = heard.message
-            return bool(found.get_msgId() == COMMAND_ACK and found.command == number)
+            return heard.id == COMMAND_ACK and bool(heard.message.command == number)
 
         while not any(of_this(heard) for heard in self.log[mark:]):
             if self.now - began >= COMMAND_LIMIT:
@@ -221,10 +239,11 @@ class Probe:
         if message.get_type() == "BAD_DATA":
             self.damaged += 1
             return
-        system_id, component = message.get_srcSystem(), message.get_srcComponent()
+        header = read_header(message.get_msgbuf())
+        system_id, component, message_id = header.system_id, header.component, header.message_id
         if self.system_id is None or not self.log:
             is_vehicle = (
-                message.get_msgId() == HEARTBEAT
+                message_id == HEARTBEAT
                 and component == AUTOPILOT
                 and message.type not in NO_VEHICLES
                 and self.system_id in (None, system_id)
@@ -234,9 +253,9 @@ class Probe:
             self.system_id = system_id
         if system_id != self.system_id:
             return
-        self._count(component, message.get_seq())
-        self.mavlink_1 += message.get_msgbuf()[0] == 0xFE
-        self.log.append(Heard(self.now, message, component))
+        self._count(component, header.sequence)
+        self.mavlink_1 += header.version == 1
+        self.log.append(Heard(self.now, message, message_id, component))
 
     def _count(self, component: int, sequence: int) -> None:
         before = self._sequence.get(component)
@@ -247,4 +266,4 @@ class Probe:
 
 
 def _is_text(heard: Heard) -> bool:
-    return bool(heard.message.get_msgId() == STATUSTEXT)
+    return heard.id == STATUSTEXT

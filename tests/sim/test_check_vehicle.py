@@ -1,0 +1,130 @@
+"""The program itself, over real sockets, against the simulated rover as a process of its own."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from rover_sim.check_vehicle.__main__ import main
+from rover_sim.check_vehicle.wire import BadUrl, Url, read_url
+from tests.kit.processes import free_udp_ports, process, wait_until
+
+SPEED = "4"  # simulated seconds per second: answers may still take a quarter of a second
+CHECK = ("-m", "rover_sim.check_vehicle")
+LIMIT = 50.0  # s
+
+
+@contextmanager
+def rover(folder: Path, *options: str) -> Iterator[str]:
+    """Run a simulated rover; gives its URL."""
+    arguments = ("-m", "rover_sim", "--port", "0", "--body", "kinematic", *options)
+    with process(*arguments, folder=folder, name="rover") as running:
+        found = running.wait_for(r"on udp 127\.0\.0\.1:(\d+)")
+        yield f"udpout:127.0.0.1:{found[1]}"
+
+
+def check(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *CHECK, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+        check=False,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("persona", ["ardupilot", "px4", "generic"])
+def test_it_passes_the_simulated_rover_with_everything_on(persona: str, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+    options = ("--persona", persona, "--speed", SPEED, "--truth", str(truth))
+    everything = ("--arm", "--drive", "--write", "--persona", persona, "--speed", SPEED)
+    with rover(tmp_path, *options) as url:
+        result = check(url, *everything)
+    assert result.returncode == 0, result.stdout
+    *lines, summary = result.stdout.splitlines()
+    assert re.fullmatch(r"\d+ ok, 0 failed, 0 skipped, \d notes", summary)
+    assert len(lines) >= 80
+    with truth.open(encoding="ascii") as file:
+        assert max(float(row["forward_speed"]) for row in csv.DictReader(file)) > 0.4
+
+
+def test_what_fails_is_said_again_at_the_end_and_in_the_exit_status(tmp_path: Path) -> None:
+    with rover(tmp_path, "--persona", "px4", "--speed", "10") as url:
+        only = ("--only", "identity", "--speed", "10", "--persona", "ardupilot")
+        result = check(url, *only)
+        as_json = check(url, *only, "--json")
+    assert (result.returncode, as_json.returncode) == (1, 1)
+    *_, again, summary = result.stdout.splitlines()
+    assert again.startswith("FAIL    identity: autopilot: expected a ardupilot rover; seen:")
+    assert "1 failed" in summary
+    failed = [line for line in json.loads(as_json.stdout) if line["outcome"] == "FAIL"]
+    assert [(line["group"], line["name"]) for line in failed] == [("identity", "autopilot")]
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_it_drives_leaves_the_rover_standing(tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+
+    def speed() -> float:
+        text = truth.read_text(encoding="ascii")
+        rows = list(csv.DictReader(text[: text.rfind("\n") + 1].splitlines()))
+        return abs(float(rows[-1]["forward_speed"])) if rows else 0.0
+
+    with rover(tmp_path, "--truth", str(truth)) as url:
+        arguments = (*CHECK, url, "--drive", "--only", "driving")
+        with process(*arguments, folder=tmp_path, name="check") as running:
+            wait_until(lambda: speed() > 0.4, within=20, what="a rover at speed")
+            running.popen.send_signal(2)
+            assert running.popen.wait(15) == 130
+            assert "driving: left behind: HOLD, disarmed" in running.text
+        wait_until(lambda: speed() < 0.05, within=5, what="a rover that stands")
+
+
+def test_nothing_heard_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    (port,) = free_udp_ports(1)
+    assert main([f"udpout:127.0.0.1:{port}", "--speed", "20"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err == "check_vehicle: no heartbeat of a vehicle within 10 s\n"
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("nowhere",), "not a link"),
+        (("udpout:127.0.0.1",), "not a link"),
+        (("udpout:example.org:14550",), "not an IP address"),
+        (("udpout:127.0.0.1:99999",), "not a port"),
+        (("udpout:192.0.2.1:14550", "--drive"), "--insecure"),
+        (("tcp:192.0.2.1:5760", "--arm"), "--insecure"),
+        (("serial:/dev/ttyACM0:57600", "--arm"), "--insecure"),
+        (("udpin:0.0.0.0:14550", "--drive"), "--insecure"),
+        (("udpout:127.0.0.1:1", "--system-id", "0"), "--system-id"),
+        (("udpout:127.0.0.1:1", "--speed", "0"), "--speed"),
+        (("udpout:127.0.0.1:1", "--only", "everything"), "--only"),
+        (("udpout:127.0.0.1:1", "--persona", "betaflight"), "--persona"),
+    ],
+)
+def test_bad_usage_is_refused_by_name(
+    arguments: tuple[str, ...], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert named in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_urls_are_those_of_the_server() -> None:
+    assert read_url("udpout:localhost:14580") == Url("udpout", "127.0.0.1:14580", 0)
+    assert read_url("serial:/dev/ttyACM0:57600") == Url("serial", "/dev/ttyACM0", 57600)
+    assert not read_url("serial:/dev/ttyACM0:57600").is_local
+    assert not read_url("udpin:0.0.0.0:14550").is_local
+    with pytest.raises(BadUrl):
+        read_url("udp:127.0.0.1:14550")
