@@ -21,6 +21,7 @@ COMMANDS = {
     "./tools/test": ".ci/run",
     "mav-tasks sim": "tests/e2e/test_by_hand.py",
     "mav-tasks serve": "tests/e2e/test_by_hand.py",
+    "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }
 
 

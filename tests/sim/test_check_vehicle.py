@@ -16,7 +16,8 @@ from rover_sim.check_vehicle.wire import BadUrl, Url, read_url
 from tests.kit.processes import free_udp_ports, process, wait_until
 
 SPEED = "4"  # simulated seconds per second: answers may still take a quarter of a second
-CHECK = ("-m", "rover_sim.check_vehicle")
+IN_README = "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580"
+CHECK = tuple(IN_README.split()[1:3])
 LIMIT = 50.0  # s
 
 
