@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -82,7 +83,9 @@ def test_ctrl_c_while_it_drives_leaves_the_rover_standing(tmp_path: Path) -> Non
         arguments = (*CHECK, url, "--drive", "--only", "driving")
         with process(*arguments, folder=tmp_path, name="check") as running:
             wait_until(lambda: speed() > 0.4, within=20, what="a rover at speed")
-            running.popen.send_signal(2)
+            running.popen.send_signal(signal.SIGINT)
+            wait_until(lambda: speed() < 0.3, within=5, what="a rover that slows down")
+            running.popen.send_signal(signal.SIGINT)  # again, from an impatient user
             assert running.popen.wait(15) == 130
             assert "driving: left behind: HOLD, disarmed" in running.text
         wait_until(lambda: speed() < 0.05, within=5, what="a rover that stands")

@@ -16,6 +16,7 @@ from rover_sim.check_vehicle.report import Line
 from rover_sim.check_vehicle.wire import BadUrl, MavutilWire, Url, read_url
 
 PASSED, FAILED, USAGE_ERROR, INTERRUPTED = 0, 1, 2, 130
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(
             f"{values.url} is beyond this machine: say --insecure if that vehicle is to be armed"
         )
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as Ctrl-C does: at rest
+    for number in ENDING:
+        signal.signal(number, _interrupt_once)
     return _run(url, values)
 
 
@@ -93,6 +95,13 @@ def _run(url: Url, values: argparse.Namespace) -> int:
             sys.stdout.write(f"{line}\n")
         sys.stdout.write(f"{report.summary()}\n")
     return FAILED if report.failed else PASSED
+
+
+def _interrupt_once(_number: int, _frame: object) -> None:
+    """End, bringing a vehicle to rest; a second signal does not cut that short."""
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _show(line: Line) -> None:

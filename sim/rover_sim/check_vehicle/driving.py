@@ -25,7 +25,7 @@ from rover_sim.check_vehicle.wheel import (
 )
 
 SPEED = 0.6  # m/s
-TURN_RATE = 0.5  # rad/s
+TURN_RATE = 0.4  # rad/s: at that speed a curve of 1.5 m
 LEG = 2.5  # s of driving
 AHEAD = 3.0  # m, to the place of a position setpoint
 STOP_LIMIT = 4.0  # s until it stands
@@ -169,21 +169,43 @@ def _check_target(context: Context, mark: int) -> None:
 
 
 def _check_yaw_rate(context: Context, wheel: Wheel) -> None:
-    before = wheel.position
-    wheel.velocity(0.0, 0.0, LEG, frame=BODY_NED, yaw_rate=TURN_RATE)
-    turned = (wheel.position.yaw - before.yaw + math.pi) % (2 * math.pi) - math.pi
-    wheel.wait_standing(STOP_LIMIT)
-    name, seen = "yaw rate in BODY_NED", f"{math.degrees(turned):.0f}° in {LEG:g} s"
+    """A curve and backwards, where yaw rates count; on the spot, where the rover can."""
     if not context.way.honours_yaw_rate:
-        context.report.note(name, f"{seen} (its make passes over yaw rates)")
+        turned, _ = _turn(wheel, 0.0, TURN_RATE)
+        said = f"{math.degrees(turned):.0f}° in {LEG:g} s (its make passes over yaw rates)"
+        context.report.note("yaw rate in BODY_NED", said)
         return
+    turned, _ = _turn(wheel, SPEED, TURN_RATE)
     wanted = TURN_RATE * LEG
     context.report.expect(
-        name,
+        "yaw rate in BODY_NED",
         0.4 * wanted < turned < 1.5 * wanted,
-        expected=f"{math.degrees(wanted):.0f}° clockwise on the spot, or nearly",
-        seen=seen,
+        expected=f"{math.degrees(wanted):.0f}° clockwise at {SPEED:g} m/s, or nearly",
+        seen=f"{math.degrees(turned):.0f}°",
     )
+    _, moved = _turn(wheel, -SPEED, 0.0)
+    context.report.expect(
+        "backwards in BODY_NED",
+        -1.5 * SPEED * LEG < moved < -0.3 * SPEED * LEG,
+        expected=f"up to {SPEED * LEG:.1f} m backwards, for a yaw rate of zero is given",
+        seen=f"{-moved:.2f} m backwards",
+    )
+    turned, _ = _turn(wheel, 0.0, TURN_RATE)
+    seen = f"{math.degrees(turned):.0f}° in {LEG:g} s"
+    if turned < 0.4 * wanted:
+        context.report.note("on the spot", f"{seen}: it steers as a car, it seems")
+    else:
+        context.report.ok("on the spot", seen)
+
+
+def _turn(wheel: Wheel, speed: float, rate: float) -> tuple[float, float]:
+    """Drive for a leg; gives the turn (rad, clockwise) and the way ahead (m)."""
+    before = wheel.position
+    wheel.velocity(speed, 0.0, LEG, frame=BODY_NED, yaw_rate=rate)
+    after = wheel.position
+    wheel.wait_standing(STOP_LIMIT)
+    turned = (after.yaw - before.yaw + math.pi) % (2 * math.pi) - math.pi
+    return turned, after.ahead_of(before)
 
 
 def _check_place(context: Context, wheel: Wheel) -> None:

@@ -161,10 +161,13 @@ class Probe:
 
     def last(self, message_id: int) -> Any:
         """Give the last message of a kind from the autopilot, or None."""
-        for heard in reversed(self.log):
-            if heard.component == AUTOPILOT and heard.id == message_id:
-                return heard.message
-        return None
+        heard = self._last(message_id)
+        return None if heard is None else heard.message
+
+    def silence(self, message_id: int) -> float:
+        """Give the seconds since the last message of a kind from the autopilot."""
+        heard = self._last(message_id)
+        return math.inf if heard is None else self.now - heard.at
 
     def wait(
         self,
@@ -219,6 +222,13 @@ class Probe:
         """The mode that its last heartbeat says; -1: none yet."""
         beat = self.last(HEARTBEAT)
         return -1 if beat is None else int(beat.custom_mode)
+
+    def _last(self, message_id: int) -> Heard | None:
+        for index in range(len(self.log) - 1, -1, -1):
+            heard = self.log[index]
+            if heard.component == AUTOPILOT and heard.id == message_id:
+                return heard
+        return None
 
     def _ask(self, number: int, message: Any) -> Answer:
         mark, began = self.mark(), self.now

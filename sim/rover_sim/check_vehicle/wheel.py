@@ -16,7 +16,8 @@ LOCAL_NED, BODY_NED = 1, 8  # MAV_FRAME
 VELOCITY, VELOCITY_AND_RATE, POSITION = 0x0DC7, 0x05C7, 0x0DF8  # type masks
 PERIOD = 0.05  # s between two setpoints
 FRESH = 2.5  # s, of a heartbeat
-FARTHEST = 20.0  # m from where it began
+FRESH_POSITION = 1.0  # s, of its position
+FARTHEST = 15.0  # m from where it began
 STANDING = 0.1  # m/s
 REST_TRIES = 5
 
@@ -91,9 +92,10 @@ class Wheel:
 
     def _guard(self) -> None:
         probe = self._probe
-        beats = probe.since(max(0, probe.mark() - 2000), HEARTBEAT)
-        if not beats or probe.now - beats[-1].at > FRESH:
+        if probe.silence(HEARTBEAT) > FRESH:
             raise Interference(f"no heartbeat for {FRESH:g} s")
+        if probe.silence(LOCAL_POSITION_NED) > FRESH_POSITION:
+            raise Interference(f"no LOCAL_POSITION_NED for {FRESH_POSITION:g} s")
         if not probe.armed:
             raise Interference("it is not armed any more")
         if probe.custom_mode != self._way.control:

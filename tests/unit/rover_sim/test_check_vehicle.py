@@ -355,7 +355,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "no frame of its own": Fault(
         ("driving",),
-        frozenset({"velocity in BODY_NED", "yaw rate in BODY_NED"}),
+        frozenset({"velocity in BODY_NED", "yaw rate in BODY_NED", "backwards in BODY_NED"}),
         hears=no_body_frame,
         options=ALL,
     ),
@@ -479,6 +479,20 @@ def test_a_rover_that_somebody_else_takes_gets_no_other_motion(name: str) -> Non
     assert "it left the control mode" in line.said
     late = [each for each in wire.setpoints[taken[0] :] if (each.vx, each.vy) != (0.0, 0.0)]
     assert len(late) <= 21  # those of the second until the next heartbeat
+
+
+@pytest.mark.parametrize(
+    ("kind", "named"), [(m.Heartbeat, "no heartbeat"), (m.LocalPositionNed, "no LOCAL_POSITION")]
+)
+def test_it_does_not_drive_blind(kind: type[Message], named: str) -> None:
+    def lose(wire: VirtualWire) -> None:
+        wire.vehicle.autopilot.set_faults(Faults(withheld=frozenset({kind.id})))
+
+    wire = VirtualWire(ARDUPILOT, at=while_driving(lose))
+    report = run(wire, ALL, ("driving",))
+    assert any(named in line.said for line in report.failed)
+    assert wire.vehicle.autopilot.mode is Mode.HOLD
+    assert not wire.vehicle.autopilot.armed
 
 
 def test_no_motion_is_asked_of_a_rover_that_is_armed_by_somebody_else() -> None:
