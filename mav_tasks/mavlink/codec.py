@@ -12,7 +12,7 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.layout import Layout
 from mav_tasks.mavlink.messages import Message
-from mav_tasks.mavlink.packet import HEADER_V1, HEADER_V2, MAGIC_V2, Packet
+from mav_tasks.mavlink.packet import HEADER_V1, HEADER_V2, MAGIC_V2, Packet, crcs_of_one_byte
 
 _LAYOUTS = {message_id: Layout(message) for message_id, message in messages.ALL.items()}
 _HEADER = Struct("<BBBBBBHB")  # of MAVLink 2, without the magic byte
@@ -96,6 +96,22 @@ class Encoder:
         packed = self._packer.pack(message, self.source, seq=self._next_seq)
         self._next_seq = (self._next_seq + 1) & 0xFF
         return packed
+
+
+def crc_fits(packet: Packet) -> bool:
+    """Whether the packet's CRC is right.
+
+    For an id that is not in the dialect: whether it is with any of the 256 CRC_EXTRA that it may
+    have, which one of 256 pieces of noise passes.
+    """
+    raw = packet.raw
+    start = HEADER_V2 if raw[0] == MAGIC_V2 else HEADER_V1
+    end = start + raw[1]
+    given = raw[end] | raw[end + 1] << 8
+    layout = _LAYOUTS.get(packet.message_id)
+    if layout is not None:
+        return bool(mcrf4xx(raw[1:end] + layout.crc_extra) == given)
+    return given ^ mcrf4xx(raw[1:end]) >> 8 in crcs_of_one_byte()
 
 
 def target_of(message: Message) -> Address:

@@ -144,6 +144,12 @@ def _patched(raw: bytes, index: int, value: int) -> bytes:
     return bytes(patched)
 
 
+@cache
+def crcs_of_one_byte() -> frozenset[int]:
+    """Give what one more byte, whatever it is, can put into the upper half of a CRC: see codec."""
+    return frozenset(_tail_crcs(0))
+
+
 @cache  # at most one table for each packet length there is
 def _tail_crcs(zeros: int) -> tuple[int, ...]:
     """CRC (initial value 0) of each byte value followed by ``zeros`` zero bytes.

@@ -1,0 +1,137 @@
+"""Packets out of a stream, held against packets that stock pymavlink made."""
+
+from itertools import pairwise
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.mavlink.packet import MAX_PACKET
+from mav_tasks.mavlink.stream import PATIENCE, StreamSplitter
+from tests.unit.mavlink.samples import stock_message, stock_packet
+from tests.unit.mavlink.test_packet import HEARTBEAT, JUNK, V1, V2, signed, unknown
+
+SEED = 20240608
+#: what can begin nothing: neither magic byte is in it
+QUIET_NOISE = st.binary(max_size=40).map(lambda data: data.translate(None, b"\xfd\xfe"))
+
+
+def a_stream(random: Random) -> list[bytes]:
+    """Some packets of every kind."""
+    packets = [V1, V2, signed(HEARTBEAT, seq=9), unknown(seq=4)]
+    for seq in range(30):
+        is_v1 = random.random() < 0.3
+        packets.append(stock_packet(stock_message(random, v1=is_v1), seq=seq, v1=is_v1))
+    random.shuffle(packets)
+    return packets
+
+
+PACKETS = a_stream(Random(SEED))
+STREAM = b"".join(PACKETS)
+
+
+def split(*chunks: bytes, at: float = 0.0) -> list[bytes]:
+    splitter = StreamSplitter()
+    return [packet.raw for chunk in chunks for packet in splitter.feed(chunk, now=at)]
+
+
+@given(st.lists(st.integers(0, len(STREAM)), max_size=80))
+def test_however_a_stream_is_cut_the_packets_are_the_same(cuts: list[int]) -> None:
+    edges = [0, *sorted(cuts), len(STREAM)]
+    assert split(*(STREAM[a:b] for a, b in pairwise(edges))) == PACKETS
+
+
+def test_byte_by_byte_each_packet_comes_with_its_last_byte() -> None:
+    splitter = StreamSplitter()
+    came = [(n, p.raw) for n in range(len(STREAM)) for p in splitter.feed(STREAM[n : n + 1], now=0)]
+    ends = [sum(map(len, PACKETS[: n + 1])) - 1 for n in range(len(PACKETS))]
+    assert came == list(zip(ends, PACKETS, strict=True))
+    assert splitter.noise == 0
+
+
+@given(st.lists(QUIET_NOISE, min_size=len(PACKETS), max_size=len(PACKETS)), st.integers(1, 300))
+def test_noise_between_packets_costs_none(noises: list[bytes], size: int) -> None:
+    data = b"".join(n + p for n, p in zip(noises, PACKETS, strict=True))
+    chunks = [data[start : start + size] for start in range(0, len(data), size)]
+    splitter = StreamSplitter()
+    came = [packet.raw for chunk in chunks for packet in splitter.feed(chunk, now=0.0)]
+    assert came == PACKETS
+    assert splitter.noise == sum(map(len, noises))
+
+
+@pytest.mark.parametrize(
+    "false",
+    [b"\xfd\xff\x00", b"\xfe\xff", b"\xfd\x09\x01", b"\xfe\x09", b"\xfd", b"\xfe"],
+    ids=lambda false: false.hex(),
+)
+def test_a_false_magic_byte_costs_no_packet(false: bytes) -> None:
+    """It waits for what the false header promises, then all that had waited comes."""
+    assert split(false + STREAM) == PACKETS
+    assert split(V2 + false, STREAM) == [V2, *PACKETS]
+
+
+@pytest.mark.parametrize("flags", [0x02, 0x80, 0xFF])
+def test_flags_that_do_not_exist_are_not_waited_for(flags: int) -> None:
+    assert split(bytes((0xFD, 255, flags)) + V2) == [V2]
+
+
+def test_on_a_quiet_link_a_false_magic_byte_is_given_up_in_time() -> None:
+    splitter = StreamSplitter()
+    assert splitter.feed(b"\xfe\xff", now=0.0) == []
+    assert splitter.feed(V2, now=0.5) == []
+    assert [p.raw for p in splitter.feed(V2, now=PATIENCE + 0.1)] == [V2, V2]
+
+
+def test_a_packet_may_stop_halfway_for_as_long_as_a_bad_net_does_if_the_rest_then_comes() -> None:
+    splitter = StreamSplitter()
+    assert splitter.feed(V2[:9], now=0.0) == []
+    assert [p.raw for p in splitter.feed(V2[9:], now=60.0)] == [V2]
+
+
+def test_a_packet_inside_another_is_payload() -> None:
+    """A log that is downloaded has packets in it: none of them was sent to us."""
+    inner = stock_packet(
+        common.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0), seq=1
+    )
+    payload = [*inner, *(0,) * (128 - len(inner))]
+    outer = stock_packet(common.MAVLink_tunnel_message(1, 1, 0, len(inner), payload), seq=2)
+    assert split(*(bytes((byte,)) for byte in outer + V2)) == [outer, V2]
+
+
+@pytest.mark.parametrize("packet", [V1, V2, signed(HEARTBEAT, seq=9)], ids=["v1", "v2", "signed"])
+def test_a_packet_with_a_flipped_bit_is_none_and_the_next_is_whole(packet: bytes) -> None:
+    unsigned = len(packet) if packet[2] != 1 or packet[0] == 0xFE else len(packet) - 13
+    for index in range(1, unsigned):
+        bad = bytearray(packet)
+        bad[index] ^= 0x04
+        came = split(bytes(bad) + STREAM)
+        assert [raw for raw in came if raw in PACKETS][-len(PACKETS) :] == PACKETS, index
+        assert packet not in came[: len(came) - len(PACKETS)]
+
+
+def test_of_unknown_ids_noise_passes_one_time_in_256() -> None:
+    random = Random(SEED)
+    bad = 0
+    for _ in range(5_000):
+        packet = bytearray(unknown(seq=1, payload=random.randbytes(20)))
+        packet[-2:] = random.randbytes(2)
+        bad += bool(split(bytes(packet)))
+    assert bad < 60  # about 20
+
+
+@given(st.lists(st.binary(max_size=600), max_size=20))
+def test_any_bytes_are_survived_and_little_is_kept(chunks: list[bytes]) -> None:
+    splitter = StreamSplitter()
+    whole = 0
+    for chunk in chunks:
+        whole += sum(len(packet.raw) for packet in splitter.feed(chunk, now=0.0))
+        assert len(splitter._rest) < MAX_PACKET
+    assert whole + splitter.noise + len(splitter._rest) == sum(map(len, chunks))
+
+
+def test_it_says_what_it_is() -> None:
+    splitter = StreamSplitter()
+    splitter.feed(JUNK + V2[:3], now=0.0)
+    assert repr(splitter) == f"StreamSplitter(3 bytes kept, {len(JUNK)} of noise)"
