@@ -14,17 +14,20 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import (
     Committed,
+    Congestion,
     Input,
     LinkChanged,
     LinkSide,
     Outgoing,
     Packets,
     Peer,
+    PeerChanged,
     SettingsChanged,
     Shutdown,
     StoreFailed,
     WallClock,
 )
+from mav_tasks.engine.intake import Intake
 from mav_tasks.engine.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.mission_reports import MissionReports
 from mav_tasks.engine.mode_requests import ModeRequests
@@ -42,7 +45,7 @@ from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer, target_of
-from mav_tasks.mavlink.packet import Packet, split_datagram
+from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
 from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
@@ -72,6 +75,7 @@ class Engine:
         self._fleet = Fleet(self._book, settings)
         if restored is not None:
             self._fleet.restore(restored, now=now)
+        self._intake = Intake()
         packer = Packer()
         self._gcs = GcsSide(queue=self._packets, packer=packer, settings=settings, now=now)
         self._vehicles = VehicleSide(
@@ -129,10 +133,16 @@ class Engine:
         match item:
             case Packets():
                 self._receive(item, now=now)
-            case LinkChanged(side=LinkSide.CLIENTS):
-                self._gcs.change_link(item, now=now)
-            case LinkChanged():
-                self._vehicles.change_link(item, now=now)
+            case LinkChanged(side=side):
+                self._intake.change_link(item)
+                clients = side is LinkSide.CLIENTS
+                (self._gcs if clients else self._vehicles).change_link(item, now=now)
+            case PeerChanged():
+                self._intake.change_peer(item)
+                self._gcs.change_peer(item, now=now)
+                self._vehicles.change_peer(item)
+            case Congestion():
+                self._gcs.note_congestion(item, now=now)
             case Committed(through=through):
                 self._submissions.committed(through, now=now)
                 self._vehicles.commit(through, now=now)
@@ -216,22 +226,18 @@ class Engine:
         if not from_vehicles and not self._gcs.owns(item.link):
             return
         counts = self._vehicles.counts if from_vehicles else self._gcs.counts
-        for peer, data in item.datagrams:
-            packets = split_datagram(data)
-            if len(packets) != 1 or len(packets[0].raw) != len(data):
-                counts.noise += len(data) - sum(len(packet.raw) for packet in packets)
-            for packet in packets:
-                if not from_vehicles:
-                    received = self._gcs.receive(item.link, peer, packet, now=now)
-                    if received is not None:
-                        self._receive_from_client(received, now=now)
-                    continue
-                vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
-                if vehicle is not None:
-                    if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
-                        self._publisher.withhold(packet)
-                    else:
-                        self._gcs.forward(vehicle.shown_mode.applied(packet, now=now), now=now)
+        for peer, packet in self._intake.packets(item, counts, now=now):
+            if not from_vehicles:
+                received = self._gcs.receive(item.link, peer, packet, now=now)
+                if received is not None:
+                    self._receive_from_client(received, now=now)
+                continue
+            vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
+            if vehicle is not None:
+                if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
+                    self._publisher.withhold(packet)
+                else:
+                    self._gcs.forward(vehicle.shown_mode.applied(packet, now=now), now=now)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message

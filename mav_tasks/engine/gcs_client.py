@@ -25,12 +25,20 @@ class GcsClient:
     """One endpoint that listens, and perhaps commands."""
 
     def __init__(
-        self, outlet: Outlet, *, settings: Clients, is_configured: bool, now: float
+        self,
+        outlet: Outlet,
+        *,
+        settings: Clients,
+        is_configured: bool,
+        is_connected: bool,
+        now: float,
     ) -> None:
         self.outlet = outlet
         self.heard_at = now
         #: spoken to before it was heard: gets heartbeats until it answers
         self.is_configured = is_configured
+        #: on a stream, whose link tells when it is gone: may be silent for as long as it likes
+        self.is_connected = is_connected
         self.is_heard = False
         self._addresses: dict[Address, None] = {}  # seen here, the latest last
         #: has used our dialect: gets TASK_STATUS

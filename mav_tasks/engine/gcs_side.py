@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from mav_tasks.engine.gcs_client import GcsClient
-from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
+from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -63,6 +63,18 @@ class GcsSide:
         self._link_numbers.setdefault(change.link, len(self._link_numbers) + 1)
         for peer in change.peers:
             self._add(change.link, peer, is_configured=True, now=now)
+
+    def change_peer(self, change: PeerChanged, *, now: float) -> None:
+        """Speak to who has come, forget who is gone."""
+        self._clients.pop((change.link, change.peer), None)
+        if change.up and change.link in self._links:
+            self._add(change.link, change.peer, is_configured=True, is_connected=True, now=now)
+
+    def note_congestion(self, change: Congestion, *, now: float) -> None:
+        """Keep telemetry from a way out that does not take it."""
+        client = self._clients.get((change.link, change.peer))
+        if client is not None:
+            client.thinner.stretch.note(change.is_congested, now=now)
 
     def link_number(self, link: str) -> int:
         """Give a client link's number, from 1; 0 for one that is not there in this run."""
@@ -131,17 +143,24 @@ class GcsSide:
         limits = self._settings.clients
         for key, client in list(self._clients.items()):
             silence = now - client.heard_at
-            if client.is_configured and silence > limits.push_lost:
-                client.is_heard = False
-            elif not client.is_configured and silence > limits.forget_after and not awaits(client):
-                del self._clients[key]
+            if client.is_configured and not client.is_connected:
+                if silence > limits.push_lost:
+                    client.is_heard = False
+            elif silence > limits.forget_after and not awaits(client):
+                if client.is_configured:
+                    client.is_heard = False
+                else:
+                    del self._clients[key]
 
-    def _add(self, link: str, peer: Peer, *, is_configured: bool, now: float) -> GcsClient:
+    def _add(
+        self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
+    ) -> GcsClient:
         self._make_room()
         client = GcsClient(
             Outlet(link, peer, self._queue, self._packer),
             settings=self._settings.clients,
             is_configured=is_configured,
+            is_connected=is_connected,
             now=now,
         )
         self._clients[link, peer] = client

@@ -19,7 +19,7 @@ class LinkSide(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Packets:
-    """Datagrams of one link, in the order in which they came."""
+    """Datagrams of one link, or pieces of its streams, in the order in which they came."""
 
     link: str
     datagrams: Sequence[tuple[Peer, bytes]]
@@ -30,7 +30,8 @@ class LinkChanged:
     """A link came up or went down.
 
     ``peers`` are endpoints known beforehand: spoken to before they have been heard.
-    ``is_local``: nobody beyond this machine can be on it.
+    ``is_local``: nobody beyond this machine can be on it. ``is_stream``: what it gives may be cut
+    anywhere, and it tells by PeerChanged who is there.
     """
 
     link: str
@@ -38,6 +39,25 @@ class LinkChanged:
     up: bool
     peers: tuple[Peer, ...] = ()
     is_local: bool = True
+    is_stream: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PeerChanged:
+    """Somebody is on a stream link now, and may be spoken to at once; or is there no more."""
+
+    link: str
+    peer: Peer
+    up: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Congestion:
+    """The way out to a peer of a stream link does not take all that is sent, or does again."""
+
+    link: str
+    peer: Peer
+    is_congested: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +93,17 @@ class Shutdown:
     """The server is to end: stop what it drives."""
 
 
-Input = Packets | LinkChanged | Committed | StoreFailed | SettingsChanged | WallClock | Shutdown
+Input = (
+    Packets
+    | LinkChanged
+    | PeerChanged
+    | Congestion
+    | Committed
+    | StoreFailed
+    | SettingsChanged
+    | WallClock
+    | Shutdown
+)
 
 
 class Outgoing(NamedTuple):

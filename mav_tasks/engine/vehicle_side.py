@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from mav_tasks.engine.agenda import Agenda
-from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
@@ -17,7 +17,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
 from mav_tasks.mavlink.enums import MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Router
+from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
 from mav_tasks.services.persona import persona_of
 from mav_tasks.settings import Settings
@@ -87,6 +87,8 @@ class VehicleSide:
         self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
         #: heartbeats of a known vehicle's id from another place: when the first one came
         self._rivals: dict[tuple[int, str, Peer], float] = {}
+        #: where nobody is any more: whoever was there may be back at once, anywhere
+        self._left: set[Place] = set()
         self._vehicles: dict[int, Vehicle] = {}
 
     def __iter__(self) -> Iterator[Vehicle]:
@@ -163,6 +165,19 @@ class VehicleSide:
         for peer in (*change.peers, *known):
             link.outlets[peer] = self._outlet(change.link, peer)
         self._links[change.link] = link
+
+    def change_peer(self, change: PeerChanged) -> None:
+        """Speak to who has come; who is gone may come back from another place."""
+        link, place = self._links.get(change.link), (change.link, change.peer)
+        if link is None:
+            return
+        if not change.up:
+            link.outlets.pop(change.peer, None)
+            self._left.add(place)
+            self._forget_if_empty(place)
+        elif len(link.outlets) < MAX_PEERS:
+            self._left.discard(place)
+            link.outlets[change.peer] = self._outlet(*place)
 
     def owns(self, link: str) -> bool:
         """Whether a link of this name is a vehicle link."""
@@ -306,7 +321,8 @@ class VehicleSide:
         if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
             del self._rivals[next(iter(self._rivals))]
         is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
-        if is_another or vehicle.is_heard(now=now):
+        old = self._router.place_of(vehicle.system_id)
+        if is_another or (old not in self._left and vehicle.is_heard(now=now)):
             self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
             return False
         outlets = self._links[link].outlets
@@ -315,8 +331,17 @@ class VehicleSide:
         del self._rivals[rival]
         vehicle.requests.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
         self._router.learn(vehicle.system_id, (link, peer))
+        self._forget_if_empty(old)
         self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
         return True
+
+    def _forget_if_empty(self, place: Place | None) -> None:
+        """Keep nothing of a place that was left, unless a vehicle may still come back to it."""
+        if place in self._left and all(
+            self._router.place_of(vehicle.system_id) != place for vehicle in self
+        ):
+            self._left.discard(place)
+            self._outlets.pop(place, None)
 
     def _is_intruder(self, packet: Packet) -> bool:
         return packet.source == self._our_address or packet.message_id in SETPOINTS

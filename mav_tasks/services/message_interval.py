@@ -6,6 +6,7 @@ out of what is forwarded to it.
 """
 
 from mav_tasks.mavlink import messages as m
+from mav_tasks.services.stretch import Stretch
 
 #: Messages that vehicles send as streams, by id: only these are thinned. Everything else is an
 #: answer or an event, of which none may be lost.
@@ -59,6 +60,8 @@ STOPPED = -1  # SET_MESSAGE_INTERVAL param2: send no more
 DEFAULT = 0  # SET_MESSAGE_INTERVAL param2: back to the default rate
 LONGEST_US = 2**31 - 1  # what MESSAGE_INTERVAL can say
 MAX_WISHES = 256  # of one client
+UNCROWDED = 0.02  # s; a wish for more is stretched as if it were for this
+GOLDEN = 0.618  # multiples of it are spread evenly between whole numbers
 SLACK = 0.7  # of an interval: the jitter of a stream must not halve its rate
 
 
@@ -69,6 +72,7 @@ class Thinner:
         self._default = default_interval
         self._intervals: dict[tuple[int, int], float | None] = {}
         self._last: dict[tuple[int, int, int], float] = {}
+        self.stretch = Stretch()
 
     def set_interval(self, system_id: int, message_id: int, interval_us: float) -> None:
         """Take a client's wish: microseconds, STOPPED or DEFAULT."""
@@ -107,8 +111,9 @@ class Thinner:
         if message_id not in STREAMED:
             return True
         interval = self._intervals.get((system_id, message_id), self._default)
-        if interval is None:
+        if interval is None or self.stretch.is_congested:
             return False
+        interval = self._stretched(interval, message_id, now=now)
         key = (system_id, component_id, message_id)
         last = self._last.get(key)
         if last is not None and now - last < SLACK * interval:
@@ -116,3 +121,14 @@ class Thinner:
         # keeping to the rhythm of the interval makes the long-run rate right in spite of SLACK
         self._last[key] = now if last is None else max(last + interval, now - interval)
         return True
+
+    def _stretched(self, interval: float, message_id: int, *, now: float) -> float:
+        """Give the interval that the way out to the client allows.
+
+        Slightly different ones, so that streams which waited for the end of the same congestion do
+        not cause the next one by always coming together.
+        """
+        factor = self.stretch.factor(now=now)
+        if factor == 1.0:
+            return interval
+        return max(interval, UNCROWDED) * factor * (0.8 + 0.4 * (message_id * GOLDEN % 1.0))

@@ -40,6 +40,8 @@ def test_what_can_come_into_the_engine() -> None:
     assert [kind.__name__ for kind in Input.__args__] == [
         "Packets",
         "LinkChanged",
+        "PeerChanged",
+        "Congestion",
         "Committed",
         "StoreFailed",
         "SettingsChanged",

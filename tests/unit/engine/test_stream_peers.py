@@ -1,0 +1,229 @@
+"""Who is on a stream comes and goes, as the link tells; what it says is cut anywhere."""
+
+import pytest
+
+from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import (
+    Congestion,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    PeerChanged,
+)
+from mav_tasks.engine.intake import MAX_STREAMS, Intake
+from mav_tasks.engine.vehicle_side import MAX_PEERS
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import DecodeCounts, Packer
+from mav_tasks.settings import Settings
+
+OLD, NEW, CLIENT = ("10.0.0.1", 1), ("10.0.0.1", 2), ("10.0.0.9", 9)
+ROVER = m.Heartbeat(10, 3, 1, 4, 4, 3)
+GCS = m.Heartbeat(6, 8, 0, 0, 4, 3)
+
+
+class Rig:
+    """A server with a stream link on each side and a datagram link to vehicles."""
+
+    def __init__(self) -> None:
+        self.engine, self.packer = Engine(Settings(), now=0.0), Packer()
+        self.now = 0.0
+        for link, side, is_stream in (
+            ("v", LinkSide.VEHICLES, True),
+            ("u", LinkSide.VEHICLES, False),
+            ("c", LinkSide.CLIENTS, True),
+        ):
+            self.engine.handle(LinkChanged(link, side, up=True, is_stream=is_stream), now=0.0)
+
+    def peer(self, link: str, peer: object, *, up: bool) -> None:
+        self.engine.handle(PeerChanged(link, peer, up), now=self.now)
+
+    def says(self, link: str, peer: object, data: bytes, *, cut: int = 0) -> None:
+        pieces = [data[:cut], data[cut:]] if cut else [data]
+        for piece in pieces:
+            self.engine.handle(Packets(link, [(peer, piece)]), now=self.now)
+
+    def rover(self, peer: object, *, seq: int = 0, link: str = "v") -> None:
+        self.says(link, peer, self.packer.pack(ROVER, Address(1, 1), seq=seq))
+
+    def client(self) -> None:
+        self.says("c", CLIENT, self.packer.pack(GCS, Address(255, 190), seq=0))
+
+    def passes(self, seconds: float) -> list[Outgoing]:
+        """Let time pass; gives what was sent."""
+        self.engine.take_packets()
+        end = self.now + seconds
+        while (due := self.engine.next_deadline()) is not None and due <= end:
+            self.now = max(self.now, due)
+            self.engine.handle_deadline(now=self.now)
+        self.now = end
+        return self.engine.take_packets()
+
+
+def ids(sent: list[Outgoing], link: str, peer: object) -> list[int]:
+    """Message ids that went to somebody."""
+    return [o.data[7] for o in sent if (o.link, o.peer) == (link, peer)]
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()
+
+
+def test_who_comes_is_spoken_to_before_it_has_said_anything(rig: Rig) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.peer("c", CLIENT, up=True)
+    assert ids(rig.passes(1.5), "v", OLD)[:1] == [0]
+    rig.engine.take_packets()
+    rig.rover(OLD)
+    assert ids(rig.engine.take_packets(), "c", CLIENT) == [0]
+
+
+@pytest.mark.parametrize("cut", range(1, 21))
+def test_a_packet_may_come_in_pieces(rig: Rig, cut: int) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.says("v", OLD, rig.packer.pack(ROVER, Address(1, 1), seq=0), cut=cut)
+    assert len(rig.engine.snapshot(now=0.0).vehicles) == 1
+
+
+def test_datagrams_are_not_put_together(rig: Rig) -> None:
+    rig.says("u", OLD, rig.packer.pack(ROVER, Address(1, 1), seq=0), cut=10)
+    assert rig.engine.snapshot(now=0.0).vehicles == ()
+
+
+def test_half_a_packet_of_who_is_gone_spoils_nothing(rig: Rig) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.says("v", OLD, rig.packer.pack(ROVER, Address(1, 1), seq=0)[:12])
+    rig.peer("v", OLD, up=False)
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD)
+    assert len(rig.engine.snapshot(now=0.0).vehicles) == 1
+
+
+def test_a_client_that_is_gone_is_forgotten_at_once(rig: Rig) -> None:
+    rig.peer("c", CLIENT, up=True)
+    rig.client()
+    rig.peer("c", CLIENT, up=False)
+    assert rig.engine.snapshot(now=0.0).clients == ()
+    rig.rover(OLD)
+    assert ids(rig.engine.take_packets(), "c", CLIENT) == []
+
+
+def test_a_client_on_a_stream_is_told_of_its_task_however_long_it_was_silent(rig: Rig) -> None:
+    """It said hello once, as a script does; on a datagram link pushed to it would be unheard."""
+    rig.peer("c", CLIENT, up=True)
+    rig.client()
+    rig.rover(OLD)
+    for second in range(50):
+        rig.passes(1.0)
+        rig.rover(OLD, seq=second)
+    attitude = rig.packer.pack(m.Attitude(0, 0, 0, 0, 0, 0, 0), Address(1, 1), seq=60)
+    rig.engine.take_packets()
+    rig.says("v", OLD, attitude)
+    assert ids(rig.engine.take_packets(), "c", CLIENT) == [m.Attitude.id]
+
+
+def test_one_that_said_nothing_for_a_minute_gets_heartbeats_only_and_stays(rig: Rig) -> None:
+    rig.peer("c", CLIENT, up=True)
+    rig.client()
+    for second in range(70):
+        rig.rover(OLD, seq=second)
+        rig.passes(1.0)
+    rig.says("v", OLD, rig.packer.pack(m.Attitude(0, 0, 0, 0, 0, 0, 0), Address(1, 1), seq=70))
+    rig.rover(OLD, seq=71)
+    assert ids(rig.engine.take_packets(), "c", CLIENT) == [0]
+
+
+def test_a_vehicle_that_is_gone_may_be_back_at_once_from_anywhere(rig: Rig) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD)
+    rig.peer("v", OLD, up=False)
+    rig.peer("v", NEW, up=True)
+    rig.now = 0.2
+    rig.rover(NEW, seq=1)
+    assert "vehicle 1: is at ('10.0.0.1', 2) now" in " ".join(map(str, rig.engine.take_events()))
+    sent = rig.passes(2.0)
+    assert 0 in ids(sent, "v", NEW)
+    assert ids(sent, "v", OLD) == []
+
+
+def test_as_long_as_it_is_there_another_of_its_id_is_ignored(rig: Rig) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.peer("v", NEW, up=True)
+    rig.rover(OLD)
+    rig.now = 0.2
+    rig.rover(NEW, seq=1)
+    assert "another of this id" in " ".join(map(str, rig.engine.take_events()))
+    for step in range(3):
+        rig.passes(1.0)
+        rig.rover(OLD, seq=2 + step)
+    rig.peer("v", OLD, up=False)
+    rig.rover(NEW, seq=9)
+    assert "is at" not in " ".join(map(str, rig.engine.take_events()))
+
+
+def test_a_vehicle_comes_back_however_often_its_connection_breaks(rig: Rig) -> None:
+    for port in range(2 * MAX_PEERS):
+        rig.peer("v", ("10.0.0.1", port), up=True)
+        rig.rover(("10.0.0.1", port), seq=port % 256)
+        rig.passes(0.01)
+        rig.peer("v", ("10.0.0.1", port), up=False)
+    rig.peer("v", NEW, up=True)
+    rig.passes(0.1)
+    rig.rover(NEW, seq=0)
+    assert 0 in ids(rig.passes(2.0), "v", NEW)
+
+
+def test_numbers_towards_a_line_that_comes_back_go_on(rig: Rig) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD)
+    before = [o.data[4] for o in rig.passes(2.5) if o.peer == OLD]
+    rig.peer("v", OLD, up=False)
+    rig.passes(0.1)
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD, seq=1)
+    after = [o.data[4] for o in rig.passes(2.5) if o.peer == OLD]
+    numbers = before + after
+    assert len(after) > 1
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def test_a_congested_client_is_spared_telemetry_and_sees_no_loss(rig: Rig) -> None:
+    rig.peer("c", CLIENT, up=True)
+    rig.client()
+    rig.rover(OLD)
+    rig.engine.take_packets()
+    sent: list[Outgoing] = []
+    for seq in range(1, 60):
+        if seq in (10, 40):
+            rig.engine.handle(Congestion("c", CLIENT, seq == 10), now=rig.now)
+        rig.now += 0.1
+        message = ROVER if seq % 10 == 5 else m.Attitude(0, 0, 0, 0, 0, 0, 0)
+        rig.says("v", OLD, rig.packer.pack(message, Address(1, 1), seq=seq))
+        came = [o for o in rig.engine.take_packets() if o.link == "c"]
+        if 10 <= seq < 40:
+            assert [o.data[7] for o in came] == [0] * (seq % 10 == 5)
+        sent += came
+    assert sum(o.data[7] == m.Attitude.id for o in sent[-20:]) > 5
+    assert [o.data[4] for o in sent] == list(range(1, len(sent) + 1))
+
+
+def test_congestion_of_who_is_not_there_means_nothing(rig: Rig) -> None:
+    rig.engine.handle(Congestion("c", CLIENT, True), now=0.0)
+    rig.engine.handle(Congestion("v", OLD, True), now=0.0)
+
+
+def test_unfinished_packets_are_bounded() -> None:
+    intake = Intake()
+    intake.change_link(LinkChanged("c", LinkSide.CLIENTS, up=True, is_stream=True))
+    pieces = [(number, b"\xfd\xff") for number in range(3 * MAX_STREAMS)]
+    assert list(intake.packets(Packets("c", pieces), DecodeCounts(), now=0.0)) == []
+    assert repr(intake).count("2 bytes kept") == MAX_STREAMS
+
+
+def test_what_is_no_packet_of_a_stream_is_counted() -> None:
+    intake, counts = Intake(), DecodeCounts()
+    intake.change_link(LinkChanged("c", LinkSide.CLIENTS, up=True, is_stream=True))
+    list(intake.packets(Packets("c", [(1, b"junk"), (1, b"more")]), counts, now=0.0))
+    assert counts.noise == 8
