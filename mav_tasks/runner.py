@@ -14,16 +14,19 @@ from math import inf
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
     Committed,
+    Congestion,
     Input,
     LinkChanged,
     LinkSide,
     Outgoing,
     Packets,
+    Peer,
+    PeerChanged,
     Shutdown,
     StoreFailed,
     WallClock,
 )
-from mav_tasks.links.base import Link
+from mav_tasks.links.base import TEND_PERIOD, Link, PeerChange, PeerState, StreamLink
 from mav_tasks.store import Kept, NotKept, Outcome, Store
 from mav_tasks.tasks.events import (
     Event,
@@ -106,7 +109,23 @@ class Pump:
 
 def link_changed(link: Link, side: LinkSide) -> LinkChanged:
     """Give the input that says that a link is up."""
-    return LinkChanged(link.name, side, up=True, peers=link.peers, is_local=link.is_local)
+    return LinkChanged(
+        link.name,
+        side,
+        up=True,
+        peers=link.peers,
+        is_local=link.is_local,
+        is_stream=link.is_stream,
+    )
+
+
+def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion:
+    """Give the input that says what became of a peer."""
+    match change.state:
+        case PeerState.UP | PeerState.DOWN as state:
+            return PeerChanged(link.name, change.peer, up=state is PeerState.UP)
+        case state:
+            return Congestion(link.name, change.peer, is_congested=state is PeerState.CONGESTED)
 
 
 class Runner:
@@ -118,6 +137,7 @@ class Runner:
         self._sides = [(link, LinkSide.VEHICLES) for link in vehicles]
         self._sides += [(link, LinkSide.CLIENTS) for link in clients]
         self._links = {link.name: link for link, _ in self._sides}
+        self._streams = [link for link, _ in self._sides if isinstance(link, StreamLink)]
         self._store = store
         self._store_fd = store.fileno()
         self._pump = Pump(engine, store, self._send)
@@ -138,6 +158,8 @@ class Runner:
                 self._loop.add_reader(link.fileno(), self._on_readable, link)
             if self._store_fd is not None:
                 self._loop.add_reader(self._store_fd, self._on_stored)
+            if self._streams:
+                self._tend(self._loop)
             return await self._over
         finally:
             if self._store_fd is not None:
@@ -148,10 +170,20 @@ class Runner:
             self._close_store()
 
     def _on_readable(self, link: Link) -> None:
+        if not isinstance(link, StreamLink):
+            self._take_in(link, link.receive(DRAIN))
+            return
+        self._note(link, link.take_changes())  # of before
+        pieces = link.receive(DRAIN)
+        changes = link.take_changes()
+        self._note(link, [change for change in changes if change.state is PeerState.UP])
+        self._take_in(link, pieces)
+        self._note(link, [change for change in changes if change.state is not PeerState.UP])
+
+    def _take_in(self, link: Link, datagrams: list[tuple[Peer, bytes]]) -> None:
         """Take in what came, but let no setpoint wait for all of it."""
         assert self._loop is not None
         assert self._over is not None
-        datagrams = link.receive(DRAIN)
         while datagrams and not self._over.done():
             due = self._timer.when() if self._timer is not None else inf
             left = due - self._loop.time()
@@ -160,6 +192,22 @@ class Runner:
             datagrams = datagrams[count:]
             if datagrams and self._timer is not None and self._timer.when() <= self._loop.time():
                 self._guarded(None)
+
+    def _note(self, link: StreamLink, changes: list[PeerChange]) -> None:
+        for change in changes:
+            if change.words:
+                is_lost = change.state is PeerState.DOWN
+                level = logging.WARNING if is_lost else logging.INFO
+                log.log(level, "link %s %s", link.name, change.words)
+            self._guarded(peer_changed(link, change))
+
+    def _tend(self, loop: asyncio.AbstractEventLoop) -> None:
+        if self._over is None or self._over.done():
+            return
+        loop.call_later(TEND_PERIOD, self._tend, loop)
+        for link in self._streams:
+            link.tend()
+            self._note(link, link.take_changes())
 
     def _on_stored(self) -> None:
         self._guarded(None)

@@ -16,8 +16,10 @@ from platformdirs import user_data_path
 
 from mav_tasks.engine.engine import Engine
 from mav_tasks.errors import StoreError, UsageError
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl, parse_endpoint, parse_url, refuse_insecure
+from mav_tasks.links.base import Link
+from mav_tasks.links.opening import open_link
+from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint, parse_url, refuse_insecure
+from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES, WayOut
 from mav_tasks.runner import Runner
 from mav_tasks.settings import ARMING, Retention, Settings
 from mav_tasks.store import MemoryStore
@@ -57,12 +59,13 @@ def serve(
     for number in (signal.SIGINT, signal.SIGTERM):  # until the loop takes them over
         signal.signal(number, _leave_before_serving)
     with ExitStack() as opened:
-        # Pushing from the first client link: who answers is served by the socket that called.
+        # Pushing from the first UDP link: who answers is served by the socket that called.
+        pushing = next((url for url in client_urls if _is_udp(url)), None)
         client_links = [
-            _open_link(opened, url, push=pushed if number == 0 else ())
-            for number, url in enumerate(client_urls)
+            _open(opened, url, TO_CLIENTS, push=pushed if url is pushing else ())
+            for url in client_urls
         ]
-        vehicle_links = [_open_link(opened, url) for url in vehicle_urls]
+        vehicle_links = [_open(opened, url, TO_VEHICLES) for url in vehicle_urls]
         gc.disable()  # many tasks are read: it would look through them again and again
         journal = open_store(store, retention)
         opened.callback(journal.close)
@@ -106,8 +109,14 @@ def open_store(path: str | None, retention: Retention | None = None) -> SqliteSt
     )
 
 
-def _open_link(opened: ExitStack, url: LinkUrl, *, push: tuple[Any, ...] = ()) -> UdpLink:
-    link = UdpLink(url, push=push)
+def _is_udp(url: LinkUrl | SerialUrl) -> bool:
+    return isinstance(url, LinkUrl) and url.kind.startswith("udp")
+
+
+def _open(
+    opened: ExitStack, url: LinkUrl | SerialUrl, way: WayOut, *, push: tuple[Any, ...] = ()
+) -> Link:
+    link = open_link(url, way=way, push=push)
     opened.callback(link.close)
     return link
 
@@ -116,8 +125,8 @@ async def _run(
     settings: Settings,
     store: SqliteStore | MemoryStore,
     restored: Restored | None,
-    clients: Sequence[UdpLink],
-    vehicles: Sequence[UdpLink],
+    clients: Sequence[Link],
+    vehicles: Sequence[Link],
 ) -> int:
     now = asyncio.get_running_loop().time()
     engine = Engine(settings, now=now, restored=restored)  # what the store gave back
@@ -133,8 +142,8 @@ def _say(words: str) -> None:
     sys.stdout.write(f"mav-tasks: {words}\n")
 
 
-def _refuse_doubles(urls: Sequence[LinkUrl]) -> None:
-    seen: set[LinkUrl] = set()
+def _refuse_doubles(urls: Sequence[LinkUrl | SerialUrl]) -> None:
+    seen: set[LinkUrl | SerialUrl] = set()
     for url in urls:
         if url in seen:
             raise UsageError(f"link {url} is given twice")

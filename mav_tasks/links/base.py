@@ -1,7 +1,9 @@
 """The seam between the server and its peers: what every link can do."""
 
 from collections.abc import Hashable
-from typing import Protocol
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Protocol, runtime_checkable
 
 Peer = Hashable
 
@@ -18,19 +20,59 @@ class Link(Protocol):
     peers: tuple[Peer, ...]
     #: whether only this machine can be on it
     is_local: bool
+    #: whether what it gives may be cut anywhere; it is a StreamLink then
+    is_stream: bool
 
     def fileno(self) -> int:
-        """Give the descriptor to wait on for reading."""
+        """Give the descriptor to wait on for reading; the same one for as long as it is open."""
         ...
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` datagrams that are there now, each with its sender."""
+        """Give up to ``limit`` datagrams, or pieces, that are there now, each with its sender."""
         ...
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send one datagram, or lose it."""
+        """Send one packet, or lose it; never wait."""
         ...
 
     def close(self) -> None:
         """Give everything back."""
         ...
+
+
+class PeerState(Enum):
+    """What can become of a peer of a stream link."""
+
+    UP = auto()
+    DOWN = auto()
+    CONGESTED = auto()  # what is sent to it piles up
+    CLEAR = auto()  # no more
+
+
+@dataclass(frozen=True, slots=True)
+class PeerChange:
+    """Something became of a peer; ``words`` go to the log."""
+
+    peer: Peer
+    state: PeerState
+    words: str = ""
+
+
+@runtime_checkable
+class StreamLink(Link, Protocol):
+    """A link on which peers come and go; ``send`` sends whole packets or nothing of them."""
+
+    def take_changes(self) -> list[PeerChange]:
+        """Give what became of peers since the last call, in order.
+
+        Who comes up in one call of ``receive`` does so before its first piece, who goes down after
+        its last.
+        """
+        ...
+
+    def tend(self) -> None:
+        """See to what waits for a time: called about every TEND_PERIOD."""
+        ...
+
+
+TEND_PERIOD = 0.05  # s

@@ -69,6 +69,7 @@ class MemoryLink:
     """One end on a MemoryNet; peers are names."""
 
     is_local = True
+    is_stream = False
 
     def __init__(self, net: MemoryNet, name: str, peers: tuple[Peer, ...]) -> None:
         self._net = net

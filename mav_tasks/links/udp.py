@@ -13,6 +13,8 @@ MAX_DATAGRAM = 65536
 class UdpLink:
     """A UDP socket. ``peers`` are (host, port): of a dialling link its URL, and those pushed to."""
 
+    is_stream = False
+
     def __init__(self, url: LinkUrl, *, push: tuple[tuple[str, int], ...] = ()) -> None:
         self.name = str(url)
         self.lost = 0  # datagrams that the system did not take

@@ -96,6 +96,7 @@ class Flood:
     name = "flood"
     peers: tuple[object, ...] = ()
     is_local = True
+    is_stream = False
 
     def __init__(self, count: int) -> None:
         self.left = [(("127.0.0.1", 1), b"x")] * count

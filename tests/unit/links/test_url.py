@@ -5,7 +5,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.errors import InsecureLinkError, LinkUrlError
-from mav_tasks.links.url import LinkUrl, is_loopback, parse_endpoint, parse_url, refuse_insecure
+from mav_tasks.links.url import (
+    LinkUrl,
+    SerialUrl,
+    is_loopback,
+    parse_endpoint,
+    parse_url,
+    refuse_insecure,
+)
+
+RATES = "from 1200 to 12000000"
+EXPECTED = (
+    "expected udpin:host:port, udpout:host:port, tcpin:host:port, tcp:host:port "
+    "or serial:device:baud"
+)
 
 
 @pytest.mark.parametrize(
@@ -15,27 +28,49 @@ from mav_tasks.links.url import LinkUrl, is_loopback, parse_endpoint, parse_url,
         ("udpout:localhost:14580", LinkUrl("udpout", "localhost", 14580)),
         ("udpin://0.0.0.0:14550", LinkUrl("udpin", "0.0.0.0", 14550)),
         ("udpout:[::1]:65535", LinkUrl("udpout", "::1", 65535)),
+        ("tcpin:0.0.0.0:5760", LinkUrl("tcpin", "0.0.0.0", 5760)),
+        ("tcp:rover.local:5760", LinkUrl("tcp", "rover.local", 5760)),
+        ("serial:/dev/ttyUSB0:57600", SerialUrl("/dev/ttyUSB0", 57_600)),
+        (
+            "serial:/dev/serial/by-path/pci-0:1.0:9600",
+            SerialUrl("/dev/serial/by-path/pci-0:1.0", 9_600),
+        ),
     ],
 )
-def test_a_url_names_kind_host_and_port(text: str, url: LinkUrl) -> None:
+def test_a_url_names_kind_host_and_port(text: str, url: LinkUrl | SerialUrl) -> None:
     assert parse_url(text) == url
 
 
-def test_a_url_reads_as_it_is_written() -> None:
-    assert str(parse_url("udpin:127.0.0.1:14560")) == "udpin:127.0.0.1:14560"
+@pytest.mark.parametrize(
+    "text", ["udpin:127.0.0.1:14560", "tcp:localhost:5760", "serial:/dev/ttyACM0:115200"]
+)
+def test_a_url_reads_as_it_is_written(text: str) -> None:
+    assert str(parse_url(text)) == text
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("14560", "link '14560': expected udpin:host:port or udpout:host:port"),
-        ("udp:127.0.0.1:1", "link 'udp:127.0.0.1:1': expected udpin:host:port or udpout:host:port"),
-        ("", "link '': expected udpin:host:port or udpout:host:port"),
-        ("tcp:host:1", "link 'tcp:host:1': tcp links are not supported in this version"),
-        (
-            "serial:/dev/ttyUSB0:57600",
-            "link 'serial:/dev/ttyUSB0:57600': serial links are not supported in this version",
-        ),
+        ("14560", f"link '14560': {EXPECTED}"),
+        ("udp:127.0.0.1:1", f"link 'udp:127.0.0.1:1': {EXPECTED}"),
+        ("", f"link '': {EXPECTED}"),
+        *[
+            (
+                text,
+                f"link {text!r}: expected serial:device:baud with a baud rate {RATES}",
+            )
+            for text in (
+                "serial:",
+                "serial:/dev/ttyUSB0",
+                "serial:/dev/ttyUSB0:",
+                "serial::57600",
+                "serial:/dev/ttyUSB0:0",
+                "serial:/dev/ttyUSB0:300",
+                "serial:/dev/ttyUSB0:fast",
+                "serial:/dev/ttyUSB0:-57600",
+                "serial:/dev/ttyUSB0:99999999999999999999",
+            )
+        ],
         *[
             (text, f"link {text!r}: expected host:port with a port from 1 to 65535")
             for text in (
@@ -47,6 +82,8 @@ def test_a_url_reads_as_it_is_written() -> None:
                 "udpin:127.0.0.1:-1",
                 "udpin:127.0.0.1:http",
                 "udpout:",
+                "tcp:host",
+                "tcpin:",
             )
         ],
     ],
@@ -66,7 +103,8 @@ def test_an_endpoint_error_names_what_it_is_for() -> None:
 def test_any_text_is_a_url_or_a_clear_error(text: str) -> None:
     problem = ""
     try:
-        assert 0 < parse_url(text).port < 65536
+        url = parse_url(text)
+        assert isinstance(url, SerialUrl) or 0 < url.port < 65536
     except LinkUrlError as error:
         problem = str(error)
     assert not problem or repr(text) in problem
@@ -93,3 +131,15 @@ def test_a_link_beyond_this_machine_is_refused_and_the_way_out_is_said() -> None
     refuse_insecure(parse_url("udpin:127.0.0.1:14560"))
     with pytest.raises(InsecureLinkError, match=r"udpin:0\.0\.0\.0:14560 .* say --insecure"):
         refuse_insecure(parse_url("udpin:0.0.0.0:14560"))
+
+
+@pytest.mark.parametrize(
+    "text", ["tcpin:0.0.0.0:5760", "tcp:192.0.2.1:5760", "udpout:rover.local:1"]
+)
+def test_who_can_be_reached_over_a_net_is_refused_by_any_kind_of_link(text: str) -> None:
+    with pytest.raises(InsecureLinkError):
+        refuse_insecure(parse_url(text))
+
+
+def test_a_serial_line_is_a_wire_that_the_operator_has_chosen() -> None:
+    refuse_insecure(parse_url("serial:/dev/ttyUSB0:57600"))

@@ -1,0 +1,26 @@
+"""From a link URL to a link."""
+
+from mav_tasks.links.base import Link
+from mav_tasks.links.tcp_in import TcpInLink
+from mav_tasks.links.tcp_out import TcpOutLink
+from mav_tasks.links.udp import UdpLink
+from mav_tasks.links.url import LinkUrl, SerialUrl
+from mav_tasks.links.way_out import WayOut
+
+
+def open_link(
+    url: LinkUrl | SerialUrl, *, way: WayOut, push: tuple[tuple[str, int], ...] = ()
+) -> Link:
+    """Open a link; LinkOpenError says why not. ``push`` is for a UDP link, others ignore it.
+
+    One that dials is open before the other end is there, and tries until it is.
+    """
+    if isinstance(url, SerialUrl):
+        from mav_tasks.links.serial import SerialLink  # noqa: PLC0415  # who has none, loads none
+
+        return SerialLink(url, way=way)
+    if url.kind == "tcpin":
+        return TcpInLink(url, way=way)
+    if url.kind == "tcp":
+        return TcpOutLink(url, way=way)
+    return UdpLink(url, push=push)

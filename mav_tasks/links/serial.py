@@ -1,0 +1,198 @@
+"""A serial line: raw, without flow control, nobody else's; opened again whenever it is lost.
+
+What the system, or an adapter behind it, has taken of what was written cannot be asked for, or not
+everywhere. So it is reckoned from the baud rate, and no more than LEAD is ever written ahead: a
+packet that has not begun can still give way to a newer one.
+"""
+
+import os
+import selectors
+import termios
+from contextlib import suppress
+from errno import EIO, ENODEV, ENOENT, ENXIO
+from time import monotonic
+
+from serial import Serial, SerialException
+
+from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.attempts import Attempts
+from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.out_queue import OutQueue
+from mav_tasks.links.url import SerialUrl
+from mav_tasks.links.way_out import WayOut
+
+PIECE = 280  # bytes read at once, a MAVLink packet
+LEAD = 0.1  # s that the line is busy with what was written; two TEND_PERIODs
+BITS = 10  # of a byte on the line: start and stop are two of them
+#: the device may be plugged in later; everything else the operator can mend
+NOT_THERE = frozenset({ENOENT, ENODEV, ENXIO, EIO})
+
+
+class SerialLink:
+    """A serial device as a link with one peer, the device's name."""
+
+    peers: tuple[Peer, ...] = ()
+    is_stream = True
+    #: it may be a radio, with anybody at its other end
+    is_local = False
+
+    def __init__(self, url: SerialUrl, *, way: WayOut) -> None:
+        self.name = str(url)
+        self._url = url
+        self._way = way
+        self._selector = selectors.DefaultSelector()
+        self._attempts = Attempts()
+        self._changes: list[PeerChange] = []
+        self._device: Serial | None = None
+        self._queue = OutQueue(max_age=way.max_age)
+        self._free_at = 0.0  # when the line has sent what was written
+        self._lost = 0
+        self._attempts.is_due(now=monotonic())
+        try:
+            self._open()
+        except (OSError, ValueError) as error:
+            if not _is_not_there(error):
+                self._selector.close()
+                reason = _reason_of(error)
+                raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
+            self._note_lost(error)
+
+    def __repr__(self) -> str:
+        return f"SerialLink({self.name}, {'up' if self._device else 'down'}, {self._queue})"
+
+    @property
+    def lost(self) -> int:
+        """Packets that were dropped, or written to nobody."""
+        return self._lost + self._queue.dropped
+
+    def fileno(self) -> int:
+        """Give the descriptor that tells of the device, whichever it is at the time."""
+        return self._selector.fileno()
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` pieces; send what waits."""
+        received: list[tuple[Peer, bytes]] = []
+        while self._device is not None and len(received) < limit and self._selector.select(0):
+            try:
+                data = os.read(self._device.fd, PIECE)
+            except (BlockingIOError, InterruptedError):
+                break
+            except OSError as error:
+                self._lose(error)
+                break
+            if not data:  # readable, and nothing there: nobody will ever be
+                self._lose(OSError(EIO, "hung up"))
+                break
+            received.append((self._url.device, data))
+        self._flush()
+        return received
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send a packet, or let it wait; while there is no device it is lost."""
+        if self._device is None or peer != self._url.device:
+            self._lost += 1
+            return
+        self._queue.put(data, now=monotonic())
+        self._flush()
+
+    def take_changes(self) -> list[PeerChange]:
+        """Give what became of the device since the last call."""
+        changes, self._changes = self._changes, []
+        return changes
+
+    def tend(self) -> None:
+        """Send what waits for the line; look for congestion; open the device if it is lost."""
+        now = monotonic()
+        if self._device is None:
+            if self._attempts.is_due(now=now):
+                try:
+                    self._open()
+                except (OSError, ValueError) as error:
+                    self._note_lost(error)
+            return
+        self._flush()
+        if self._queue.changed(now=now):
+            state = PeerState.CONGESTED if self._queue.is_congested else PeerState.CLEAR
+            self._changes.append(PeerChange(self._url.device, state))
+
+    def close(self) -> None:
+        """Send what the system takes at once, and give the device back."""
+        if self._device is not None:
+            self._write(ahead_until=float("inf"))
+        if self._device is not None:
+            self._give_back(self._device)
+        self._selector.close()
+
+    def _open(self) -> None:
+        device = Serial(
+            self._url.device,
+            self._url.baud,
+            timeout=0,
+            write_timeout=0,
+            xonxoff=False,
+            rtscts=False,
+            dsrdtr=False,
+            exclusive=True,
+        )
+        self._device = device
+        self._lost += self._queue.dropped
+        self._queue, self._free_at = OutQueue(max_age=self._way.max_age), 0.0
+        self._selector.register(device.fd, selectors.EVENT_READ)
+        words = self._attempts.succeeded()
+        self._changes.append(PeerChange(self._url.device, PeerState.UP, words))
+
+    def _flush(self) -> None:
+        self._write(ahead_until=monotonic() + LEAD)
+
+    def _write(self, *, ahead_until: float) -> None:
+        """Write packets as long as the line is free before that time."""
+        while self._device is not None and self._free_at < ahead_until:
+            now = monotonic()
+            packet = self._queue.next(now=now)
+            if not packet:
+                return
+            try:
+                count = os.write(self._device.fd, packet)
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError as error:
+                self._lose(error)
+                return
+            self._queue.wrote(count)
+            self._free_at = max(self._free_at, now) + count * BITS / self._url.baud
+
+    def _lose(self, error: OSError) -> None:
+        assert self._device is not None
+        with suppress(OSError, termios.error):  # what it did not take it would wait for at closing
+            termios.tcflush(self._device.fd, termios.TCOFLUSH)
+        self._give_back(self._device)
+        self._note_lost(error)
+
+    def _give_back(self, device: Serial) -> None:
+        self._selector.unregister(device.fd)
+        self._device = None
+        with suppress(OSError):
+            device.close()
+
+    def _note_lost(self, error: Exception) -> None:
+        words = self._attempts.failed(_reason_of(error))
+        if words is not None:
+            self._changes.append(PeerChange(self._url.device, PeerState.DOWN, words))
+
+
+def _is_not_there(error: Exception) -> bool:
+    return isinstance(error, OSError) and error.errno in NOT_THERE
+
+
+def _reason_of(error: Exception) -> str:
+    """pySerial wraps the system's words in several of its own; and what is no line it calls odd."""
+    if isinstance(error, SerialException):
+        if error.errno is None:
+            return "it is no serial device"
+        if "exclusively lock" in str(error):
+            return "it is in use"
+    if isinstance(error, ValueError):
+        return str(error)
+    if isinstance(error, OSError) and error.errno is not None:
+        return os.strerror(error.errno)
+    return str(error)

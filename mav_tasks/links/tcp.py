@@ -1,0 +1,205 @@
+"""TCP connections: pieces in, whole packets out, nothing ever waited for. What both kinds share.
+
+Each link waits on one descriptor, its selector's, whatever becomes of its connections.
+"""
+
+import os
+import selectors
+import socket
+from collections.abc import Callable
+from time import monotonic
+
+from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.out_queue import OutQueue
+from mav_tasks.links.way_out import WayOut
+
+PIECE = 280  # bytes read at once, a MAVLink packet: a piece takes no longer to handle than one
+KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}  # s, s, times
+
+
+class Connection:
+    """One connection, and what waits to be sent on it."""
+
+    def __init__(self, sock: socket.socket, peer: Peer, way: WayOut) -> None:
+        self.socket = sock
+        self.peer = peer
+        self.queue = OutQueue(max_age=way.max_age)
+        self.is_blocked = False  # the system takes no more: told when it does again
+
+    def __repr__(self) -> str:
+        return f"Connection({self.peer}, {self.queue})"
+
+    @property
+    def name(self) -> str:
+        """The peer in words."""
+        return ":".join(map(str, self.peer)) if isinstance(self.peer, tuple) else str(self.peer)
+
+
+class Connections:
+    """The connections of one link, with the descriptor that tells of them."""
+
+    def __init__(
+        self, way: WayOut, *, other: Callable[[], None], ended: Callable[[Connection, str], None]
+    ) -> None:
+        """``other`` sees to what is registered beside connections; ``ended`` is told why one is."""
+        self.selector = selectors.DefaultSelector()
+        self.lost = 0  # packets that were dropped, or for nobody
+        self._other = other
+        self._ended = ended
+        self._way = way
+        self._by_peer: dict[Peer, Connection] = {}
+        self._changes: list[PeerChange] = []
+
+    def __repr__(self) -> str:
+        return f"Connections({list(self._by_peer.values())}, {self.lost} packets lost)"
+
+    def __len__(self) -> int:
+        return len(self._by_peer)
+
+    def __contains__(self, peer: Peer) -> bool:
+        return peer in self._by_peer
+
+    def fileno(self) -> int:
+        """Give the selector's descriptor, readable when anything is to be done."""
+        return self.selector.fileno()
+
+    def add(self, sock: socket.socket, peer: Peer, words: str) -> None:
+        """Take a connection that stands into use. OSError: it does no more."""
+        prepare(sock, self._way)
+        connection = self._by_peer[peer] = Connection(sock, peer, self._way)
+        self.selector.register(sock, selectors.EVENT_READ, connection)
+        self._changes.append(PeerChange(peer, PeerState.UP, words))
+
+    def take_changes(self) -> list[PeerChange]:
+        """Give what became of peers since the last call."""
+        changes, self._changes = self._changes, []
+        return changes
+
+    def note(self, change: PeerChange) -> None:
+        """Have something told with the next changes."""
+        self._changes.append(change)
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
+        received: list[tuple[Peer, bytes]] = []
+        for _ in range(limit):
+            ready = self.selector.select(0) if len(received) < limit else ()
+            if not ready:
+                break
+            for key, events in ready:
+                if not isinstance(key.data, Connection):
+                    self._other()
+                elif (reason := self._serve(key.data, events, received)) is not None:
+                    self._ended(key.data, reason)
+        return received
+
+    def _serve(
+        self, connection: Connection, events: int, received: list[tuple[Peer, bytes]]
+    ) -> str | None:
+        """Read and write what can be; gives why the connection has ended, if it has."""
+        if events & selectors.EVENT_WRITE:
+            connection.is_blocked = False
+            self.selector.modify(connection.socket, selectors.EVENT_READ, connection)
+            reason = self._flush(connection)
+            if reason is not None:
+                return reason
+        if not events & selectors.EVENT_READ:
+            return None
+        try:
+            data = connection.socket.recv(PIECE)
+        except (BlockingIOError, InterruptedError):
+            return None
+        except OSError as error:
+            return reason_of(error)
+        if not data:
+            return "closed by the other end"
+        received.append((connection.peer, data))
+        return None
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send a packet, or let it wait; to who is not there it is lost."""
+        connection = self._by_peer.get(peer)
+        if connection is None:
+            self.lost += 1
+            return
+        before = connection.queue.dropped
+        connection.queue.put(data, now=monotonic())
+        reason = None if connection.is_blocked else self._flush(connection)
+        self.lost += connection.queue.dropped - before
+        if reason is not None:
+            self._ended(connection, reason)
+
+    def look(self) -> None:
+        """Tell of congestions that have begun or ended."""
+        now = monotonic()
+        for connection in self._by_peer.values():
+            if connection.queue.changed(now=now):
+                is_congested = connection.queue.is_congested
+                state = PeerState.CONGESTED if is_congested else PeerState.CLEAR
+                self._changes.append(PeerChange(connection.peer, state))
+
+    def end(self, connection: Connection, words: str | None) -> None:
+        """Give a connection back; ``words`` tell of it."""
+        del self._by_peer[connection.peer]
+        self.selector.unregister(connection.socket)
+        connection.socket.close()
+        if words is not None:
+            self._changes.append(PeerChange(connection.peer, PeerState.DOWN, words))
+
+    def close(self) -> None:
+        """Send what can be sent, and give everything back."""
+        for connection in list(self._by_peer.values()):
+            self._flush(connection)
+            _say_farewell(connection.socket)
+            self.end(connection, None)
+        self.selector.close()
+
+    def _flush(self, connection: Connection) -> str | None:
+        queue = connection.queue
+        while packet := queue.next(now=monotonic()):
+            try:
+                queue.wrote(connection.socket.send(packet))
+            except (BlockingIOError, InterruptedError):
+                both = selectors.EVENT_READ | selectors.EVENT_WRITE
+                self.selector.modify(connection.socket, both, connection)
+                connection.is_blocked = True
+                break
+            except OSError as error:
+                return reason_of(error)
+        return None
+
+
+def prepare(sock: socket.socket, way: WayOut) -> None:
+    """Have a connection send at once, keep little, and notice when nobody is there any more."""
+    sock.setblocking(False)
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if way.send_buffer is not None:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, way.send_buffer)
+    limits = {"TCP_NOTSENT_LOWAT": way.unsent, "TCP_USER_TIMEOUT": round(way.give_up * 1e3)}
+    for name, value in {**KEEPALIVE, **limits}.items():
+        if hasattr(socket, name):  # not every system has each of them
+            sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+
+
+def resolve(host: str, port: int) -> list[tuple[socket.AddressFamily, tuple[str, int]]]:
+    """Give the addresses that a host has. OSError: it has none."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    return [(family, (str(at[0]), int(at[1]))) for family, _, _, _, at in found]
+
+
+def reason_of(error: OSError) -> str:
+    """Give an error in words."""
+    if error.errno is not None and error.errno > 0:
+        return os.strerror(error.errno)
+    return error.strerror or str(error)
+
+
+def _say_farewell(sock: socket.socket) -> None:
+    """End in order: with something unread a close would take back what was just sent."""
+    try:
+        sock.shutdown(socket.SHUT_WR)
+        while sock.recv(1 << 16):
+            pass
+    except OSError:
+        pass

@@ -1,0 +1,111 @@
+"""A TCP link that listens: each connection is a peer, (host, port) of its other end."""
+
+import selectors
+import socket
+
+from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.base import Peer, PeerChange
+from mav_tasks.links.tcp import Connection, Connections, reason_of, resolve
+from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.way_out import WayOut
+
+MAX_CONNECTIONS = 64  # one more is closed as soon as it is there
+
+
+class TcpInLink:
+    """A listening TCP socket and its connections."""
+
+    peers: tuple[Peer, ...] = ()
+    is_stream = True
+
+    def __init__(self, url: LinkUrl, *, way: WayOut) -> None:
+        self.name = str(url)
+        self.is_local = url.is_loopback
+        self.refused = 0  # connections
+        try:
+            family, address = resolve(url.host, url.port)[0]
+            self._socket = _listen(family, address)
+        except OSError as error:
+            raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
+        self._connections = Connections(way, other=self._accept, ended=self._end)
+        self._is_accepting = False
+        self._accept_again()
+
+    def __repr__(self) -> str:
+        return f"TcpInLink({self.name}, {len(self._connections)} connections)"
+
+    @property
+    def lost(self) -> int:
+        """Packets that were dropped, or for nobody."""
+        return self._connections.lost
+
+    @property
+    def port(self) -> int:
+        """The port on which it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def fileno(self) -> int:
+        """Give the descriptor of all of it."""
+        return self._connections.fileno()
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
+        return self._connections.receive(limit)
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send a packet, or let it wait; to who is gone it is lost."""
+        self._connections.send(peer, data)
+
+    def take_changes(self) -> list[PeerChange]:
+        """Give what became of peers since the last call."""
+        return self._connections.take_changes()
+
+    def tend(self) -> None:
+        """Look for congestions."""
+        self._connections.look()
+        self._accept_again()
+
+    def close(self) -> None:
+        """Close everything."""
+        self._connections.close()
+        self._socket.close()
+
+    def _accept(self) -> None:
+        try:
+            sock, address = self._socket.accept()
+        except (BlockingIOError, InterruptedError, ConnectionError):
+            return
+        except OSError:  # no descriptors left: it would be called again and again
+            self._connections.selector.unregister(self._socket)
+            self._is_accepting = False
+            return
+        peer = (str(address[0]), int(address[1]))
+        try:
+            # One from the very place of another that has not ended yet comes again.
+            if len(self._connections) >= MAX_CONNECTIONS or peer in self._connections:
+                raise ConnectionRefusedError
+            self._connections.add(sock, peer, f"{peer[0]}:{peer[1]} has come")
+        except OSError:
+            self.refused += 1
+            sock.close()
+
+    def _accept_again(self) -> None:
+        if not self._is_accepting:
+            self._connections.selector.register(self._socket, selectors.EVENT_READ)
+            self._is_accepting = True
+
+    def _end(self, connection: Connection, reason: str) -> None:
+        self._connections.end(connection, f"{connection.name} is gone: {reason}")
+
+
+def _listen(family: socket.AddressFamily, address: tuple[str, int]) -> socket.socket:
+    sock = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        sock.setblocking(False)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(address)
+        sock.listen(MAX_CONNECTIONS)
+    except OSError:
+        sock.close()
+        raise
+    return sock

@@ -1,0 +1,123 @@
+"""A TCP link that dials: one peer, tried again once a second for as long as it is not there."""
+
+import selectors
+import socket
+from time import monotonic
+
+from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.attempts import Attempts
+from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.tcp import Connection, Connections, reason_of, resolve
+from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.way_out import WayOut
+
+CONNECT_LIMIT = 3.0  # s for the other end to answer
+
+
+class TcpOutLink:
+    """A TCP connection that is made again whenever it is lost.
+
+    The host's addresses are looked up once, at the beginning: to look again could take seconds.
+    """
+
+    peers: tuple[Peer, ...] = ()
+    is_stream = True
+
+    def __init__(self, url: LinkUrl, *, way: WayOut) -> None:
+        self.name = str(url)
+        self.is_local = url.is_loopback
+        self._peer: Peer = (url.host, url.port)
+        try:
+            self._addresses = resolve(url.host, url.port)
+        except OSError as error:
+            raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
+        self._connections = Connections(way, other=self._answered, ended=self._end)
+        self._attempts = Attempts()
+        self._dialling: socket.socket | None = None
+        self._give_up_at = 0.0
+
+    def __repr__(self) -> str:
+        return f"TcpOutLink({self.name}, {'up' if len(self._connections) else 'down'})"
+
+    @property
+    def lost(self) -> int:
+        """Packets that were dropped, or for nobody."""
+        return self._connections.lost
+
+    def fileno(self) -> int:
+        """Give the descriptor of all of it."""
+        return self._connections.fileno()
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` pieces; send what waits."""
+        return self._connections.receive(limit)
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        """Send a packet, or let it wait; while nobody is there it is lost."""
+        self._connections.send(peer, data)
+
+    def take_changes(self) -> list[PeerChange]:
+        """Give what became of the peer since the last call."""
+        return self._connections.take_changes()
+
+    def tend(self) -> None:
+        """Dial if it is time to; look for congestions."""
+        self._connections.look()
+        now = monotonic()
+        if self._dialling is not None:
+            if now >= self._give_up_at:
+                self._hang_up("no answer")
+        elif not len(self._connections) and self._attempts.is_due(now=now):
+            self._dial(now)
+
+    def close(self) -> None:
+        """Close everything."""
+        if self._dialling is not None:
+            self._dialling.close()
+            self._dialling = None
+        self._connections.close()
+
+    def _dial(self, now: float) -> None:
+        family, address = self._addresses[0]
+        self._addresses = self._addresses[1:] + self._addresses[:1]  # the next one next time
+        self._give_up_at = now + CONNECT_LIMIT
+        try:
+            self._dialling = socket.socket(family, socket.SOCK_STREAM)
+            self._dialling.setblocking(False)
+            self._connections.selector.register(self._dialling, selectors.EVENT_WRITE)
+            self._dialling.connect(address)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self._hang_up(reason_of(error))
+            return
+        self._answered()
+
+    def _answered(self) -> None:
+        sock = self._dialling
+        assert sock is not None
+        failed = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        try:
+            if failed:
+                raise OSError(failed, "")
+            if sock.getsockname() == sock.getpeername():  # by chance from the port it dials
+                raise ConnectionRefusedError("nobody but this end")
+            self._connections.selector.unregister(sock)
+            self._dialling = None
+            self._connections.add(sock, self._peer, self._attempts.succeeded())
+        except OSError as error:
+            self._dialling = sock
+            self._hang_up(reason_of(error))
+
+    def _hang_up(self, reason: str) -> None:
+        if self._dialling is not None:
+            if self._dialling in self._connections.selector.get_map():
+                self._connections.selector.unregister(self._dialling)
+            self._dialling.close()
+            self._dialling = None
+        words = self._attempts.failed(reason)
+        if words is not None:
+            self._connections.note(PeerChange(self._peer, PeerState.DOWN, words))
+
+    def _end(self, connection: Connection, reason: str) -> None:
+        self._connections.end(connection, self._attempts.failed(reason))

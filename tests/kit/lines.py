@@ -1,0 +1,110 @@
+"""Serial lines made of pseudo-terminals: a device that can be unplugged, and a slow line."""
+
+import os
+import selectors
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
+
+BITS = 10  # of a byte on the line
+TICK = 0.01  # s
+END_LIMIT = 10.0  # s
+
+
+class Device:
+    """A serial device at ``path``, and the far end of its line, a descriptor.
+
+    As with an adapter whose name udev keeps, a device plugged in again has the same path.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.far = -1
+        self._near = -1
+        self.plug()
+
+    def plug(self) -> None:
+        """Let the device be there."""
+        self.far, self._near = os.openpty()
+        tty.setraw(self._near)
+        os.set_blocking(self.far, False)
+        self.path.symlink_to(os.ttyname(self._near))
+
+    def unplug(self) -> None:
+        """Let it be gone; who has it open is told by the system."""
+        if self.far < 0:
+            return
+        self.path.unlink()
+        os.close(self._near)
+        os.close(self.far)
+        self.far = self._near = -1
+
+
+@contextmanager
+def device(path: Path) -> Iterator[Device]:
+    """Have a device while the block runs."""
+    made = Device(path)
+    try:
+        yield made
+    finally:
+        made.unplug()
+
+
+class SlowLine:
+    """Two devices joined by a line of so many bits a second; what it does not take waits in them.
+
+    A pseudo-terminal says of nothing that it is on its way: to who writes, it is a wire without end
+    until it is full.
+    """
+
+    def __init__(self, one: Device, other: Device, *, baud: int) -> None:
+        self._ways = ((one.far, other.far), (other.far, one.far))
+        self._rate = baud / BITS
+        self.passed = [0, 0]  # bytes, from one to the other and back
+        self._is_over = Event()
+        self._thread = Thread(target=self._run, name="slow line", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop passing anything on."""
+        self._is_over.set()
+        self._thread.join(END_LIMIT)
+        assert not self._thread.is_alive()
+
+    def _run(self) -> None:
+        at, due = monotonic(), [0.0, 0.0]
+        while not self._is_over.wait(TICK):
+            passed, at = monotonic() - at, monotonic()
+            for number, (source, target) in enumerate(self._ways):
+                due[number] = min(due[number] + passed * self._rate, 2 * TICK * self._rate)
+                with suppress(BlockingIOError):
+                    data = os.read(source, int(due[number])) if due[number] >= 1 else b""
+                    due[number] -= len(data)
+                    self.passed[number] += len(data)
+                    while data:
+                        data = data[os.write(target, data) :]
+
+
+@contextmanager
+def slow_line(folder: Path, *, baud: int) -> Iterator[tuple[Path, Path]]:
+    """Give the paths of two devices that are joined while the block runs."""
+    with device(folder / "ttyOne") as one, device(folder / "ttyOther") as other:
+        line = SlowLine(one, other, baud=baud)
+        try:
+            yield one.path, other.path
+        finally:
+            line.close()
+
+
+def read_from(descriptor: int, count: int, *, within: float = END_LIMIT) -> bytes:
+    """Give so many bytes of a descriptor, or AssertionError."""
+    data, end = b"", monotonic() + within
+    with selectors.DefaultSelector() as selector:
+        selector.register(descriptor, selectors.EVENT_READ)
+        while len(data) < count:
+            assert selector.select(max(0.0, end - monotonic())), f"only {data!r}"
+            data += os.read(descriptor, count - len(data))
+    return data

@@ -1,0 +1,406 @@
+"""TCP links on real loopback sockets with ports that the system chooses."""
+
+import select
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+
+import pytest
+
+from mav_tasks.errors import LinkOpenError
+from mav_tasks.links import tcp_in, tcp_out
+from mav_tasks.links.attempts import RETRY
+from mav_tasks.links.base import Peer, PeerChange, PeerState, StreamLink
+from mav_tasks.links.opening import open_link
+from mav_tasks.links.tcp_in import TcpInLink
+from mav_tasks.links.tcp_out import TcpOutLink
+from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
+
+HOST = "127.0.0.1"
+LIMIT = 10.0  # s
+
+
+class Clock:
+    """Stands in for the clock of a link: time passes when it is told to."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr("mav_tasks.links.tcp.monotonic", made)
+    monkeypatch.setattr(tcp_out, "monotonic", made)
+    return made
+
+
+@pytest.fixture
+def listening() -> Iterator[TcpInLink]:
+    link = TcpInLink(LinkUrl("tcpin", HOST, 0), way=TO_CLIENTS)
+    yield link
+    link.close()
+
+
+@pytest.fixture
+def server() -> Iterator[socket.socket]:
+    """Somebody who listens."""
+    with socket.create_server((HOST, 0)) as sock:
+        sock.settimeout(LIMIT)
+        yield sock
+
+
+def dial(link: TcpInLink) -> socket.socket:
+    return socket.create_connection((HOST, link.port), LIMIT)
+
+
+class Watched:
+    """A link and all that it has given."""
+
+    def __init__(self, link: StreamLink) -> None:
+        self.link = link
+        self.pieces: list[tuple[Peer, bytes]] = []
+        self.changes: list[PeerChange] = []
+
+    def until(self, condition: Callable[[], object], *, tends: bool = True) -> None:
+        """Do what a runner does until the condition holds."""
+        end = time.monotonic() + LIMIT
+        while not condition():
+            assert time.monotonic() < end, (self.pieces, self.changes)
+            select.select([self.link.fileno()], [], [], 0.01)
+            self.pieces += self.link.receive(64)
+            if tends:
+                self.link.tend()
+            self.changes += self.link.take_changes()
+
+    @property
+    def states(self) -> list[PeerState]:
+        return [change.state for change in self.changes]
+
+    def heard(self, peer: Peer) -> bytes:
+        return b"".join(data for who, data in self.pieces if who == peer)
+
+
+def read(sock: socket.socket, count: int) -> bytes:
+    sock.settimeout(LIMIT)
+    data = b""
+    while len(data) < count:
+        more = sock.recv(count - len(data))
+        assert more, f"ended after {data!r}"
+        data += more
+    return data
+
+
+def up(link: TcpInLink, count: int) -> tuple[Watched, list[socket.socket]]:
+    """Connect so many clients; give them when the link knows of all."""
+    watched = Watched(link)
+    clients = [dial(link) for _ in range(count)]
+    watched.until(lambda: watched.states.count(PeerState.UP) == count)
+    return watched, clients
+
+
+# listening
+
+
+def test_it_is_a_stream_link(listening: TcpInLink) -> None:
+    link: StreamLink = listening
+    assert isinstance(link, StreamLink)
+    assert (link.name, link.peers, link.is_local) == (f"tcpin:{HOST}:0", (), True)
+    assert repr(link) == f"TcpInLink(tcpin:{HOST}:0, 0 connections)"
+
+
+def test_each_connection_is_a_peer_and_is_answered(listening: TcpInLink) -> None:
+    watched, (one, two) = up(listening, 2)
+    one.sendall(b"from one")
+    two.sendall(b"from two")
+    watched.until(lambda: len(watched.pieces) == 2)
+    assert watched.heard(one.getsockname()) == b"from one"
+    assert watched.heard(two.getsockname()) == b"from two"
+    for each in (one, two):
+        listening.send(each.getsockname(), b"to %d" % each.getsockname()[1])
+        expected = b"to %d" % each.getsockname()[1]
+        assert read(each, len(expected)) == expected
+        each.close()
+
+
+def test_who_comes_and_goes_is_told_in_order_and_in_words(listening: TcpInLink) -> None:
+    watched, (client,) = up(listening, 1)
+    peer = client.getsockname()
+    client.sendall(b"last words")
+    client.close()
+    watched.until(lambda: PeerState.DOWN in watched.states)
+    assert watched.heard(peer) == b"last words"
+    name = f"{HOST}:{peer[1]}"
+    assert watched.changes == [
+        PeerChange(peer, PeerState.UP, f"{name} has come"),
+        PeerChange(peer, PeerState.DOWN, f"{name} is gone: closed by the other end"),
+    ]
+
+
+def test_one_that_resets_its_connection_is_gone(listening: TcpInLink) -> None:
+    watched, (client,) = up(listening, 1)
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    client.close()
+    watched.until(lambda: PeerState.DOWN in watched.states)
+    assert watched.changes[-1].words.endswith("is gone: Connection reset by peer")
+
+
+def test_what_is_sent_to_who_is_gone_is_lost_and_said_by_nobody(listening: TcpInLink) -> None:
+    listening.send((HOST, 9), b"anybody?")
+    watched, (client,) = up(listening, 1)
+    peer = client.getsockname()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    client.close()
+    for _ in range(3):  # before the link was read, as in the middle of a turn
+        listening.send(peer, b"still there?")
+    watched.until(lambda: PeerState.DOWN in watched.states)
+    listening.send(peer, b"still there?")
+    assert listening.lost >= 2
+    assert watched.states == [PeerState.UP, PeerState.DOWN]
+
+
+def test_a_piece_is_no_longer_than_a_packet_and_all_are_served_in_turn(
+    listening: TcpInLink,
+) -> None:
+    watched, (one, two) = up(listening, 2)
+    one.sendall(bytes(20_000))
+    two.sendall(b"hello")
+    watched.until(lambda: len(watched.heard(one.getsockname())) == 20_000)
+    assert max(len(data) for _, data in watched.pieces) <= 280
+    assert two.getsockname() in [peer for peer, _ in watched.pieces[:64]]
+    for each in (one, two):
+        each.close()
+
+
+def test_connections_are_bounded(listening: TcpInLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tcp_in, "MAX_CONNECTIONS", 3)
+    watched, clients = up(listening, 3)
+    with dial(listening) as late:
+        watched.until(lambda: listening.refused == 1)
+        with suppress(ConnectionError):
+            assert late.recv(1) == b""
+    clients.pop().close()
+    watched.until(lambda: PeerState.DOWN in watched.states)
+    clients.append(dial(listening))
+    watched.until(lambda: watched.states.count(PeerState.UP) == 4)
+    for client in clients:
+        client.close()
+
+
+def test_without_descriptors_it_waits_for_some(
+    listening: TcpInLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Exhausted:
+        def __init__(self, sock: socket.socket) -> None:
+            self.fileno, self.close = sock.fileno, sock.close
+
+        def accept(self) -> None:
+            raise OSError(24, "Too many open files")
+
+    real = listening._socket
+    watched = Watched(listening)
+    with dial(listening) as client:
+        monkeypatch.setattr(listening, "_socket", Exhausted(real))
+        assert select.select([listening.fileno()], [], [], LIMIT)[0]
+        listening.receive(64)
+        assert not select.select([listening.fileno()], [], [], 0.0)[0]  # is not called for nothing
+        monkeypatch.setattr(listening, "_socket", real)
+        watched.until(lambda: watched.states == [PeerState.UP])
+        assert watched.changes[0].peer == client.getsockname()
+
+
+def test_a_port_in_use_is_one_clear_error(listening: TcpInLink) -> None:
+    with pytest.raises(LinkOpenError) as error:
+        TcpInLink(LinkUrl("tcpin", HOST, listening.port), way=TO_CLIENTS)
+    words = f"link tcpin:{HOST}:{listening.port} cannot be opened: Address already in use"
+    assert str(error.value) == words
+
+
+@pytest.mark.parametrize("kind", ["tcpin", "tcp"])
+def test_a_host_that_is_none_is_one_clear_error(kind: str) -> None:
+    with pytest.raises(LinkOpenError, match=rf"^link {kind}:no host:1 cannot be opened: "):
+        open_link(LinkUrl(kind, "no host", 1), way=TO_CLIENTS)
+
+
+# a slow reader
+
+
+def test_a_slow_reader_delays_nobody_and_gets_whole_packets_the_newest_last(
+    listening: TcpInLink, clock: Clock
+) -> None:
+    watched, (slow, quick) = up(listening, 2)
+    packets = [number.to_bytes(4, "big") + bytes(196) for number in range(60_000)]
+    sent = 0
+    for number, packet in enumerate(packets):
+        listening.send(slow.getsockname(), packet)
+        sent += 1
+        clock.now += 0.001
+        if number % 1_000 == 0:
+            listening.send(quick.getsockname(), b"hello")
+            assert read(quick, 5) == b"hello"
+        if listening.lost > 20_000:
+            break
+    watched.until(lambda: PeerState.CONGESTED in watched.states)
+    assert watched.changes[-1].peer == slow.getsockname()
+    connection = next(iter(listening._connections._by_peer.values()))
+    assert connection.queue.size <= 1 << 16
+    numbers: list[int] = []
+    while not numbers or numbers[-1] != sent - 1:
+        watched.until(lambda: True)
+        listening.receive(64)
+        packet = read(slow, 200)
+        assert packet[4:] == bytes(196)
+        numbers.append(int.from_bytes(packet[:4], "big"))
+    assert numbers == sorted(set(numbers))
+    assert len(numbers) + listening.lost == sent
+    watched.until(lambda: PeerState.CLEAR in watched.states)
+    for each in (slow, quick):
+        each.close()
+
+
+def test_towards_a_vehicle_nothing_old_is_delivered_later(
+    server: socket.socket, clock: Clock
+) -> None:
+    """Its connection stalls; the newest setpoint comes next after what the system had taken."""
+    link = TcpOutLink(LinkUrl("tcp", HOST, server.getsockname()[1]), way=TO_VEHICLES)
+    server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2_048)
+    watched = Watched(link)
+    watched.until(lambda: watched.states == [PeerState.UP])
+    rover, _ = server.accept()
+    for number in range(20_000):
+        link.send(link._peer, number.to_bytes(4, "big") + bytes(61))
+        clock.now += 0.05
+    taken = 0
+    numbers: list[int] = []
+    while not numbers or numbers[-1] != 19_999:
+        link.receive(64)
+        numbers.append(int.from_bytes(read(rover, 65)[:4], "big"))
+        taken += 1
+    gap = next(n for n in range(taken - 1) if numbers[n + 1] != numbers[n] + 1)
+    assert numbers[gap + 1 :] == list(range(19_996, 20_000)) or numbers[gap + 2 :] == list(
+        range(19_996, 20_000)
+    )
+    rover.close()
+    link.close()
+
+
+# dialling
+
+
+def test_a_dialling_link_has_one_peer_that_comes(server: socket.socket) -> None:
+    port = server.getsockname()[1]
+    link = TcpOutLink(LinkUrl("tcp", HOST, port), way=TO_VEHICLES)
+    watched = Watched(link)
+    watched.until(lambda: watched.changes)
+    other, _ = server.accept()
+    assert watched.changes == [PeerChange((HOST, port), PeerState.UP, "is up")]
+    assert (link.peers, link.is_local, repr(link)) == (
+        (),
+        True,
+        f"TcpOutLink(tcp:{HOST}:{port}, up)",
+    )
+    link.send((HOST, port), b"hello")
+    assert read(other, 5) == b"hello"
+    other.sendall(b"answer")
+    watched.until(lambda: watched.heard((HOST, port)) == b"answer")
+    assert other.getpeername()[1] != port
+    other.close()
+    link.close()
+
+
+def test_it_waits_for_the_other_end_and_dials_again_when_it_is_lost(clock: Clock) -> None:
+    with socket.create_server((HOST, 0)) as reserved:
+        port = reserved.getsockname()[1]
+    link = TcpOutLink(LinkUrl("tcp", HOST, port), way=TO_VEHICLES)
+    watched = Watched(link)
+    for _ in range(3):
+        watched.until(lambda: link._dialling is None and watched.changes)
+        clock.now += RETRY
+        link.tend()
+    link.send((HOST, port), b"lost")
+    words = "is not there yet: Connection refused; trying again every second"
+    assert [change.words for change in watched.changes] == [words]
+    for expected in ("is up", "is back"):
+        with socket.create_server((HOST, port)) as server:
+            server.settimeout(LIMIT)
+            clock.now += RETRY
+            watched.until(lambda: watched.states[-1] is PeerState.UP)
+            assert watched.changes[-1].words == expected
+            other, _ = server.accept()
+            other.close()
+            watched.until(lambda: watched.states[-1] is PeerState.DOWN)
+        lost = "lost: closed by the other end; trying again every second"
+        assert watched.changes[-1].words == lost
+    assert len(watched.changes) == 5
+    assert link.lost == 1
+    link.close()
+
+
+def test_it_dials_no_more_than_once_a_second(server: socket.socket, clock: Clock) -> None:
+    link = TcpOutLink(LinkUrl("tcp", HOST, server.getsockname()[1]), way=TO_VEHICLES)
+    watched = Watched(link)
+    watched.until(lambda: watched.changes)
+    server.accept()[0].close()
+    watched.until(lambda: PeerState.DOWN in watched.states)
+    for _ in range(10):
+        link.tend()
+        assert link._dialling is None
+        assert not len(link._connections)
+        clock.now += RETRY / 11
+    clock.now += RETRY / 11
+    watched.until(lambda: watched.states[-1] is PeerState.UP)
+    server.accept()[0].close()
+    link.close()
+
+
+def test_one_that_never_answers_is_given_up_and_dialled_again(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link = TcpOutLink(LinkUrl("tcp", HOST, 9), way=TO_VEHICLES)
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as full:
+        full.bind((HOST, 0))
+        full.listen(0)
+        backlog = []
+        for _ in range(4):  # from now on nobody is answered
+            sock = socket.socket()
+            sock.setblocking(False)
+            sock.connect_ex(full.getsockname())
+            backlog.append(sock)
+        link._addresses = [(socket.AF_INET, full.getsockname())]
+        link.tend()
+        clock.now += tcp_out.CONNECT_LIMIT - 0.1
+        link.tend()
+        assert link.take_changes() == []
+        clock.now += 0.2
+        link.tend()
+        (change,) = link.take_changes()
+        assert change.words == "is not there yet: no answer; trying again every second"
+        for sock in backlog:
+            sock.close()
+    link.close()
+
+
+def test_what_was_sent_just_before_the_end_arrives(server: socket.socket) -> None:
+    """Even with something unread, for which the system would otherwise reset the connection."""
+    link = TcpOutLink(LinkUrl("tcp", HOST, server.getsockname()[1]), way=TO_VEHICLES)
+    watched = Watched(link)
+    watched.until(lambda: watched.changes)
+    other, _ = server.accept()
+    other.sendall(b"unread" * 100)
+    assert select.select([link.fileno()], [], [], LIMIT)[0]
+    link.send(link._peer, b"stop")
+    link.close()
+    assert read(other, 4) == b"stop"
+    other.close()
+
+
+@pytest.mark.parametrize(("host", "local"), [(HOST, True), ("localhost", True), ("0.0.0.0", False)])
+def test_a_link_beyond_this_machine_is_not_local(host: str, local: bool) -> None:
+    link = TcpInLink(LinkUrl("tcpin", host, 0), way=TO_CLIENTS)
+    assert link.is_local is local
+    link.close()
