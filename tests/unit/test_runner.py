@@ -11,7 +11,19 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import Committed, Outgoing, Packets, StoreFailed
+from mav_tasks.engine.inputs import (
+    Committed,
+    Congestion,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    PeerChanged,
+    Shutdown,
+    StoreFailed,
+    WallClock,
+)
+from mav_tasks.links.base import PeerChange, PeerState
 from mav_tasks.runner import Pump, Runner
 from mav_tasks.serve import open_store
 from mav_tasks.settings import Settings
@@ -148,3 +160,91 @@ def test_what_is_due_does_not_wait_for_all_that_came(is_due: bool) -> None:
         assert seen[first : first + 4] == ["8 in", "due", "8 in", "due"]
     else:
         assert seen[first] == "40 in"
+
+
+class FakeStream:
+    """A stream link that tells what it is given to tell."""
+
+    name = "stream"
+    peers: tuple[object, ...] = ()
+    is_local = True
+    is_stream = True
+
+    def __init__(self) -> None:
+        self.told: list[PeerChange] = []  # before anything is read
+        self.read: list[tuple[list[PeerChange], bytes]] = []  # each with what reading shows
+        self.tends = asyncio.Queue[None]()
+        self._read, self._write = os.pipe()
+
+    def comes(self, changes: list[PeerChange], piece: bytes) -> None:
+        self.read.append((changes, piece))
+        os.write(self._write, b"!")
+
+    def fileno(self) -> int:
+        return self._read
+
+    def receive(self, limit: int) -> list[tuple[object, bytes]]:
+        os.read(self._read, 1)
+        changes, piece = self.read.pop(0)
+        self.told += changes
+        return [("peer", piece)]
+
+    def send(self, peer: object, data: bytes) -> None:
+        """Nobody is there."""
+
+    def take_changes(self) -> list[PeerChange]:
+        told, self.told = self.told, []
+        return told
+
+    def tend(self) -> None:
+        self.tends.put_nowait(None)
+
+    def close(self) -> None:
+        os.close(self._read)
+        os.close(self._write)
+
+
+def test_the_engine_is_told_who_comes_before_its_words_and_who_goes_after_them(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    up = PeerChange("peer", PeerState.UP, "is up")
+    down = PeerChange("peer", PeerState.DOWN, "lost: closed")
+
+    async def run() -> list[object]:
+        loop = asyncio.get_running_loop()
+        engine, link = Recorder(), FakeStream()
+        engine.handle_deadline = lambda *, now: None  # type: ignore[method-assign]
+        running = loop.create_task(Runner(engine, MemoryStore(), clients=[link], vehicles=[]).run())
+        await asyncio.sleep(0)
+        link.comes([up, down], b"one")
+        while not any(isinstance(item, Packets) for item in engine.inputs):
+            await asyncio.wait_for(link.tends.get(), 10)
+        link.told = [PeerChange("peer", PeerState.CONGESTED)]  # by a send, say: told when tended
+        while link.told:
+            await asyncio.wait_for(link.tends.get(), 10)
+        link.told = [down, up]  # of before: in its order
+        link.comes([PeerChange("peer", PeerState.CLEAR)], b"two")
+        while engine.inputs[-1] != Congestion("stream", "peer", is_congested=False):
+            await asyncio.wait_for(link.tends.get(), 10)
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.02)
+        await asyncio.wait_for(running, 10)
+        return engine.inputs
+
+    with caplog.at_level(logging.INFO, "mav_tasks"):
+        inputs = asyncio.run(run())
+    assert [item for item in inputs if not isinstance(item, WallClock | Shutdown)] == [
+        LinkChanged("stream", LinkSide.CLIENTS, up=True, is_stream=True),
+        PeerChanged("stream", "peer", up=True),
+        Packets("stream", [("peer", b"one")]),
+        PeerChanged("stream", "peer", up=False),
+        Congestion("stream", "peer", is_congested=True),
+        PeerChanged("stream", "peer", up=False),
+        PeerChanged("stream", "peer", up=True),
+        Packets("stream", [("peer", b"two")]),
+        Congestion("stream", "peer", is_congested=False),
+    ]
+    words = ["link stream is up", "link stream lost: closed"]
+    words += ["link stream lost: closed", "link stream is up"]
+    assert [record.getMessage() for record in caplog.records] == words
