@@ -1,8 +1,8 @@
 """A serial line: raw, without flow control, nobody else's; opened again whenever it is lost.
 
-What the system, or an adapter behind it, has taken of what was written cannot be asked for, or not
-everywhere. So it is reckoned from the baud rate, and no more than LEAD is ever written ahead: a
-packet that has not begun can still give way to a newer one.
+How much of what was written the line has still before it, not every system and adapter tells. So it
+is reckoned from the baud rate, and no more than LEAD is ever written ahead: a packet that has not
+begun can still give way to a newer one.
 """
 
 import os
@@ -24,6 +24,8 @@ from mav_tasks.links.way_out import WayOut
 PIECE = 280  # bytes read at once, a MAVLink packet
 LEAD = 0.1  # s that the line is busy with what was written; two TEND_PERIODs
 BITS = 10  # of a byte on the line: start and stop are two of them
+USED = 0.9  # of the line; a little slower than it says it is, what was ahead would only ever grow
+FAILURES = (OSError, ValueError, termios.error)  # what pySerial raises or lets through
 #: the device may be plugged in later; everything else the operator can mend
 NOT_THERE = frozenset({ENOENT, ENODEV, ENXIO, EIO})
 
@@ -50,7 +52,7 @@ class SerialLink:
         self._attempts.is_due(now=monotonic())
         try:
             self._open()
-        except (OSError, ValueError) as error:
+        except FAILURES as error:
             if not _is_not_there(error):
                 self._selector.close()
                 reason = _reason_of(error)
@@ -107,9 +109,11 @@ class SerialLink:
             if self._attempts.is_due(now=now):
                 try:
                     self._open()
-                except (OSError, ValueError) as error:
+                except FAILURES as error:
                     self._note_lost(error)
             return
+        with suppress(OSError):
+            self._free_at = max(self._free_at, now + self._time_of(self._device.out_waiting))
         self._flush()
         if self._queue.changed(now=now):
             state = PeerState.CONGESTED if self._queue.is_congested else PeerState.CLEAR
@@ -159,11 +163,15 @@ class SerialLink:
                 self._lose(error)
                 return
             self._queue.wrote(count)
-            self._free_at = max(self._free_at, now) + count * BITS / self._url.baud
+            self._free_at = max(self._free_at, now) + self._time_of(count)
+
+    def _time_of(self, count: int) -> float:
+        """Seconds that the line takes for so many bytes."""
+        return count * BITS / (USED * self._url.baud)
 
     def _lose(self, error: OSError) -> None:
         assert self._device is not None
-        with suppress(OSError, termios.error):  # what it did not take it would wait for at closing
+        with suppress(*FAILURES):  # what it did not take it would wait for at closing
             termios.tcflush(self._device.fd, termios.TCOFLUSH)
         self._give_back(self._device)
         self._note_lost(error)
@@ -171,7 +179,7 @@ class SerialLink:
     def _give_back(self, device: Serial) -> None:
         self._selector.unregister(device.fd)
         self._device = None
-        with suppress(OSError):
+        with suppress(*FAILURES):
             device.close()
 
     def _note_lost(self, error: Exception) -> None:
@@ -181,7 +189,14 @@ class SerialLink:
 
 
 def _is_not_there(error: Exception) -> bool:
-    return isinstance(error, OSError) and error.errno in NOT_THERE
+    return _number_of(error) in NOT_THERE
+
+
+def _number_of(error: Exception) -> int | None:
+    """Give the system's number of an error: termios has it, too, but not under a name."""
+    if isinstance(error, termios.error):
+        return int(error.args[0])
+    return error.errno if isinstance(error, OSError) else None
 
 
 def _reason_of(error: Exception) -> str:
@@ -191,8 +206,5 @@ def _reason_of(error: Exception) -> str:
             return "it is no serial device"
         if "exclusively lock" in str(error):
             return "it is in use"
-    if isinstance(error, ValueError):
-        return str(error)
-    if isinstance(error, OSError) and error.errno is not None:
-        return os.strerror(error.errno)
-    return str(error)
+    number = _number_of(error)
+    return str(error) if number is None else os.strerror(number)

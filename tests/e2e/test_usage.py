@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.kit.processes import free_udp_ports, process
+from tests.kit.processes import free_tcp_ports, free_udp_ports, process
 
 
 def run(*arguments: str, environment: dict[str, str] | None = None) -> tuple[int, str, str]:
@@ -51,7 +51,10 @@ def test_a_port_in_use_is_named() -> None:
         ("udpin:127.0.0.1", "host:port"),
         ("udpin:127.0.0.1:99999", "65535"),
         ("udpin::14560", "host:port"),
-        ("tcp:127.0.0.1:5760", "not supported in this version"),
+        ("tcpin:127.0.0.1", "host:port"),
+        ("tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
+        ("serial:/dev/null:57600", "no serial device"),
+        ("serial:/dev/ttyUSB0", "serial:device:baud"),
         ("udpin:no.such.host.invalid:14560", "no.such.host.invalid"),
         ("", "udpin:host:port"),
     ],
@@ -67,6 +70,8 @@ def test_a_link_that_says_nothing_is_named(option: str, url: str, word: str) -> 
         ("--client", "udpin:0.0.0.0:14560"),
         ("--vehicle", "udpout:192.0.2.1:14580"),
         ("--push", "192.0.2.1:14550"),
+        ("--client", "tcpin:0.0.0.0:5760"),
+        ("--vehicle", "tcp:192.0.2.1:5760"),
     ],
 )
 def test_a_link_beyond_this_machine_needs_a_key(option: tuple[str, str]) -> None:
@@ -84,6 +89,37 @@ def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
         server.wait_for(f"clients on udpin:0.0.0.0:{port}")
         server.end()
     assert server.popen.returncode == 0
+
+
+def test_a_tcp_port_in_use_is_named() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        result = run("serve", "--client", f"tcpin:127.0.0.1:{port}", "--no-push")
+        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use")
+
+
+def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
+    """A rover that is started later, a radio that is plugged in later: and a serial line needs no
+    --insecure.
+    """
+    (port,) = free_tcp_ports(1)
+    serial, tcp = f"serial:{tmp_path / 'ttyLater'}:57600", f"tcp:127.0.0.1:{port}"
+    with process(
+        *("-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:"),
+        *("--client", serial, "--vehicle", tcp),
+        folder=tmp_path,
+        name="server",
+    ) as server:
+        server.wait_for(re.escape(f"link {serial} is not there yet: No such file"))
+        server.wait_for(re.escape(f"link {tcp} is not there yet: Connection refused"))
+        with socket.create_server(("127.0.0.1", port)) as rover:
+            rover.settimeout(10)
+            connection, _ = rover.accept()
+            with connection:
+                assert connection.recv(1) == b"\xfd"  # it is spoken to first
+        assert server.end() < 1.0
+    assert server.popen.returncode == 0
+    assert server.text.count("is not there yet") == 2  # once for each, however often it was tried
 
 
 def test_a_store_in_use_is_named_with_its_process(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -114,24 +114,34 @@ class Stand:
 
     def connect(self, *, source_system: int = 255) -> Any:
         """Give a stock pymavlink connection to the server that has heard the rover."""
-        return self._heard(f"udpout:127.0.0.1:{self.client_port}", source_system)
+        return self.heard(f"udpout:127.0.0.1:{self.client_port}", source_system)
 
     def connect_to_rover(self) -> Any:
         """Give one to the rover itself, past the server."""
-        return self._heard(f"udpout:127.0.0.1:{self.rover_port}", 254)
+        return self.heard(f"udpout:127.0.0.1:{self.rover_port}", 254)
 
     def close(self) -> None:
         """Close every connection given."""
         for link in self._links:
             link.close()
 
-    def _heard(self, url: str, source_system: int) -> Any:
-        link = mavutil.mavlink_connection(url, source_system=source_system)
+    def heard(self, url: str, source_system: int = 255, **options: Any) -> Any:
+        """Give a stock pymavlink connection that has said hello and heard the rover."""
+        link = mavutil.mavlink_connection(url, source_system=source_system, **options)
         self._links.append(link)
         link.mav.heartbeat_send(6, 8, 0, 0, 4)
         assert link.wait_heartbeat(timeout=10) is not None, "no heartbeat"
         wait_for(link, "LOCAL_POSITION_NED")
         wait_for(link, "ATTITUDE")
+        return link
+
+    def heard_by(self, url: str, source_system: int = 255) -> Any:
+        """Give one to which the server comes: who is there can be spoken to only then."""
+        link = mavutil.mavlink_connection(url, source_system=source_system)
+        self._links.append(link)
+        wait_for(link, "HEARTBEAT")
+        link.mav.heartbeat_send(6, 8, 0, 0, 4)
+        wait_for(link, "LOCAL_POSITION_NED")
         return link
 
     def drive(self, link: Any, distance: float) -> int:
@@ -141,22 +151,34 @@ class Stand:
         return task_id
 
 
+def udp_to(rover_port: int) -> AbstractContextManager[str]:
+    """Give the way to a rover past which there is nothing."""
+    return nullcontext(f"udpout:127.0.0.1:{rover_port}")
+
+
 @contextmanager
 def stand(
-    folder: Path, *serve_options: str, body: str = "kinematic", persona: str = "ardupilot"
+    folder: Path,
+    *serve_options: str,
+    body: str = "kinematic",
+    persona: str = "ardupilot",
+    way: Callable[[int], AbstractContextManager[str]] = udp_to,
 ) -> Iterator[Stand]:
-    """Run a server and a rover of that make on ports of their own."""
+    """Run a server and a rover of that make on ports of their own.
+
+    ``way`` makes of the rover's UDP port the URL by which the server is to reach it.
+    """
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", body, "--persona", persona]
     rover += ["--truth", str(truth)]
     serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client_port}"]
-    serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]
     serve += ["--store", ":memory:", *serve_options]
     with (
         process(*rover, folder=folder, name="rover") as rover_process,
-        process(*serve, folder=folder, name="server") as server_process,
+        way(rover_port) as url,
+        process(*serve, "--vehicle", url, folder=folder, name="server") as server_process,
     ):
         server_process.wait_for("vehicle 1: found")
         wait_until(truth.exists, within=START_LIMIT, what="the truth file")
@@ -187,9 +209,18 @@ def command_long(
     return ack
 
 
+def free_tcp_ports(count: int) -> list[int]:
+    """Give TCP ports of the loopback that nobody uses at this moment."""
+    return _free_ports(count, socket.SOCK_STREAM)
+
+
 def free_udp_ports(count: int) -> list[int]:
     """Give UDP ports of the loopback that nobody uses at this moment."""
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    return _free_ports(count, socket.SOCK_DGRAM)
+
+
+def _free_ports(count: int, kind: socket.SocketKind) -> list[int]:
+    sockets = [socket.socket(socket.AF_INET, kind) for _ in range(count)]
     try:
         for each in sockets:
             each.bind(("127.0.0.1", 0))
@@ -199,7 +230,9 @@ def free_udp_ports(count: int) -> list[int]:
             each.close()
 
 
-def wait_for(link: Any, kind: str, condition: str | None = None, *, within: float = 10) -> Any:
+def wait_for(
+    link: Any, kind: str | list[str], condition: str | None = None, *, within: float = 10
+) -> Any:
     """Wait for a message of a kind."""
     message = link.recv_match(type=kind, condition=condition, blocking=True, timeout=within)
     assert message is not None, f"no {kind} ({condition}) in {within} s"

@@ -13,7 +13,7 @@ from mav_tasks.links import serial
 from mav_tasks.links.attempts import RETRY
 from mav_tasks.links.base import PeerChange, PeerState, StreamLink
 from mav_tasks.links.opening import open_link
-from mav_tasks.links.serial import LEAD, SerialLink
+from mav_tasks.links.serial import LEAD, USED, SerialLink
 from mav_tasks.links.url import SerialUrl
 from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
 from tests.kit.lines import Device, device, read_from
@@ -89,12 +89,12 @@ def test_no_more_is_written_ahead_than_the_line_takes_in_a_moment(
     packet = bytes(100)
     for _ in range(10):
         link.send(str(line.path), packet)
-    ahead = int(LEAD * BAUD / 10) // 100 + 1
+    ahead = int(LEAD * USED * BAUD / 10) // 100 + 1
     assert len(read_from(line.far, 100 * ahead)) == 100 * ahead
     assert not select.select([line.far], [], [], 0.0)[0]
     clock.now += 0.1
     link.tend()
-    assert len(read_from(line.far, 400)) == 400
+    assert len(read_from(line.far, 100 * (10 - ahead))) == 100 * (10 - ahead)
 
 
 def test_on_a_line_that_is_too_slow_the_newest_is_sent_and_whole(
@@ -115,7 +115,7 @@ def test_on_a_line_that_is_too_slow_the_newest_is_sent_and_whole(
             newest = int.from_bytes(numbers[-1], "big")
             assert number - newest <= (TO_VEHICLES.max_age + LEAD) / 0.05 + 1
     assert numbers == sorted(numbers)
-    assert 190 < len(numbers) < 210
+    assert 400 / 2 * USED - 10 < len(numbers) < 400 / 2 * USED + 10
 
 
 def test_congestion_is_told_and_its_end(link: SerialLink, line: Device, clock: Clock) -> None:
