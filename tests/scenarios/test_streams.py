@@ -1,0 +1,153 @@
+"""Links whose bytes are cut anywhere, with peers that come and go: in virtual time."""
+
+from itertools import pairwise
+from random import Random
+
+import pytest
+
+from mav_tasks.engine.inputs import Congestion, Input, LinkChanged, LinkSide, PeerChanged
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.links.base import Peer
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from tests.kit.client import ACCEPTED, REQUEST, FakeClient
+from tests.kit.mission import Item, Upload
+from tests.kit.world import World, at, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+SEED = 31
+ATTITUDE, POSITION, HEARTBEAT = 30, 32, 0
+
+
+def tell(world: World, item: Input) -> None:
+    """Let the server know something as its links would tell it."""
+    world.server.pump.handle(item, now=world.now)
+    world.server.pump.turn(now=world.now)
+
+
+def cut_anywhere(world: World, name: str, side: LinkSide, peers: tuple[str, ...]) -> None:
+    """From now on a link of the server's is a stream."""
+    random, link = Random(SEED), world.server._links[name]
+    whole = link.receive
+
+    def receive(limit: int) -> list[tuple[Peer, bytes]]:
+        pieces: list[tuple[Peer, bytes]] = []
+        for peer, data in whole(limit):
+            edges = sorted({0, len(data), *random.choices(range(len(data)), k=random.randrange(4))})
+            pieces += [(peer, data[a:b]) for a, b in pairwise(edges)]
+        return pieces
+
+    link.receive = receive  # type: ignore[method-assign]
+    tell(world, LinkChanged(name, side, up=True, is_stream=True))
+    for peer in peers:
+        tell(world, PeerChanged(name, peer, up=True))
+
+
+@pytest.fixture
+def streams(make_world: MakeWorld) -> World:
+    """A world in which both links of the server are streams."""
+    world = make_world()
+    cut_anywhere(world, VEHICLE_LINK, LinkSide.VEHICLES, ("rover1",))
+    cut_anywhere(world, CLIENT_LINK, LinkSide.CLIENTS, ("client",))
+    world.run(1.5)
+    return world
+
+
+def gaps(client: FakeClient, since: float) -> int:
+    """Losses that a client sees from a moment on."""
+    client.received = [packet for packet in client.received if packet.at >= since]
+    return client.gaps((1, 1)) + client.gaps((1, 191))
+
+
+def test_tasks_and_plans_are_the_same_over_streams(streams: World) -> None:
+    world, since = streams, streams.now
+    moves = [world.client.move(0.5), world.client.rotate(90)]
+    plan = Upload(world.client, [Item(16, **at(1.0, 0.0)), Item(16, **at(1.0, 1.0))])
+    world.client.roles.append(plan)
+    world.until(lambda: plan.result is not None, within=5)
+    world.until(lambda: world.state(2)[0] is S.COMPLETED, within=30)
+    assert [sent.answer for sent in moves] == [(ACCEPTED, 1), (ACCEPTED, 2)]
+    assert plan.result == 0
+    assert near_pose(world.pose(), (0.5, 0.0, 90.0))
+    assert gaps(world.client, since) == 0
+
+
+@pytest.mark.parametrize("seconds", [0.5, 5.0])
+def test_a_rover_whose_connection_breaks_goes_on_when_it_is_back(
+    streams: World, seconds: float
+) -> None:
+    world = streams
+    world.client.move(3)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+    tell(world, PeerChanged(VEHICLE_LINK, "rover1", up=False))
+    world.fault(Faults(silent=True))
+    world.run(seconds)
+    if seconds > 1.0:
+        assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
+        assert world.stands()
+    world.fault(Faults())
+    tell(world, PeerChanged(VEHICLE_LINK, "rover1", up=True))
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert near_pose(world.pose(), (3.0, 0.0, 0.0))
+
+
+def test_a_client_that_comes_back_from_elsewhere_commands_at_once(streams: World) -> None:
+    world = streams
+    world.client.move(2)
+    world.until_state(1, S.EXECUTING)
+    world.client.heartbeats = False
+    tell(world, PeerChanged(CLIENT_LINK, "client", up=False))
+    sent_at = world.now
+    world.run(1)
+    assert all(packet.at <= sent_at + 0.01 for packet in world.client.received)
+    again = world.add_client("again")
+    tell(world, PeerChanged(CLIENT_LINK, "again", up=True))
+    world.run(0.2)
+    stop = again.stop()
+    world.until(world.stands, within=3)
+    assert stop.answer == (ACCEPTED, 1)
+    assert world.state(1) == (S.KILLED, R.STOP)
+
+
+def test_a_congested_client_gets_answers_and_no_telemetry_and_the_other_all(
+    streams: World,
+) -> None:
+    world = streams
+    other = world.add_client("other", system_id=245)
+    tell(world, PeerChanged(CLIENT_LINK, "other", up=True))
+    world.run(2)
+    since = world.now
+    tell(world, Congestion(CLIENT_LINK, "client", is_congested=True))
+    sent = [world.client.command(REQUEST, 148, target=(1, 1)), world.client.move(0.3)]
+    world.until_idle(tasks=1)
+    took = world.now - since
+    assert [s.result for s in sent] == [ACCEPTED, ACCEPTED]
+    assert sent[1].acked_at - sent[1].at < 0.1
+    came = [p for p in world.client.received if p.at > since]
+    ids = {p.message_id for p in came}
+    assert not ids & {ATTITUDE, POSITION}
+    assert sum(p.message_id == HEARTBEAT for p in came) >= 2 * int(took) - 1
+    assert "Task 1 done" in world.client.texts()
+    assert sum(p.at > since for p in other.of_id(ATTITUDE)) > 9 * took
+
+    tell(world, Congestion(CLIENT_LINK, "client", is_congested=False))
+    world.run(60)
+    at_last = world.now
+    world.run(5)
+    attitudes = sum(p.at > at_last for p in world.client.of_id(ATTITUDE))
+    assert attitudes == pytest.approx(50, abs=3)
+    assert gaps(world.client, since) == 0
+
+
+def test_noise_on_a_line_costs_no_more_than_what_it_hit(streams: World) -> None:
+    world, random = streams, Random(SEED)
+    world.client.move(1)
+    for _ in range(200):
+        world.client.send_raw(random.randbytes(random.randrange(1, 40)))
+        world.from_vehicle_side(random.randbytes(random.randrange(1, 40)), peer="rover1")
+        world.run(0.05)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
