@@ -19,6 +19,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+LINKS = (
+    "udpin:host:port or tcpin:… listens, udpout:… or tcp:… dials, "
+    "serial:/dev/ttyUSB0:57600 is a line."
+)
 DEFAULT_CLIENTS = ["udpin:127.0.0.1:14560"]
 DEFAULT_PUSH = ["127.0.0.1:14550", "127.0.0.1:14540"]
 DEFAULT_VEHICLES = ["udpout:127.0.0.1:14580"]
@@ -28,16 +32,18 @@ DEFAULT_VEHICLES = ["udpout:127.0.0.1:14580"]
 def serve(
     client: Annotated[
         list[str],
-        typer.Option(metavar="URL", help="Link for clients, as udpin:host:port; repeatable."),
+        typer.Option(metavar="URL", help=f"Link for clients; repeatable. {LINKS}"),
     ] = DEFAULT_CLIENTS,
     push: Annotated[
         list[str],
-        typer.Option(metavar="HOST:PORT", help="Where a client listens, unasked; repeatable."),
+        typer.Option(
+            metavar="HOST:PORT", help="Where a client listens on UDP, unasked; repeatable."
+        ),
     ] = DEFAULT_PUSH,
     no_push: Annotated[bool, typer.Option("--no-push", help="Push to nobody.")] = False,
     vehicle: Annotated[
         list[str],
-        typer.Option(metavar="URL", help="Link to vehicles, as udpout:host:port; repeatable."),
+        typer.Option(metavar="URL", help="Link to vehicles, of the same kinds; repeatable."),
     ] = DEFAULT_VEHICLES,
     arming: Annotated[
         str,
