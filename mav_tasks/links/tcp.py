@@ -43,7 +43,7 @@ class Connections:
     ) -> None:
         """``other`` sees to what is registered beside connections; ``ended`` is told why one is."""
         self.selector = selectors.DefaultSelector()
-        self.lost = 0  # packets that were dropped, or for nobody
+        self._lost = 0  # packets that were for nobody, or dropped by who is gone
         self._other = other
         self._ended = ended
         self._way = way
@@ -52,6 +52,11 @@ class Connections:
 
     def __repr__(self) -> str:
         return f"Connections({list(self._by_peer.values())}, {self.lost} packets lost)"
+
+    @property
+    def lost(self) -> int:
+        """Packets that were dropped, or for nobody."""
+        return self._lost + sum(each.queue.dropped for each in self._by_peer.values())
 
     def __len__(self) -> int:
         return len(self._by_peer)
@@ -120,12 +125,10 @@ class Connections:
         """Send a packet, or let it wait; to who is not there it is lost."""
         connection = self._by_peer.get(peer)
         if connection is None:
-            self.lost += 1
+            self._lost += 1
             return
-        before = connection.queue.dropped
         connection.queue.put(data, now=monotonic())
         reason = None if connection.is_blocked else self._flush(connection)
-        self.lost += connection.queue.dropped - before
         if reason is not None:
             self._ended(connection, reason)
 
@@ -141,6 +144,7 @@ class Connections:
     def end(self, connection: Connection, words: str | None) -> None:
         """Give a connection back; ``words`` tell of it."""
         del self._by_peer[connection.peer]
+        self._lost += connection.queue.dropped
         self.selector.unregister(connection.socket)
         connection.socket.close()
         if words is not None:

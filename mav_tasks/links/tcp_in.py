@@ -9,7 +9,7 @@ from mav_tasks.links.tcp import Connection, Connections, reason_of, resolve
 from mav_tasks.links.url import LinkUrl
 from mav_tasks.links.way_out import WayOut
 
-MAX_CONNECTIONS = 64  # one more is closed as soon as it is there
+BACKLOG = 64  # connections that the system keeps until they are accepted
 
 
 class TcpInLink:
@@ -27,6 +27,7 @@ class TcpInLink:
             self._socket = _listen(family, address)
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
+        self._most = way.connections
         self._connections = Connections(way, other=self._accept, ended=self._end)
         self._is_accepting = False
         self._accept_again()
@@ -82,7 +83,7 @@ class TcpInLink:
         peer = (str(address[0]), int(address[1]))
         try:
             # One from the very place of another that has not ended yet comes again.
-            if len(self._connections) >= MAX_CONNECTIONS or peer in self._connections:
+            if len(self._connections) >= self._most or peer in self._connections:
                 raise ConnectionRefusedError
             self._connections.add(sock, peer, f"{peer[0]}:{peer[1]} has come")
         except OSError:
@@ -104,7 +105,7 @@ def _listen(family: socket.AddressFamily, address: tuple[str, int]) -> socket.so
         sock.setblocking(False)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind(address)
-        sock.listen(MAX_CONNECTIONS)
+        sock.listen(BACKLOG)
     except OSError:
         sock.close()
         raise

@@ -15,7 +15,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.kit.bridges import Bridge, SerialFar, TcpFar, bridge
+from tests.kit.bridges import Bridge, DiallingFar, SerialFar, TcpFar, bridge
 from tests.kit.lines import slow_line
 from tests.kit.processes import (
     Stand,
@@ -221,7 +221,7 @@ def test_a_rover_is_driven_stops_when_its_link_is_cut_and_goes_on_when_it_is_bac
 def test_one_that_reads_nothing_delays_no_answer_and_no_setpoint(tmp_path: Path) -> None:
     (port,) = free_tcp_ports(1)
     bridges: list[Bridge] = []
-    way = over(TcpFar, bridges)
+    way = over(DiallingFar, bridges)
     with (
         stand(tmp_path, "--client", f"tcpin:{HOST}:{port}", way=way) as running,
         reads_nothing(port) as deaf,

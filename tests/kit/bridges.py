@@ -11,6 +11,7 @@ from time import monotonic
 from typing import Protocol
 
 from tests.kit.lines import Device
+from tests.kit.processes import free_tcp_ports
 
 LOOPBACK = "127.0.0.1"
 TICK = 0.05  # s, to look whether the other end has changed
@@ -71,6 +72,36 @@ class TcpFar:
         """Listen again."""
         self._listening = socket.create_server((LOOPBACK, self._port))
         self._port = self._listening.getsockname()[1]
+
+
+class DiallingFar:
+    """Dials the server, as a rover with a modem of its own does."""
+
+    def __init__(self) -> None:
+        (self._port,) = free_tcp_ports(1)
+        self._socket: socket.socket | None = None
+
+    @property
+    def url(self) -> str:
+        """Where the server is to listen."""
+        return f"tcpin:{LOOPBACK}:{self._port}"
+
+    def descriptor(self) -> int | None:
+        """Give the connection, if the server is there."""
+        if self._socket is None:
+            with suppress(OSError):
+                self._socket = socket.create_connection((LOOPBACK, self._port), 1.0)
+                self._socket.setblocking(False)
+        return None if self._socket is None else self._socket.fileno()
+
+    def cut(self) -> None:
+        """Hang up."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def mend(self) -> None:
+        """Nothing is to be done: it dials again."""
 
 
 class SerialFar:

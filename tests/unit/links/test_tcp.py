@@ -5,18 +5,19 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 import pytest
 
 from mav_tasks.errors import LinkOpenError
-from mav_tasks.links import tcp_in, tcp_out
+from mav_tasks.links import tcp_out
 from mav_tasks.links.attempts import RETRY
 from mav_tasks.links.base import Peer, PeerChange, PeerState, StreamLink
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.tcp_in import TcpInLink
 from mav_tasks.links.tcp_out import TcpOutLink
 from mav_tasks.links.url import LinkUrl
-from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
+from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES, WayOut
 
 HOST = "127.0.0.1"
 LIMIT = 10.0  # s
@@ -177,8 +178,8 @@ def test_a_piece_is_no_longer_than_a_packet_and_all_are_served_in_turn(
         each.close()
 
 
-def test_connections_are_bounded(listening: TcpInLink, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tcp_in, "MAX_CONNECTIONS", 3)
+def test_connections_are_bounded() -> None:
+    listening = TcpInLink(LinkUrl("tcpin", HOST, 0), way=replace(TO_CLIENTS, connections=3))
     watched, clients = up(listening, 3)
     with dial(listening) as late:
         watched.until(lambda: listening.refused == 1)
@@ -190,6 +191,21 @@ def test_connections_are_bounded(listening: TcpInLink, monkeypatch: pytest.Monke
     watched.until(lambda: watched.states.count(PeerState.UP) == 4)
     for client in clients:
         client.close()
+    listening.close()
+
+
+@pytest.mark.parametrize("way", [TO_VEHICLES, TO_CLIENTS])
+def test_a_connection_sends_at_once_and_notices_when_nobody_is_there(way: WayOut) -> None:
+    listening = TcpInLink(LinkUrl("tcpin", HOST, 0), way=way)
+    _, (client,) = up(listening, 1)
+    (connection,) = listening._connections._by_peer.values()
+    option = connection.socket.getsockopt
+    assert option(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    assert option(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        assert option(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == way.give_up * 1e3
+    client.close()
+    listening.close()
 
 
 def test_without_descriptors_it_waits_for_some(
