@@ -72,6 +72,8 @@ def serve(
         restored = journal.load() if isinstance(journal, SqliteStore) else None
         for link in client_links:
             _say(f"clients on {link.name}")
+        if pushed and pushing is None:
+            _say("nobody is spoken to unasked: none of the links for clients is UDP")
         for link in vehicle_links:
             _say(f"vehicles on {link.name}, waiting for the first heartbeat")
         _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")

@@ -102,11 +102,12 @@ def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
     (port,) = free_tcp_ports(1)
     serial, tcp = f"serial:{tmp_path / 'ttyLater'}:57600", f"tcp:127.0.0.1:{port}"
     with process(
-        *("-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:"),
+        *("-m", "mav_tasks.cli", "serve", "--store", ":memory:"),
         *("--client", serial, "--vehicle", tcp),
         folder=tmp_path,
         name="server",
     ) as server:
+        server.wait_for("nobody is spoken to unasked: none of the links for clients is UDP")
         server.wait_for(re.escape(f"link {serial} is not there yet: No such file"))
         server.wait_for(re.escape(f"link {tcp} is not there yet: Connection refused"))
         with socket.create_server(("127.0.0.1", port)) as rover:
