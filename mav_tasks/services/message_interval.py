@@ -111,9 +111,12 @@ class Thinner:
         if message_id not in STREAMED:
             return True
         interval = self._intervals.get((system_id, message_id), self._default)
-        if interval is None or self.stretch.is_congested:
+        if interval is None:
             return False
-        interval = self._stretched(interval, message_id, now=now)
+        if not self.stretch.is_idle:
+            if self.stretch.is_congested:
+                return False
+            interval = self._stretched(interval, message_id, now=now)
         key = (system_id, component_id, message_id)
         last = self._last.get(key)
         if last is not None and now - last < SLACK * interval:

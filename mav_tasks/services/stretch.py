@@ -20,6 +20,7 @@ class Stretch:
         self._factor = 1.0
         self._at = 0.0  # when the factor was that
         self.is_congested = False
+        self.is_idle = True  # there was no congestion lately: looked at for each packet
 
     def __repr__(self) -> str:
         return f"Stretch({self._factor:.2f}, congested={self.is_congested})"
@@ -29,13 +30,13 @@ class Stretch:
         self._factor = self.factor(now=now)
         if is_congested and not self.is_congested:
             self._factor = min(self._factor * WIDEN, LONGEST)
-        self._at, self.is_congested = now, is_congested
+        self._at, self.is_congested, self.is_idle = now, is_congested, False
 
     def factor(self, *, now: float) -> float:
         """Give the factor, 1 or more."""
-        if self._factor == 1.0 and not self.is_congested:
-            return 1.0
         passed = now - self._at
         if self.is_congested:
             return min(self._factor * exp(log(WIDEN) * min(passed / AGAIN, 100.0)), LONGEST)
-        return max(1.0, self._factor * exp(-RELAX * passed))
+        factor = max(1.0, self._factor * exp(-RELAX * passed))
+        self.is_idle = factor == 1.0
+        return factor
