@@ -8,6 +8,7 @@ next upload. What an item is worth says ``check``; a plan counts only when it is
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.mavlink import messages as m
@@ -21,6 +22,9 @@ STEP_BACK = 3  # from so many requests for an item on each second one is for an 
 QUIET = 0.3  # s that a packet is on its way at the most
 LATE = 2 * QUIET  # s after an upload has ended, in which items may still come that it asked for
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
+ANOTHER_TRY = (
+    10.0  # s after an upload that came to nothing, in which the next one is meant the same
+)
 CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
 
 #: mission type, number, item, count -> why not, or None
@@ -36,7 +40,7 @@ class Sender(NamedTuple):
 
 
 class Upload(NamedTuple):
-    """A whole plan, to be decided about."""
+    """A whole plan, to be decided about; ``begun_at`` is of the first try, if some failed."""
 
     sender: Sender
     mission_type: int
@@ -82,6 +86,8 @@ class MissionReceiver:
         self._session: _Session | None = None
         self._answered: _Answered | None = None
         self._ended: dict[tuple[Sender, int], float] = {}  # by mission type: when the last one did
+        #: by mission type, of tries that came to nothing: when the first began, the last ended
+        self._in_vain: dict[tuple[Sender, int], tuple[float, float]] = {}
         self._outgoing: list[ToClient] = []
         self._uploads: list[Upload] = []
 
@@ -116,11 +122,13 @@ class MissionReceiver:
         # Also a count that only seems to come again may be of another plan of that length: never
         # items of one upload with those of another.
         if session is not None:
-            self._note_end(session, now=now)
+            self._note_in_vain(session, now=now)
+        began, ended = self._in_vain.get((sender, kind), (now, -inf))
+        begun_at = began if now - ended <= ANOTHER_TRY else now
         quiet_until = self._quiet_until(sender, kind, now=now)
         give_up_at = now + GIVE_UP
         self._session = _Session(
-            sender, kind, message.count, now, quiet_until, give_up_at, quiet_until
+            sender, kind, message.count, begun_at, quiet_until, give_up_at, quiet_until
         )
         self._answered = None
         self._advance(now=now)
@@ -159,7 +167,7 @@ class MissionReceiver:
             return
         if (session.sender, session.mission_type) == (sender, message.mission_type):
             self._session = None
-            self._note_end(session, now=now)
+            self._note_in_vain(session, now=now)
 
     def finish(self, result: MavMissionResult, *, opaque_id: int, now: float) -> None:
         """A whole plan has been decided about: tell the client."""
@@ -212,6 +220,14 @@ class MissionReceiver:
         self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}
         self._ended[session.sender, session.mission_type] = now
 
+    def _note_in_vain(self, session: _Session, *, now: float) -> None:
+        """An upload came to nothing: its client will try again, and mean what it meant."""
+        self._note_end(session, now=now)
+        self._in_vain = {
+            key: tries for key, tries in self._in_vain.items() if now - tries[1] <= ANOTHER_TRY
+        }
+        self._in_vain[session.sender, session.mission_type] = session.begun_at, now
+
     def _quiet_until(self, sender: Sender, kind: int, *, now: float) -> float:
         """Give until when items may come that were sent before the count that came now."""
         ended_at = self._ended.get((sender, kind))
@@ -223,7 +239,9 @@ class MissionReceiver:
         session = self._session
         assert session is not None, "an upload is under way"
         self._session = None
-        self._note_end(session, now=now)
+        self._note_in_vain(session, now=now)
+        if result == MavMissionResult.ACCEPTED:
+            del self._in_vain[session.sender, session.mission_type]
         ack = self._send_ack(session.sender, session.mission_type, result, opaque_id=opaque_id)
         self._answered = _Answered(
             session.sender, session.mission_type, last, len(session.items), ack, now

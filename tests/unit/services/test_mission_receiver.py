@@ -213,6 +213,43 @@ def test_an_upload_begun_again_takes_no_item_of_the_one_before() -> None:
     assert [i.x - 470000000 for i in rig.uploads[0].items] == [2, 3]
 
 
+@pytest.mark.parametrize(("pause", "is_same"), [(1.0, True), (9.9, True), (10.1, False)])
+@pytest.mark.parametrize("how", ["silent", "given up", "refused"])
+def test_a_try_soon_after_one_in_vain_counts_from_the_first(
+    how: str, pause: float, is_same: bool
+) -> None:
+    """By that it is known whether the plan is one that came before and was not heard of."""
+    rig = Rig(refused=16 if how == "refused" else None).count(2)
+    if how == "silent":
+        rig.run(GIVE_UP)
+    elif how == "given up":
+        rig.cancel()
+    else:
+        rig.item(0)
+    rig.refused = None
+    rig.run(rig.now + pause)
+    rig.uploaded(1)
+    assert rig.uploads[0].begun_at == (0.0 if is_same else rig.now)
+
+
+def test_a_count_that_comes_again_counts_from_the_first() -> None:
+    rig = Rig().count(2)
+    rig.run(1.0)
+    rig.count(1)
+    rig.run(1.0 + QUIET)
+    rig.item(0)
+    rig.said()
+    assert rig.uploads[0].begun_at == 0.0
+
+
+def test_an_upload_after_one_that_was_accepted_counts_from_itself() -> None:
+    rig = Rig().uploaded(2)
+    rig.receiver.finish(Result.ACCEPTED, opaque_id=7, now=0.0)
+    rig.run(1.0)
+    rig.uploaded(2)
+    assert [upload.begun_at for upload in rig.uploads] == [0.0, 1.0]
+
+
 def test_after_a_client_has_given_up_nothing_more_is_asked() -> None:
     rig = Rig().count(2)
     rig.item(0)
