@@ -153,7 +153,6 @@ class Commands:
                     self._take_in(asked, now=now)
                     return
                 case number if self._control.handles(number):
-                    asked.client.uses_dialect = asked.client.uses_dialect or number in OUR_COMMANDS
                     asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
                     return
                 case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
@@ -278,7 +277,6 @@ class Commands:
         if not targets and not unheard:
             return
         killed = [vehicle.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
-        client.uses_dialect = True
         silent = [vehicle.system_id for vehicle in targets if not vehicle.is_heard(now=now)]
         silent += unheard
         component = targets[0].server_component if targets else MavComponent.ONBOARD_COMPUTER

@@ -6,7 +6,7 @@ from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import OUR_COMMANDS, wish_of
+from mav_tasks.engine.goals import wish_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -64,8 +64,6 @@ class Submissions:
     def submit(self, asked: Asked, *, now: float) -> None:
         """Take in the task that a command asks for; Rejection says why not."""
         command, vehicle = asked.command, asked.vehicle
-        # a stock ground station cannot read TASK_STATUS: to it that is a packet lost
-        asked.client.uses_dialect |= command.command in OUR_COMMANDS
         submitter = asked.client.submitter(asked.packet.source)
         wish = wish_of(
             command,
@@ -74,6 +72,8 @@ class Submissions:
             now=now,
             priority=self._priority_of(submitter),
         )
+        # a stock client cannot read TASK_STATUS, and counts it as a packet lost; none sets a nonce
+        asked.client.uses_dialect |= bool(wish.marks.nonce)
         goal = as_driven(wish.goal, turns_on_spot=vehicle.persona.turns_on_spot)
         self._check_reach(vehicle, goal)
         draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)

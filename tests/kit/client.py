@@ -150,6 +150,8 @@ class FakeClient:
     component_id: int = 190
     server: str = CLIENT_LINK
     heartbeats: bool = True
+    #: says so as soon as it hears of a rover: TASK_STATUS goes to no other
+    reads_dialect: bool = True
     received: list[Received] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -159,6 +161,8 @@ class FakeClient:
         self._next_heartbeat = self.net.now
         self._under_way: list[Sent] = []
         self._streams: list[_Stream] = []
+        self._has_said_so = False
+        self._is_owed_ack = False  # of that
         self.acks: list[Message] = []
         self.roles: list[Role] = []
 
@@ -311,6 +315,9 @@ class FakeClient:
             self.received.append(packet)
             if packet.message_id == ACK:
                 self._take_ack(self.decoded(packet), now)
+            elif self.reads_dialect and not self._has_said_so and packet.source[1] == 1:
+                self._has_said_so = self._is_owed_ack = True
+                self.send(command_long(SET_INTERVAL, TASK_STATUS, -1, target=packet.source))
             for role in list(self.roles):
                 role.take(packet, now=now)
         for role in list(self.roles):
@@ -331,6 +338,9 @@ class FakeClient:
         return sent
 
     def _take_ack(self, message: Message, now: float) -> None:
+        if self._is_owed_ack and message.command == SET_INTERVAL:
+            self._is_owed_ack = False
+            return
         self.acks.append(message)
         for sent in self._under_way:
             if sent.message.command == message.command:

@@ -18,8 +18,7 @@ What is good to know of release 1.8.75, found by trying and in its source:
 - A mode is announced every 2 s at the most; the prompt shows each one, but is written only along
   with the next line. An empty line brings it forth.
 - A message that its dialects lack comes from component 0 of system 0 as pymavlink sees it, so each
-  leaves a hole in the numbers of who sent it, and is counted as lost. Who has submitted a task gets
-  messages of our dialect.
+  leaves a hole in the numbers of who sent it, and is counted as lost.
 - A rover that does not call its fence healthy makes it say "fence breach", though there is none.
 - A rover that restarts after half a minute or more makes it say "Time has wrapped".
 - ``exit`` needs an end of file in place of the next line, and its exit code is 1 however it ends.

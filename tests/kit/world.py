@@ -110,9 +110,22 @@ class World(VirtualWorld):
         """Where the first rover really is."""
         return self.rover.truth
 
-    def add_client(self, name: str, *, system_id: int = 255, component_id: int = 190) -> FakeClient:
+    def add_client(
+        self,
+        name: str,
+        *,
+        system_id: int = 255,
+        component_id: int = 190,
+        reads_dialect: bool = True,
+    ) -> FakeClient:
         """Let another client take part."""
-        client = FakeClient(self.net, name, system_id=system_id, component_id=component_id)
+        client = FakeClient(
+            self.net,
+            name,
+            system_id=system_id,
+            component_id=component_id,
+            reads_dialect=reads_dialect,
+        )
         self.join(client)
         return client
 

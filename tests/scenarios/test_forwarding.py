@@ -18,10 +18,13 @@ from tests.kit.client import (
     GUIDED,
     HOLD,
     IDS,
+    MOVE,
     REQUEST,
     RTL,
     SET_INTERVAL,
     SET_MODE,
+    STOP,
+    TASK_QUEUE_STATUS,
     TASK_STATUS,
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
@@ -34,6 +37,7 @@ from tests.scenarios.conftest import MakeWorld
 ATTITUDE, POSITION = 30, 32
 DATA_STREAM, PARAM_VALUE = 66, 22
 OUR_MESSAGES = range(54000, 54050)
+CLEAR = 54011
 
 
 ALL_STREAMS, POSITIONS, ATTITUDES = 0, 6, 10
@@ -381,7 +385,7 @@ def test_a_status_is_pushed_to_who_submitted_and_to_nobody_else(world: World) ->
 
 
 def test_messages_of_our_dialect_go_only_to_clients_that_use_it(world: World) -> None:
-    stock = world.add_client("stock")
+    stock = world.add_client("stock", reads_dialect=False)
     world.client.command(SET_INTERVAL, TASK_STATUS, 100_000)
     world.client.move(0.5)
     world.until_idle(tasks=1)
@@ -390,15 +394,42 @@ def test_messages_of_our_dialect_go_only_to_clients_that_use_it(world: World) ->
 
 
 @pytest.mark.parametrize(
-    ("command", "params"), [(192, (-1, 1, 0, nan, -35.36325, 149.16524)), (SET_MODE, (1, RTL))]
+    ("command", "params"),
+    [
+        (192, (-1, 1, 0, nan, -35.36325, 149.16524)),
+        (SET_MODE, (1, RTL)),
+        (MOVE, (1.0,)),
+        (STOP, (0.0,)),
+        (CLEAR, (0.0,)),
+    ],
 )
-def test_standard_commands_do_not_make_a_client_use_our_dialect(
+def test_what_a_stock_client_may_send_brings_it_nothing_that_it_cannot_read(
     world: World, command: int, params: tuple[float, ...]
 ) -> None:
-    sent = world.client.command(command, *params, target=(1, 1))
+    """To its parser a message of our dialect is a packet lost."""
+    stock = world.add_client("stock", reads_dialect=False)
+    world.run(1.2)
+    sent = stock.command(command, *params, target=(1, 1))
     world.run(3)
-    assert sent.task_id == 1
-    assert not [p for p in world.client.received if p.message_id in OUR_MESSAGES]
+    assert sent.result == ACCEPTED
+    assert not [p for p in stock.received if p.message_id in OUR_MESSAGES]
+
+
+@pytest.mark.parametrize("how", ["nonce", "asked", "streamed", "queue"])
+def test_who_knows_our_dialect_is_told_of_its_tasks(world: World, how: str) -> None:
+    client = world.add_client("stock", reads_dialect=False)
+    world.run(1.2)
+    sent = client.move(0.5, nonce=7 if how == "nonce" else 0)
+    world.run(0.1)
+    if how == "asked":
+        client.request_status(sent.task_id)
+    elif how == "streamed":
+        client.command(SET_INTERVAL, TASK_STATUS, 100_000)
+    elif how == "queue":
+        client.command(REQUEST, TASK_QUEUE_STATUS)
+    world.until_idle(tasks=1)
+    world.run(0.1)
+    assert client.statuses(1)[-1].state == S.COMPLETED
 
 
 def test_a_stream_of_statuses_has_the_rate_that_was_asked_for(world: World) -> None:

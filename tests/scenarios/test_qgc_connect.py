@@ -4,8 +4,6 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
-import pytest
-
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
 from mav_tasks.in_memory import CLIENT_LINK
 from rover_sim.personas import Persona
@@ -199,7 +197,6 @@ def test_two_stations_get_each_their_own_answers(
         assert set(station.qgc.lost) <= {TASK_SERVER}
 
 
-@pytest.mark.xfail(reason="TASK_STATUS goes to whoever sends 54000, readable to it or not")
 def test_a_task_command_as_an_action_shows_no_loss(make_world: MakeWorld) -> None:
     world = make_world()
     party = join(world, V4)
@@ -221,7 +218,6 @@ def test_the_servers_own_parameters_are_a_component_of_their_own(
     party.check()
 
 
-@pytest.mark.xfail(reason="the simulated PX4 does not tell its modes yet")
 def test_the_modes_of_px4_are_told_one_by_one(make_world: MakeWorld) -> None:
     world = make_world(persona=PROMPT_PX4)
     party = join(world, MASTER)
