@@ -237,7 +237,7 @@ class Engine:
                 if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
                     self._publisher.withhold(packet)
                 else:
-                    self._gcs.forward(vehicle.shown_mode.applied(packet, now=now), now=now)
+                    self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message

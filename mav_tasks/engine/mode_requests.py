@@ -152,7 +152,7 @@ class ModeRequests:
         if vehicle.control.is_engaged or vehicle.control.we_armed:
             return  # armed by ourselves, for a task
         marker = vehicle.start_mark.take()
-        vehicle.shown_mode.forget()
+        vehicle.shown.forget()
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
@@ -183,8 +183,8 @@ class ModeRequests:
     def _show(self, vehicle: Vehicle, mode: int, *, now: float) -> None:
         """Let clients see a mode at once: who sends SET_MODE is told in no other way."""
         lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
-        vehicle.shown_mode.show(mode, until=now + lasts)
-        heartbeat = vehicle.shown_mode.in_message(vehicle.heartbeat, now=now)
+        vehicle.shown.show(mode, until=now + lasts)
+        heartbeat = vehicle.shown.in_message(vehicle.heartbeat, now=now)
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs:
             if client.knows(vehicle.system_id):

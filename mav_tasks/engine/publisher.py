@@ -32,7 +32,8 @@ class Publisher:
             if client.knows(vehicle.system_id) or not vehicle.is_heard(now=now):
                 continue  # a silent one must not look alive
             if vehicle.last_heartbeat is not None:
-                client.introduce(vehicle.last_heartbeat, last_seq=vehicle.last_seq)
+                heartbeat = vehicle.shown.applied(vehicle.last_heartbeat, now=now)
+                client.introduce(heartbeat, last_seq=vehicle.last_seq)
 
     def withhold(self, packet: Packet) -> None:
         """Note for every client that a packet of a vehicle is not passed on."""

@@ -15,7 +15,7 @@ from mav_tasks.engine.hold_before import HoldBefore
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
-from mav_tasks.engine.shown_mode import ShownMode
+from mav_tasks.engine.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.start_mark import StartMark
 from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.engine.whereabouts import Whereabouts
@@ -97,7 +97,7 @@ class Vehicle:
         self.start_mark = StartMark()
         self._own_items = 0  # of a mission on board
         #: what its heartbeats say towards clients
-        self.shown_mode = ShownMode()
+        self.shown = ShownHeartbeat()
         self.components = Components(system_id, first=settings.identity.component_id)
 
     def __repr__(self) -> str:
@@ -378,7 +378,7 @@ class Vehicle:
     def forget_start(self) -> None:
         """The mission that was to begin when it is armed is another one now, or is not wanted."""
         self.start_mark.remove()
-        self.shown_mode.forget()
+        self.shown.forget()
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""

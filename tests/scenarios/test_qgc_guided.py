@@ -106,10 +106,7 @@ class TestAlsoWhileDriving:
 
 @pytest.mark.parametrize(
     "persona",
-    [
-        pytest.param(PROMPT, marks=pytest.mark.xfail(reason="in HOLD it says it is on standby")),
-        PROMPT_PX4,
-    ],
+    [PROMPT, PROMPT_PX4],
     ids=lambda p: p.name,
 )
 def test_a_rover_that_has_driven_may_be_sent_to_a_place(
@@ -118,6 +115,8 @@ def test_a_rover_that_has_driven_may_be_sent_to_a_place(
     """It stands armed in HOLD, and nothing of it but its status tells that from having landed."""
     world = make_world(persona=persona)
     party = join(world, V4)
+    party.operator.set_mode(persona.modes.numbers[Mode.HOLD])
+    world.run(1.2)
     party.operator.arm()
     world.run(1.2)
     party.operator.action(MOVE, 0.3, component=191)

@@ -1,0 +1,67 @@
+"""The heartbeats of one vehicle as clients are shown them: its own, but for two things.
+
+For a moment another mode: a ground station that asks for a mode waits until a heartbeat shows it,
+and what the server does itself instead, a mission or a return, the vehicle would never show. And
+armed is active: an ArduPilot that stands armed in HOLD says that it is on standby, and ground
+stations then hide what an operator may have it do next.
+"""
+
+from math import inf
+
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.enums import MavModeFlag, MavState
+from mav_tasks.mavlink.messages import Heartbeat
+from mav_tasks.mavlink.packet import Packet, with_payload
+
+#: where they are in HEARTBEAT's payload
+CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
+BYTES = 4  # of the custom_mode
+
+
+class ShownHeartbeat:
+    """What the heartbeats of one vehicle say towards clients."""
+
+    def __init__(self) -> None:
+        self._mode = 0
+        self._until = -inf
+
+    def __repr__(self) -> str:
+        return f"ShownHeartbeat({self._mode}, until={self._until:.2f})"
+
+    def show(self, mode: int, *, until: float) -> None:
+        """Show a custom_mode for a while."""
+        self._mode, self._until = mode, until
+
+    def forget(self) -> None:
+        """Show the vehicle's own again."""
+        self._until = -inf
+
+    def in_message(self, heartbeat: Heartbeat, *, now: float) -> Heartbeat:
+        """Give a copy of a heartbeat's message as clients are to see it."""
+        mode = self._mode if now < self._until else heartbeat.custom_mode
+        return Heartbeat(
+            type=heartbeat.type,
+            autopilot=heartbeat.autopilot,
+            base_mode=heartbeat.base_mode,
+            custom_mode=mode,
+            system_status=_status(heartbeat.base_mode, heartbeat.system_status),
+            mavlink_version=heartbeat.mavlink_version,
+        )
+
+    def applied(self, packet: Packet, *, now: float) -> Packet:
+        """Give a packet of the vehicle as clients are to see it."""
+        if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
+            return packet
+        payload = packet.payload
+        if len(payload) > SYSTEM_STATUS:
+            status = _status(payload[BASE_MODE], payload[SYSTEM_STATUS])
+            if status != payload[SYSTEM_STATUS]:
+                packet = with_payload(packet, SYSTEM_STATUS, bytes((status,)))
+        if now < self._until:
+            packet = with_payload(packet, CUSTOM_MODE, self._mode.to_bytes(BYTES, "little"))
+        return packet
+
+
+def _status(base_mode: int, status: int) -> int:
+    is_armed = base_mode & MavModeFlag.SAFETY_ARMED
+    return MavState.ACTIVE if is_armed and status == MavState.STANDBY else status
