@@ -13,7 +13,7 @@ from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import Goal, GoTo, describe
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TaskReason, words_of
 from mav_tasks.tasks.recollection import Known, Recollection, Rule
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
@@ -199,6 +199,8 @@ class Submissions:
             each.answer(MavResult.ACCEPTED, task.id)
             _note(each, task.id)
         words = f"Task {task.id} queued: {describe(task.goal)}"
+        if asked.vehicle.tasks.paused:  # who queued it may not be who paused
+            words += f"; the queue is paused: {words_of(asked.vehicle.tasks.paused)}"
         self._gcs.tell(words, MavSeverity.INFO, asked.vehicle.server_address, now=now)
 
     def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:

@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import REQUEST, TASK_STATUS
 from tests.kit.world import World
@@ -70,3 +72,16 @@ def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -
     assert quiet.statuses(1)[-1].state == S.COMPLETED
     world.run(90)
     assert not any("quiet" in who for who in world.server.engine.snapshot(now=world.now).clients)
+
+
+@pytest.mark.parametrize(("how", "why"), [("pause", "operator"), ("stop", "stopped")])
+def test_who_queues_behind_a_pause_is_told_that_nothing_runs(
+    world: World, how: str, why: str
+) -> None:
+    getattr(world.client, how)()
+    world.run(1)
+    other = world.add_client("other")
+    world.run(1.2)
+    other.move(1)
+    world.run(0.2)
+    assert f"Task 1 queued: move 1 m; the queue is paused: {why}" in other.texts()
