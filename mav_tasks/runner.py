@@ -9,6 +9,7 @@ import logging
 import signal
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from math import inf
 
 from mav_tasks.engine.engine import Engine
@@ -90,7 +91,8 @@ class Pump:
     def send_last_words(self) -> None:
         """Stop every vehicle that is being driven, without asking the engine anything."""
         for outgoing in self.engine.last_words:
-            self._send(outgoing)
+            with suppress(Exception):  # what fails for one must not keep it from the next
+                self._send(outgoing)
 
     def _note_outcome(self, outcome: Outcome) -> None:
         if isinstance(outcome, NotKept):
@@ -236,8 +238,11 @@ class Runner:
     def _guarded(self, item: Input | None) -> None:
         """One turn of the pump, for an input or (None) for the time.
 
-        If the engine fails, stop the vehicles and end: no zombie.
+        If the engine fails, stop the vehicles and end: no zombie. What comes after that, or after
+        an end at once, is not taken in: a setpoint must not follow the last words.
         """
+        if self._over is not None and self._over.done():
+            return
         try:
             self._turn(item)
         except Exception:  # whatever our own mistake is, a vehicle must not drive on for it

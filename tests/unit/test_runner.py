@@ -24,7 +24,7 @@ from mav_tasks.engine.inputs import (
     WallClock,
 )
 from mav_tasks.links.base import PeerChange, PeerState
-from mav_tasks.runner import Pump, Runner
+from mav_tasks.runner import EXIT_FAILED, Pump, Runner
 from mav_tasks.serve import open_store
 from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore
@@ -174,6 +174,7 @@ class FakeStream:
         self.told: list[PeerChange] = []  # before anything is read
         self.read: list[tuple[list[PeerChange], bytes]] = []  # each with what reading shows
         self.tends = asyncio.Queue[None]()
+        self.sent: list[bytes] = []
         self._read, self._write = os.pipe()
 
     def comes(self, changes: list[PeerChange], piece: bytes) -> None:
@@ -190,7 +191,7 @@ class FakeStream:
         return [("peer", piece)]
 
     def send(self, peer: object, data: bytes) -> None:
-        """Nobody is there."""
+        self.sent.append(data)
 
     def take_changes(self) -> list[PeerChange]:
         told, self.told = self.told, []
@@ -248,3 +249,52 @@ def test_the_engine_is_told_who_comes_before_its_words_and_who_goes_after_them(
     words = ["link stream is up", "link stream lost: closed"]
     words += ["link stream lost: closed", "link stream is up"]
     assert [record.getMessage() for record in caplog.records] == words
+
+
+class Broken(Recorder):
+    """An engine that fails when somebody comes, with a setpoint not yet sent."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.last_words = tuple(Outgoing("stream", "peer", word) for word in (b"zero", b"hold"))
+
+    def handle(self, item: object, *, now: float) -> None:
+        super().handle(item, now=now)
+        if isinstance(item, PeerChanged) and item.up:
+            self._packets.append(Outgoing("stream", "peer", b"faster"))
+            raise ZeroDivisionError
+
+    def take_packets(self) -> list[Outgoing]:
+        packets, self._packets = self._packets, []
+        return packets
+
+    def handle_deadline(self, *, now: float) -> None:
+        self._packets.append(Outgoing("stream", "peer", b"on"))
+
+
+def run_broken(link: FakeStream) -> int:
+    async def run() -> int:
+        runner = Runner(Broken(), MemoryStore(), clients=[], vehicles=[link])
+        link.comes([PeerChange("peer", PeerState.UP), PeerChange("peer", PeerState.DOWN)], b"word")
+        return await asyncio.wait_for(runner.run(), 10)
+
+    return asyncio.run(run())
+
+
+def test_after_the_last_words_of_a_failed_engine_nothing_of_it_is_sent() -> None:
+    link = FakeStream()
+    assert run_broken(link) == EXIT_FAILED
+    after = link.sent[link.sent.index(b"zero") :]
+    assert after == [b"zero", b"hold"]
+
+
+def test_a_failed_engine_ends_the_server_even_if_its_last_words_fail_too() -> None:
+    class Mute(FakeStream):
+        def send(self, peer: object, data: bytes) -> None:
+            super().send(peer, data)
+            if data == b"zero":
+                raise ValueError
+
+    link = Mute()
+    assert run_broken(link) == EXIT_FAILED
+    assert link.sent[-1] == b"hold"
