@@ -71,8 +71,9 @@ class Connections:
     def add(self, sock: socket.socket, peer: Peer, words: str) -> None:
         """Take a connection that stands into use. OSError: it does no more."""
         prepare(sock, self._way)
-        connection = self._by_peer[peer] = Connection(sock, peer, self._way)
+        connection = Connection(sock, peer, self._way)
         self.selector.register(sock, selectors.EVENT_READ, connection)
+        self._by_peer[peer] = connection
         self._changes.append(PeerChange(peer, PeerState.UP, words))
 
     def take_changes(self) -> list[PeerChange]:
@@ -85,17 +86,23 @@ class Connections:
         self._changes.append(change)
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
+        """Give up to ``limit`` pieces, of each connection one after the other; send what waits.
+
+        Whoever has ended is the last news: the next to come may come from the very same place.
+        """
         received: list[tuple[Peer, bytes]] = []
         for _ in range(limit):
             ready = self.selector.select(0) if len(received) < limit else ()
-            if not ready:
-                break
+            before = len(self)
             for key, events in ready:
-                if not isinstance(key.data, Connection):
-                    self._other()
-                elif (reason := self._serve(key.data, events, received)) is not None:
+                if isinstance(key.data, Connection) and (
+                    reason := self._serve(key.data, events, received)
+                ):
                     self._ended(key.data, reason)
+            if not ready or len(self) < before:
+                break
+            if not all(isinstance(key.data, Connection) for key, _ in ready):
+                self._other()
         return received
 
     def _serve(

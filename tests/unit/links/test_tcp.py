@@ -178,6 +178,28 @@ def test_a_piece_is_no_longer_than_a_packet_and_all_are_served_in_turn(
         each.close()
 
 
+def test_one_that_comes_again_from_the_same_place_does_so_after_it_has_gone(
+    listening: TcpInLink,
+) -> None:
+    """As a box with a fixed port does, all of it before the link is read again."""
+    watched, (client,) = up(listening, 1)
+    peer = client.getsockname()
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    client.close()
+    with socket.socket() as again:
+        again.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        again.bind(peer)
+        again.connect((HOST, listening.port))
+        again.sendall(b"again")
+        end, told = time.monotonic() + LIMIT, list[list[PeerState]]()
+        while watched.heard(peer) != b"again" and time.monotonic() < end:
+            select.select([listening.fileno()], [], [], LIMIT)
+            watched.pieces += listening.receive(64)
+            told.append([change.state for change in listening.take_changes()])
+    # the engine is told of one reading's comings before its goings
+    assert told[:2] == [[PeerState.DOWN], [PeerState.UP]]
+
+
 def test_connections_are_bounded() -> None:
     listening = TcpInLink(LinkUrl("tcpin", HOST, 0), way=replace(TO_CLIENTS, connections=3))
     watched, clients = up(listening, 3)
