@@ -40,6 +40,11 @@ class Authority:
         """Somebody else has a hand on the vehicle: arm it no more."""
         self.may_arm = False
 
+    def moved(self, *, may_arm: bool) -> None:
+        """The vehicle is at another place: what may be armed there is another question."""
+        self._arming_allowed = may_arm
+        self.may_arm = self.may_arm and may_arm
+
     def restore_arming(self) -> None:
         """A person said that all is well."""
         self.may_arm = self._arming_allowed

@@ -78,6 +78,7 @@ class Vehicle:
         self.control = self.requests.control
         self.last_heartbeat: Packet | None = None
         self.last_seq = 0  # of the autopilot's packets
+        self._number = 0  # the same, counted on beyond 255
         self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
         self._book = book
         self._settings = settings
@@ -139,13 +140,29 @@ class Vehicle:
 
     # what comes in
 
-    def is_overtaken(self, packet: Packet, *, now: float) -> bool:
-        """Whether a newer heartbeat came just before this one; keeps its number if not."""
-        seq, at = self._last_beat
-        if 0 < (seq - packet.seq) & 0xFF <= REORDERED and now - at <= REORDERED_WITHIN:
+    def count(self, seq: int) -> None:
+        """Take note of the number of a packet of its autopilot."""
+        self._number += (seq - self.last_seq + 0x80 & 0xFF) - 0x80
+        self.last_seq = seq
+
+    def is_overtaken(self, *, now: float) -> bool:
+        """Whether a newer heartbeat came just before the one just counted."""
+        number, at = self._last_beat
+        if 0 < number - self._number <= REORDERED and now - at <= REORDERED_WITHIN:
             return True
-        self._last_beat = packet.seq, now
+        self._last_beat = self._number, now
         return False
+
+    def comes_anew(self) -> None:
+        """It is on another connection: its numbers may begin anew, and it may be another one."""
+        self._last_beat = (0, -inf)
+        self.requests.ask_which_again()
+
+    def move_to(self, outlet: Outlet, *, may_arm: bool) -> None:
+        """It is heard at another endpoint now; ``may_arm``: whether we may arm what is there."""
+        self.comes_anew()
+        self.requests.move_to(outlet)
+        self._authority.moved(may_arm=may_arm)
 
     def come_back(self, *, was_driven: bool, now: float) -> None:
         """A vehicle of an earlier run is heard: first of all it stands, if we left it driving."""

@@ -4,6 +4,7 @@ It decides nothing but the order in which things leave.
 """
 
 from collections.abc import Hashable
+from math import inf
 
 from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
@@ -169,6 +170,11 @@ class VehicleRequests:
         request = self._message_request(m.AutopilotVersion.id)
         self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
+
+    def ask_which_again(self) -> None:
+        """It may be another one now."""
+        self.is_identified = False
+        self._versions_asked, self._ask_version_at = 0, -inf
 
     def next_deadline(self) -> float | None:
         """Give when a command is to be repeated or given up."""

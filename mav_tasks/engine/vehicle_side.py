@@ -178,6 +178,9 @@ class VehicleSide:
         elif len(link.outlets) < MAX_PEERS:
             self._left.discard(place)
             link.outlets[change.peer] = self._outlet(*place)
+            for vehicle in self:
+                if self._router.place_of(vehicle.system_id) == place:
+                    vehicle.comes_anew()
 
     def owns(self, link: str) -> bool:
         """Whether a link of this name is a vehicle link."""
@@ -218,11 +221,11 @@ class VehicleSide:
         ):
             return None
         if packet.component_id == AUTOPILOT:
-            vehicle.last_seq = packet.seq
+            vehicle.count(packet.seq)
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
-                if vehicle.is_overtaken(packet, now=now):
+                if vehicle.is_overtaken(now=now):
                     return vehicle  # an old mode, or an old arming, is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
@@ -301,8 +304,7 @@ class VehicleSide:
             book=self._book,
             tasks=self._fleet.of(packet.system_id),
             settings=self._settings,
-            may_arm=self._settings.arming == "server"
-            or (self._settings.arming == "auto" and link.is_local),
+            may_arm=self._may_arm(link),
             now=now,
         )
         self._vehicles[packet.system_id] = vehicle
@@ -311,6 +313,10 @@ class VehicleSide:
         vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
         vehicle.step(now=now)
         return vehicle
+
+    def _may_arm(self, link: _Link) -> bool:
+        arming = self._settings.arming
+        return arming == "server" or (arming == "auto" and link.is_local)
 
     def _moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
         """Whether a vehicle that fell silent is back at another place; two are not mixed.
@@ -325,11 +331,11 @@ class VehicleSide:
         if is_another or (old not in self._left and vehicle.is_heard(now=now)):
             self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
             return False
-        outlets = self._links[link].outlets
+        outlets, may_arm = self._links[link].outlets, self._may_arm(self._links[link])
         if peer not in outlets and len(outlets) >= MAX_PEERS:
             return False
         del self._rivals[rival]
-        vehicle.requests.move_to(outlets.setdefault(peer, self._outlet(link, peer)))
+        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
         self._router.learn(vehicle.system_id, (link, peer))
         self._forget_if_empty(old)
         self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))

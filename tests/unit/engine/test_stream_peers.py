@@ -1,5 +1,7 @@
 """Who is on a stream comes and goes, as the link tells; what it says is cut anywhere."""
 
+import struct
+
 import pytest
 
 from mav_tasks.engine.engine import Engine
@@ -20,14 +22,17 @@ from mav_tasks.settings import Settings
 
 OLD, NEW, CLIENT = ("10.0.0.1", 1), ("10.0.0.1", 2), ("10.0.0.9", 9)
 ROVER = m.Heartbeat(10, 3, 1, 4, 4, 3)
+ARMED = m.Heartbeat(10, 3, 0x81, 4, 4, 3)
+ATTITUDE = m.Attitude(0, 0, 0, 0, 0, 0, 0)
 GCS = m.Heartbeat(6, 8, 0, 0, 4, 3)
+WHO_MAY_ARM = [(True, "auto", True), (False, "auto", False), (False, "server", True)]
 
 
 class Rig:
     """A server with a stream link on each side and a datagram link to vehicles."""
 
-    def __init__(self) -> None:
-        self.engine, self.packer = Engine(Settings(), now=0.0), Packer()
+    def __init__(self, settings: Settings | None = None) -> None:
+        self.engine, self.packer = Engine(settings or Settings(), now=0.0), Packer()
         self.now = 0.0
         for link, side, is_stream in (
             ("v", LinkSide.VEHICLES, True),
@@ -44,8 +49,15 @@ class Rig:
         for piece in pieces:
             self.engine.handle(Packets(link, [(peer, piece)]), now=self.now)
 
-    def rover(self, peer: object, *, seq: int = 0, link: str = "v") -> None:
-        self.says(link, peer, self.packer.pack(ROVER, Address(1, 1), seq=seq))
+    def rover(
+        self, peer: object, *, seq: int = 0, link: str = "v", message: m.Message = ROVER
+    ) -> None:
+        self.says(link, peer, self.packer.pack(message, Address(1, 1), seq=seq % 256))
+
+    @property
+    def is_armed(self) -> bool:
+        (vehicle,) = self.engine.snapshot(now=self.now).vehicles
+        return vehicle.armed
 
     def client(self) -> None:
         self.says("c", CLIENT, self.packer.pack(GCS, Address(255, 190), seq=0))
@@ -148,6 +160,71 @@ def test_a_vehicle_that_is_gone_may_be_back_at_once_from_anywhere(rig: Rig) -> N
     assert ids(sent, "v", OLD) == []
 
 
+@pytest.mark.parametrize("place", [OLD, NEW])
+def test_what_is_on_another_connection_is_armed_only_if_it_says_so_itself(
+    rig: Rig, place: object
+) -> None:
+    """Its numbers begin anew, a little below those of before: that is no heartbeat overtaken."""
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD, seq=50, message=ARMED)
+    assert rig.is_armed
+    rig.peer("v", OLD, up=False)
+    rig.peer("v", place, up=True)
+    rig.now = 0.2
+    rig.rover(place, seq=0)
+    assert not rig.is_armed
+
+
+def test_heartbeats_are_not_overtaken_by_many_other_packets_between_them(rig: Rig) -> None:
+    """A log is being downloaded, and a heartbeat was asked for."""
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD, seq=0, message=ARMED)
+    for seq in range(1, 200):
+        rig.now += 0.002
+        rig.rover(OLD, seq=seq, message=ATTITUDE)
+    rig.rover(OLD, seq=200)
+    assert not rig.is_armed
+    rig.rover(OLD, seq=190, message=ARMED)
+    assert not rig.is_armed
+
+
+@pytest.mark.parametrize("place", [OLD, NEW])
+def test_what_is_on_another_connection_is_asked_again_which_it_is(rig: Rig, place: object) -> None:
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD)
+    version = m.AutopilotVersion(0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 7)
+    rig.rover(OLD, seq=1, message=version)
+    rig.passes(2.0)
+    rig.peer("v", OLD, up=False)
+    rig.peer("v", place, up=True)
+    rig.engine.take_packets()
+    rig.rover(place, seq=2)
+    sent = [o.data for o in rig.engine.take_packets() if o.peer == place and o.data[7] == 76]
+    asked = [data for data in sent if data[38:40] == (512).to_bytes(2, "little")]
+    assert [data[10:14] for data in asked] == [struct.pack("<f", m.AutopilotVersion.id)]
+
+
+@pytest.mark.parametrize(("is_local", "arming", "may"), WHO_MAY_ARM)
+def test_what_is_at_another_place_is_armed_only_if_we_may_arm_there(
+    is_local: bool, arming: str, may: bool
+) -> None:
+    """A simulated rover ends, and one on a radio has its number."""
+    rig = Rig(Settings(arming=arming))
+    change = LinkChanged("radio", LinkSide.VEHICLES, up=True, is_local=is_local, is_stream=True)
+    rig.engine.handle(change, now=0.0)
+    rig.peer("v", OLD, up=True)
+    rig.rover(OLD)
+    rig.peer("v", OLD, up=False)
+    rig.peer("radio", NEW, up=True)
+    rig.rover(NEW, link="radio", seq=1)
+    assert "is at" in " ".join(map(str, rig.engine.take_events()))
+    vehicle = rig.engine._vehicles.get(1)
+    assert vehicle is not None
+    assert vehicle.view(now=0.0).may_arm is may
+    vehicle.proceed(actor="somebody", now=0.0)
+    assert vehicle.view(now=0.0).may_arm is may
+
+
 def test_as_long_as_it_is_there_another_of_its_id_is_ignored(rig: Rig) -> None:
     rig.peer("v", OLD, up=True)
     rig.peer("v", NEW, up=True)
@@ -183,7 +260,8 @@ def test_numbers_towards_a_line_that_comes_back_go_on(rig: Rig) -> None:
     rig.passes(0.1)
     rig.peer("v", OLD, up=True)
     rig.rover(OLD, seq=1)
-    after = [o.data[4] for o in rig.passes(2.5) if o.peer == OLD]
+    at_once = rig.engine.take_packets()
+    after = [o.data[4] for o in at_once + rig.passes(2.5) if o.peer == OLD]
     numbers = before + after
     assert len(after) > 1
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
