@@ -99,6 +99,12 @@ class Authority:
         """A task has ended, or STOP: who wants to drive must ask again."""
         self._granted.clear()
 
+    def forget(self, client: Hashable) -> bool:
+        """A client is gone; gives whether it had control. Who comes to its place must ask."""
+        had_control = client in self._granted
+        self._granted.discard(client)
+        return had_control
+
     def note_other(self, *, now: float) -> None:
         """Somebody else is driving just now."""
         self._other_at = now

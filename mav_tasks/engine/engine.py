@@ -141,6 +141,8 @@ class Engine:
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
                 self._vehicles.change_peer(item)
+                if self._gcs.owns(item.link):
+                    self._release(item.link, item.peer, now=now)
             case Congestion():
                 self._gcs.note_congestion(item, now=now)
             case Committed(through=through):
@@ -290,6 +292,13 @@ class Engine:
             else:
                 for vehicle in vehicles:
                     withheld(vehicle, client.key, message, now=now)
+
+    def _release(self, link: str, peer: Peer, *, now: float) -> None:
+        """Whatever a client that is gone was driving is driven by nobody."""
+        for vehicle in self._vehicles:
+            if vehicle.has_granted((link, peer)):
+                self._vehicles.touch(vehicle)
+                vehicle.client_is_gone((link, peer), now=now)
 
     def _watch_operator(self, *, now: float) -> None:
         is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)

@@ -438,6 +438,18 @@ class Vehicle:
         """A client's motion message does not go to it."""
         self._authority.note_withheld(client, now=now)
 
+    def has_granted(self, client: Hashable) -> bool:
+        """Whether a client may move it, as far as that is the client's doing."""
+        return self._authority.has_granted(client)
+
+    def client_is_gone(self, client: Hashable, *, now: float) -> None:
+        """Its connection has ended: what it drove stands, and does not wait for its own watch."""
+        had_control = self._authority.forget(client)
+        is_driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
+        is_free = not self.control.is_engaged and not self.persona.has_loss_failsafe
+        if had_control and is_driven and is_free:
+            self.requests.send_zero()
+
     def is_moved_by_client(self, *, now: float) -> None:
         """A client's motion message goes to it: tasks wait."""
         self._authority.note_other(now=now)

@@ -11,7 +11,7 @@ from mav_tasks.links.base import Peer
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from tests.kit.client import ACCEPTED, REQUEST, FakeClient
+from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
 from tests.kit.world import World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -71,6 +71,43 @@ def test_tasks_and_plans_are_the_same_over_streams(streams: World) -> None:
     assert plan.result == 0
     assert near_pose(world.pose(), (0.5, 0.0, 90.0))
     assert gaps(world.client, since) == 0
+
+
+def test_who_drove_and_is_gone_leaves_no_velocity_behind_and_must_ask_again(
+    streams: World,
+) -> None:
+    world = streams
+    world.client.mode(GUIDED)
+    world.run(0.5)
+    world.client.arm(True)
+    world.run(0.5)
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(3)
+    assert world.truth.forward_speed > 0.4
+    world.client.end_streams()
+    tell(world, PeerChanged(CLIENT_LINK, "client", up=False))
+    world.run(1.5)
+    assert world.stands()
+    tell(world, PeerChanged(CLIENT_LINK, "client", up=True))
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(2)
+    assert world.stands()
+    world.client.mode(GUIDED)
+    world.run(2)
+    assert world.truth.forward_speed > 0.4
+
+
+def test_a_client_that_goes_while_a_task_drives_changes_nothing(streams: World) -> None:
+    world = streams
+    world.client.mode(GUIDED)
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    world.client.send(setpoint(0.5))
+    before = len(world.observer.reached)
+    tell(world, PeerChanged(CLIENT_LINK, "client", up=False))
+    assert len(world.observer.reached) == before
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
 
 
 @pytest.mark.parametrize("seconds", [0.5, 5.0])
