@@ -287,4 +287,8 @@ class Runner:
             self._over.set_result(code)
 
     def _send(self, outgoing: Outgoing) -> None:
-        self._links[outgoing.link].send(outgoing.peer, outgoing.data)
+        link = self._links[outgoing.link]
+        if outgoing.is_first and isinstance(link, StreamLink):
+            link.send(outgoing.peer, outgoing.data, first=True)
+        else:
+            link.send(outgoing.peer, outgoing.data)

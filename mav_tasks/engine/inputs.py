@@ -107,8 +107,9 @@ Input = (
 
 
 class Outgoing(NamedTuple):
-    """One datagram to send."""
+    """One datagram to send; ``is_first``: before everything that waits for its turn."""
 
     link: str
     peer: Peer
     data: bytes
+    is_first: bool = False

@@ -25,10 +25,10 @@ class Outlet:
         """Give an outlet to the same endpoint that fills another queue."""
         return Outlet(self.link, self.peer, queue, self._packer)
 
-    def send(self, message: Message, source: Address) -> None:
+    def send(self, message: Message, source: Address, *, first: bool = False) -> None:
         """Send a message of our own in the name of ``source``."""
         raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
-        self._queue.append(Outgoing(self.link, self.peer, raw))
+        self._queue.append(Outgoing(self.link, self.peer, raw, first))
 
     def forward(self, packet: Packet) -> None:
         """Pass a packet on; a gap in its source's numbers stays one."""

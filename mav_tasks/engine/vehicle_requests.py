@@ -201,7 +201,10 @@ class VehicleRequests:
             if isinstance(item, Packet):
                 self._outlet.inject(item)
             else:
-                self._outlet.send(item, self._source)
+                # zeros stay behind what setpoints wait; HOLD stops it whatever those say
+                is_command = isinstance(item, m.CommandLong | m.CommandInt)
+                is_first = is_command and self.control.phase is Phase.STOPPING
+                self._outlet.send(item, self._source, first=is_first)
         for answer in answers:
             self._dispatch(answer, now=now)
 
@@ -251,6 +254,6 @@ class VehicleRequests:
     def _prepare_last_words(self) -> tuple[Outgoing, ...]:
         queue: list[Outgoing] = []
         spare = self._outlet.sibling(queue)
-        spare.send(self.control.zero_setpoint(), self._source)
-        spare.send(self.control.hold_request(), self._source)
+        spare.send(self.control.zero_setpoint(), self._source)  # after each setpoint that waits
+        spare.send(self.control.hold_request(), self._source, first=True)
         return tuple(queue)

@@ -62,6 +62,10 @@ class PeerChange:
 class StreamLink(Link, Protocol):
     """A link on which peers come and go; ``send`` sends whole packets or nothing of them."""
 
+    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
+        """Send one packet, or let it wait, ``first`` before all that wait already; or lose it."""
+        ...
+
     def take_changes(self) -> list[PeerChange]:
         """Give what became of peers since the last call, in order.
 

@@ -89,12 +89,12 @@ class SerialLink:
         self._flush()
         return received
 
-    def send(self, peer: Peer, data: bytes) -> None:
+    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send a packet, or let it wait; while there is no device it is lost."""
         if self._device is None or peer != self._url.device:
             self._lost += 1
             return
-        self._queue.put(data, now=monotonic())
+        self._queue.put(data, now=monotonic(), first=first)
         self._flush()
 
     def take_changes(self) -> list[PeerChange]:

@@ -128,13 +128,13 @@ class Connections:
         received.append((connection.peer, data))
         return None
 
-    def send(self, peer: Peer, data: bytes) -> None:
+    def send(self, peer: Peer, data: bytes, *, first: bool) -> None:
         """Send a packet, or let it wait; to who is not there it is lost."""
         connection = self._by_peer.get(peer)
         if connection is None:
             self._lost += 1
             return
-        connection.queue.put(data, now=monotonic())
+        connection.queue.put(data, now=monotonic(), first=first)
         reason = None if connection.is_blocked else self._flush(connection)
         if reason is not None:
             self._ended(connection, reason)

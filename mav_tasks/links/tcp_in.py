@@ -53,9 +53,9 @@ class TcpInLink:
         """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
         return self._connections.receive(limit)
 
-    def send(self, peer: Peer, data: bytes) -> None:
+    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send a packet, or let it wait; to who is gone it is lost."""
-        self._connections.send(peer, data)
+        self._connections.send(peer, data, first=first)
 
     def take_changes(self) -> list[PeerChange]:
         """Give what became of peers since the last call."""

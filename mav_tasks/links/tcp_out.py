@@ -52,9 +52,9 @@ class TcpOutLink:
         """Give up to ``limit`` pieces; send what waits."""
         return self._connections.receive(limit)
 
-    def send(self, peer: Peer, data: bytes) -> None:
+    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send a packet, or let it wait; while nobody is there it is lost."""
-        self._connections.send(peer, data)
+        self._connections.send(peer, data, first=first)
 
     def take_changes(self) -> list[PeerChange]:
         """Give what became of the peer since the last call."""

@@ -5,7 +5,14 @@ from random import Random
 
 import pytest
 
-from mav_tasks.engine.inputs import Congestion, Input, LinkChanged, LinkSide, PeerChanged
+from mav_tasks.engine.inputs import (
+    Congestion,
+    Input,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    PeerChanged,
+)
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.base import Peer
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -13,11 +20,12 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
-from tests.kit.world import World, at, near_pose
+from tests.kit.world import COMMAND_ID, MODE_COMMAND, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 SEED = 31
 ATTITUDE, POSITION, HEARTBEAT = 30, 32, 0
+SET_MODE = 176  # the command
 
 
 def tell(world: World, item: Input) -> None:
@@ -108,6 +116,28 @@ def test_a_client_that_goes_while_a_task_drives_changes_nothing(streams: World) 
     assert len(world.observer.reached) == before
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
+
+
+def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: World) -> None:
+    world, sent = streams, list[Outgoing]()
+    send = world.server.pump._send
+
+    def see(outgoing: Outgoing) -> None:
+        sent.append(outgoing)
+        send(outgoing)
+
+    world.server.pump._send = see
+    world.client.move(3)
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    assert not any(outgoing.is_first for outgoing in sent)
+    words = world.server.engine.last_words
+    assert [outgoing.is_first for outgoing in words] == [False, True]  # zero, HOLD
+    world.client.stop()
+    world.until(world.stands, within=3)
+    firsts = [outgoing for outgoing in sent if outgoing.is_first]
+    assert firsts[0].data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
+    assert {outgoing.data[7] for outgoing in firsts} == {MODE_COMMAND}
 
 
 @pytest.mark.parametrize("seconds", [0.5, 5.0])

@@ -175,6 +175,7 @@ class FakeStream:
         self.read: list[tuple[list[PeerChange], bytes]] = []  # each with what reading shows
         self.tends = asyncio.Queue[None]()
         self.sent: list[bytes] = []
+        self.firsts: list[bytes] = []
         self._read, self._write = os.pipe()
 
     def comes(self, changes: list[PeerChange], piece: bytes) -> None:
@@ -190,8 +191,9 @@ class FakeStream:
         self.told += changes
         return [("peer", piece)]
 
-    def send(self, peer: object, data: bytes) -> None:
+    def send(self, peer: object, data: bytes, *, first: bool = False) -> None:
         self.sent.append(data)
+        self.firsts += [data] * first
 
     def take_changes(self) -> list[PeerChange]:
         told, self.told = self.told, []
@@ -256,7 +258,8 @@ class Broken(Recorder):
 
     def __init__(self) -> None:
         super().__init__()
-        self.last_words = tuple(Outgoing("stream", "peer", word) for word in (b"zero", b"hold"))
+        zero, hold = (Outgoing("stream", "peer", word) for word in (b"zero", b"hold"))
+        self.last_words = (zero, hold._replace(is_first=True))
 
     def handle(self, item: object, *, now: float) -> None:
         super().handle(item, now=now)
@@ -286,12 +289,13 @@ def test_after_the_last_words_of_a_failed_engine_nothing_of_it_is_sent() -> None
     assert run_broken(link) == EXIT_FAILED
     after = link.sent[link.sent.index(b"zero") :]
     assert after == [b"zero", b"hold"]
+    assert link.firsts == [b"hold"]
 
 
 def test_a_failed_engine_ends_the_server_even_if_its_last_words_fail_too() -> None:
     class Mute(FakeStream):
-        def send(self, peer: object, data: bytes) -> None:
-            super().send(peer, data)
+        def send(self, peer: object, data: bytes, *, first: bool = False) -> None:
+            super().send(peer, data, first=first)
             if data == b"zero":
                 raise ValueError
 

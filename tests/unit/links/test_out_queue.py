@@ -42,6 +42,29 @@ def test_what_has_not_begun_gives_way_to_the_newest() -> None:
     assert waiting.dropped == 96
 
 
+def test_what_is_to_go_first_waits_only_for_what_has_begun() -> None:
+    waiting = queue(b"begun", b"old", b"older")
+    waiting.wrote(2)
+    for word in (b"hold", b"again"):
+        waiting.put(word, now=0.1, first=True)
+    out = []
+    while piece := waiting.next(now=0.1):
+        out.append(piece)
+        waiting.wrote(len(piece))
+    assert out == [b"gun", b"hold", b"again", b"old", b"older"]
+    assert (waiting.size, bool(waiting), waiting.dropped) == (0, False, 0)
+
+
+def test_what_was_to_go_first_grows_old_and_too_much_all_the_same() -> None:
+    waiting = OutQueue(max_age=AGE)
+    for _ in range(1_000):
+        waiting.put(bytes(280), now=0.0, first=True)
+    assert MAX_BYTES - 280 < waiting.size <= MAX_BYTES
+    assert waiting.changed(now=0.15)
+    assert waiting.next(now=AGE + 0.01) == b""
+    assert (waiting.size, waiting.dropped) == (0, 1_000)
+
+
 def test_what_waits_is_bounded() -> None:
     waiting = queue(*[bytes(280)] * 10_000)
     assert MAX_BYTES - 280 < waiting.size <= MAX_BYTES

@@ -97,6 +97,24 @@ def test_no_more_is_written_ahead_than_the_line_takes_in_a_moment(
     assert len(read_from(line.far, 100 * (10 - ahead))) == 100 * (10 - ahead)
 
 
+def test_what_goes_first_does_not_wait_behind_all_that_clients_send(
+    link: SerialLink, line: Device, clock: Clock
+) -> None:
+    arrived, written_after = b"", []
+    for number in range(200):
+        for _ in range(2):  # four times what the line takes
+            link.send(str(line.path), b"f" * 280)
+        if number % 20 == 10:
+            link.send(str(line.path), b"H" * 45, first=True)
+        clock.now += 0.025
+        link.tend()
+        while select.select([line.far], [], [], 0.0)[0]:
+            arrived += os.read(line.far, 4096)
+        written_after.append(arrived.count(b"H" * 45))
+    late = [at // 20 + 1 - written_after[at + 4] for at in range(10, 196, 20)]  # in 0.1 s
+    assert late == [0] * 10
+
+
 def test_on_a_line_that_is_too_slow_the_newest_is_sent_and_whole(
     link: SerialLink, line: Device, clock: Clock
 ) -> None:
