@@ -175,7 +175,8 @@ class Runner:
         if not isinstance(link, StreamLink):
             self._take_in(link, link.receive(DRAIN))
             return
-        self._note(link, link.take_changes())  # of before
+        while before := link.take_changes():  # to tell of some may show others
+            self._note(link, before)
         pieces = link.receive(DRAIN)
         changes = link.take_changes()
         self._note(link, [change for change in changes if change.state is PeerState.UP])

@@ -253,6 +253,41 @@ def test_the_engine_is_told_who_comes_before_its_words_and_who_goes_after_them(
     assert [record.getMessage() for record in caplog.records] == words
 
 
+def test_who_goes_while_the_engine_is_told_of_others_is_gone_before_anybody_comes() -> None:
+    """A packet that it sends then finds nobody there; the next one comes from the same place."""
+    link = FakeStream()
+
+    class Sending(Recorder):
+        def handle(self, item: object, *, now: float) -> None:
+            super().handle(item, now=now)
+            if item == PeerChanged("stream", "other", up=False):
+                link.told.append(PeerChange("peer", PeerState.DOWN))
+
+    async def run() -> list[object]:
+        engine = Sending()
+        engine.handle_deadline = lambda *, now: None  # type: ignore[method-assign]
+        loop = asyncio.get_running_loop()
+        running = loop.create_task(Runner(engine, MemoryStore(), clients=[], vehicles=[link]).run())
+        await asyncio.sleep(0)
+        link.told = [PeerChange("other", PeerState.DOWN)]
+        link.comes([PeerChange("peer", PeerState.UP)], b"again")
+        while not any(isinstance(item, Packets) for item in engine.inputs):
+            await asyncio.wait_for(link.tends.get(), 10)
+        await asyncio.wait_for(link.tends.get(), 10)
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.02)
+        await asyncio.wait_for(running, 10)
+        return engine.inputs
+
+    changes = [item for item in asyncio.run(run()) if isinstance(item, PeerChanged)]
+    assert [(change.peer, change.up) for change in changes] == [
+        ("other", False),
+        ("peer", False),
+        ("peer", True),
+    ]
+
+
 class Broken(Recorder):
     """An engine that fails when somebody comes, with a setpoint not yet sent."""
 
