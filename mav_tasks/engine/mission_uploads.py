@@ -109,7 +109,7 @@ class MissionUploads:
         # a long plan may take longer to come again than it is remembered
         known = None
         if not is_staged:
-            known = self._submissions.known_plan(draft, begun_at=upload.begun_at)
+            known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
         if known is not None:
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
             self.flush(desk, vehicle, now=now)

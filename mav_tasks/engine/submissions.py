@@ -119,10 +119,17 @@ class Submissions:
         self._await_commit(asked, task, now=now)
         return task
 
-    def known_plan(self, draft: Draft, *, begun_at: float) -> TaskId | None:
-        """Give the task that a plan is already, uploaded a moment before: its ack may be lost."""
+    def known_plan(self, draft: Draft, *, begun_at: float, now: float) -> TaskId | None:
+        """Give the task that a plan is already, uploaded a moment before: its ack may be lost.
+
+        So may be the ack of this copy: from here on the next one counts.
+        """
         known = self._recollection.known(draft, confirmation=1, origin=None, now=begun_at)
-        return None if known is None else known.task_id
+        task = None if known is None else self._book.get(known.task_id)
+        if task is None:
+            return None
+        self._recollection.remember(task, at=now, now=now)
+        return task.id
 
     def submit_plan(self, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
         """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""

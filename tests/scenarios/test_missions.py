@@ -111,6 +111,15 @@ def test_the_same_plan_again_a_moment_later_is_the_same_task(world: World) -> No
     assert len(world.tasks()) == 1
 
 
+def test_of_copies_of_a_plan_the_last_one_counts(world: World) -> None:
+    """Each of their acks may have been lost, and a long plan takes its time."""
+    plan = (place(1, 0), place(1, 1))
+    for _ in range(3):
+        uploaded(world, *plan, target=(1, 191))
+        world.run(8)
+    assert len(world.tasks()) == 1
+
+
 def test_it_comes_back_as_it_was(world: World) -> None:
     plan = (HOME, *PLAN[1:], Item(SPEED, param1=1, param2=0.7, param3=-1, frame=2, z=nan))
     upload = uploaded(world, *plan)
