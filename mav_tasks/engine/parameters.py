@@ -46,7 +46,8 @@ class ParameterDesk:
         self._submissions = submissions
         self._configured = settings
         self._kept = dict(kept)
-        self._pending: dict[str, float] = {}  # set, and not durable yet
+        #: the latest wish for each that is not durable yet, and the number of its event
+        self._pending: dict[str, tuple[float, int]] = {}
         self._settings, _ = with_all(settings, self._kept)
         self._is_changed = False
 
@@ -128,7 +129,8 @@ class ParameterDesk:
         try:
             if message.param_type != MavParamType.REAL32:
                 raise SettingError(f"{name}: its type is REAL32")
-            expected, _ = with_all(self._configured, self._kept | self._pending)
+            pending = {each: wish for each, (wish, _) in self._pending.items()}
+            expected, _ = with_all(self._configured, self._kept | pending)
             changed(expected, name, value)
             self._submissions.check_open()
         except SettingError as error:
@@ -137,25 +139,36 @@ class ParameterDesk:
         except Rejection as refusal:
             refuse(refusal.text, MavParamError.PERMISSION_DENIED, now=now)
             return
-        before = self._kept.get(name)
 
         def accept(*, now: float) -> None:
-            del now
-            self._take(name, value)
+            is_latest = self._settled(name, mine)
+            try:
+                changed(self._settings, name, value)
+            except SettingError as error:  # what it was checked against was not stored
+                if is_latest:
+                    self._book.record(ParameterSet(name, self._kept.get(name), actor, now))
+                refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            else:
+                self._take(name, value)
 
         def give_up(*, now: float) -> None:
-            self._pending.pop(name, None)
-            self._book.record(ParameterSet(name, before, actor, now))
+            if self._settled(name, mine):  # or else a later wish is on its way to the store
+                self._book.record(ParameterSet(name, self._kept.get(name), actor, now))
             words = f"{name} was not stored in time: not set"
             refuse(words, MavParamError.PERMISSION_DENIED, now=now)
 
-        self._pending[name] = value
         self._book.record(ParameterSet(name, value, actor, now))
+        mine = self._pending[name] = value, self._book.recorded
         self._submissions.when_durable(accept, give_up, now=now)
 
-    def _take(self, name: str, value: float) -> None:
-        if self._pending.get(name) == value:
+    def _settled(self, name: str, wish: tuple[float, int]) -> bool:
+        """Whether a wish that waits no more was the latest for this parameter."""
+        is_latest = self._pending.get(name) == wish
+        if is_latest:
             del self._pending[name]
+        return is_latest
+
+    def _take(self, name: str, value: float) -> None:
         self._kept[name] = value
         self._settings, _ = with_all(self._configured, self._kept)
         self._is_changed = True
