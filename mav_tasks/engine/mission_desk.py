@@ -116,12 +116,11 @@ class MissionDesks:
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
             case m.MissionCount():
                 desk.uploads.receiver.count(message, sender, now=now)
+            case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
+                self._vehicles.touch(vehicle)  # never an item of a plan, whatever is under way
+                self._go_to.receive(client, vehicle, packet, message, now=now)
             case m.MissionItem() | m.MissionItemInt():
-                if not desk.uploads.receiver.item(message, sender, now=now) and (
-                    message.current in GO_TO
-                ):
-                    self._vehicles.touch(vehicle)
-                    self._go_to.receive(client, vehicle, packet, message, now=now)
+                desk.uploads.receiver.item(message, sender, now=now)
             case m.MissionAck():
                 desk.uploads.receiver.cancelled(message, sender, now=now)
                 desk.sender.end(sender, message.mission_type)

@@ -135,30 +135,30 @@ class MissionReceiver:
 
     def item(
         self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float
-    ) -> bool:
-        """Take an item; False: nobody uploads here, it may mean something else."""
+    ) -> None:
+        """Take an item; one of no upload changes nothing."""
         session = self._session
         if session is None or session.sender != sender:
-            return self._repeat_answer(message, sender, now=now)
+            self._repeat_answer(message, sender, now=now)
+            return
         is_next = message.seq == len(session.items) and message.mission_type == session.mission_type
         if session.is_whole or now < session.quiet_until:
-            return True  # left from before
+            return  # left from before
         if not is_next:  # one that was asked for twice
             if session.asked >= STEP_BACK and message.seq < len(session.items):
                 session.ask_at = now + ASK_AGAIN
                 self._request(session, message.seq + 1)
-            return True
+            return
         item = item_of(message)
         refusal: MavMissionResult | None = MavMissionResult.INVALID_PARAM5_X
         if item is not None:
             refusal = self._check(session.mission_type, message.seq, item, session.count)
         if refusal is not None or item is None:
             self._end(refusal or MavMissionResult.ERROR, item, now=now)
-            return True
+            return
         session.items.append(item)
         session.asked, session.ask_at, session.give_up_at = 0, now, now + GIVE_UP
         self._advance(now=now)
-        return True
 
     def cancelled(self, message: m.MissionAck, sender: Sender, *, now: float) -> None:
         """A client's own ack: it gives its upload up, or has all of a download."""
@@ -249,17 +249,15 @@ class MissionReceiver:
 
     def _repeat_answer(
         self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float
-    ) -> bool:
+    ) -> None:
         """The last item again: its sender has not heard what became of the plan."""
         answered = self._answered
         if answered is None or answered.sender != sender or now - answered.at > REPEATED:
-            return False
+            return
         is_last = message.seq in (answered.taken - 1, answered.taken)
-        if is_last and message.mission_type == answered.mission_type:
-            if item_of(message) == answered.last:
-                self._outgoing.append(ToClient(sender, answered.ack))
-            return True
-        return False
+        is_last = is_last and message.mission_type == answered.mission_type
+        if is_last and item_of(message) == answered.last:
+            self._outgoing.append(ToClient(sender, answered.ack))
 
     def _send_ack(
         self, sender: Sender, mission_type: int, result: MavMissionResult, *, opaque_id: int = 0

@@ -10,6 +10,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import ACCEPTED
+from tests.kit.mission import Item, Upload
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
@@ -95,3 +96,21 @@ def test_a_bad_one_is_refused_in_words(world: World, message: Any, result: int, 
     assert any(says in text for text in world.client.texts())
     assert not world.tasks()
     assert common.MAVLINK_MSG_ID_MISSION_ITEM not in [p.kind for p in world.observer.reached]
+
+
+def test_just_after_a_plan_of_one_item_it_is_still_a_go_to(world: World) -> None:
+    upload = Upload(world.client, [Item(16, **at(1, 1), frame=0, current=1)])
+    world.until(lambda: upload.result is not None, within=5)
+    world.client.received.clear()
+    world.client.send(go_there(1.5, -1.0))
+    world.run(0.2)
+    assert acks(world) == [(OK, 0, 1)]
+
+
+def test_while_its_client_uploads_it_is_no_item_of_the_plan(world: World) -> None:
+    world.client.send(common.MAVLink_mission_count_message(1, 1, 2, 0))
+    world.run(0.1)
+    world.client.send(go_there(1.5, -1.0))
+    world.run(0.1)
+    assert acks(world) == [(OK, 0, 1)]
+    assert {each.seq for each in world.client.of_type("MISSION_REQUEST_INT")} == {0}
