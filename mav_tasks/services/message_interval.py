@@ -59,7 +59,7 @@ GROUPS: dict[int, frozenset[int]] = {
 STOPPED = -1  # SET_MESSAGE_INTERVAL param2: send no more
 DEFAULT = 0  # SET_MESSAGE_INTERVAL param2: back to the default rate
 LONGEST_US = 2**31 - 1  # what MESSAGE_INTERVAL can say
-MAX_WISHES = 256  # of one client
+MAX_WISHES = 256  # of one client, for each vehicle
 UNCROWDED = 0.02  # s; a wish for more is stretched as if it were for this
 GOLDEN = 0.618  # multiples of it are spread evenly between whole numbers
 SLACK = 0.7  # of an interval: the jitter of a stream must not halve its rate
@@ -70,19 +70,21 @@ class Thinner:
 
     def __init__(self, *, default_interval: float) -> None:
         self._default = default_interval
-        self._intervals: dict[tuple[int, int], float | None] = {}
+        self._intervals: dict[int, dict[int, float | None]] = {}  # by system and message
         self._last: dict[tuple[int, int, int], float] = {}
         self.stretch = Stretch()
 
     def set_interval(self, system_id: int, message_id: int, interval_us: float) -> None:
         """Take a client's wish: microseconds, STOPPED or DEFAULT."""
-        key = (system_id, message_id)
-        if interval_us == DEFAULT or len(self._intervals) >= MAX_WISHES:
-            self._intervals.pop(key, None)
+        wishes = self._intervals.setdefault(system_id, {})
+        if interval_us == DEFAULT:
+            wishes.pop(message_id, None)
+        elif message_id not in wishes and len(wishes) >= MAX_WISHES:
+            return
         elif interval_us < 0:
-            self._intervals[key] = None
+            wishes[message_id] = None
         else:
-            self._intervals[key] = min(interval_us, LONGEST_US) / 1e6
+            wishes[message_id] = min(interval_us, LONGEST_US) / 1e6
 
     def set_group(self, system_id: int, group: int, rate: float) -> None:
         """Take a client's wish for a MAV_DATA_STREAM: messages a second of each kind, 0 for none.
@@ -95,22 +97,19 @@ class Thinner:
 
     def interval_us(self, system_id: int, message_id: int) -> int:
         """Give the interval in force, in microseconds; STOPPED if none."""
-        interval = self._intervals.get((system_id, message_id), self._default)
+        interval = self._interval(system_id, message_id)
         return STOPPED if interval is None else round(interval * 1e6)
 
     def wishes(self, system_id: int) -> dict[int, float]:
         """Give the intervals, in seconds by message id, that the client asked for."""
-        return {
-            message_id: interval
-            for (system, message_id), interval in self._intervals.items()
-            if system == system_id and interval is not None
-        }
+        wishes = self._intervals.get(system_id, {})
+        return {number: interval for number, interval in wishes.items() if interval is not None}
 
     def passes(self, system_id: int, component_id: int, message_id: int, *, now: float) -> bool:
         """Whether a message that just came is sent on to the client."""
         if message_id not in STREAMED:
             return True
-        interval = self._intervals.get((system_id, message_id), self._default)
+        interval = self._interval(system_id, message_id)
         if interval is None:
             return False
         if not self.stretch.is_idle:
@@ -124,6 +123,10 @@ class Thinner:
         # keeping to the rhythm of the interval makes the long-run rate right in spite of SLACK
         self._last[key] = now if last is None else max(last + interval, now - interval)
         return True
+
+    def _interval(self, system_id: int, message_id: int) -> float | None:
+        wishes = self._intervals.get(system_id)
+        return self._default if wishes is None else wishes.get(message_id, self._default)
 
     def _stretched(self, interval: float, message_id: int, *, now: float) -> float:
         """Give the interval that the way out to the client allows.

@@ -114,6 +114,15 @@ def test_wishes_of_one_client_are_bounded() -> None:
     for message_id in range(10 * MAX_WISHES):
         thinner.set_interval(1, message_id, 1e6)
     assert len(thinner.wishes(1)) == MAX_WISHES
+    thinner.set_interval(1, 0, 2e6)  # one that is there may still be changed
+    assert thinner.interval_us(1, 0) == 2_000_000
+
+
+def test_every_stream_of_many_vehicles_has_its_rate() -> None:
+    thinner = Thinner(default_interval=0.1)
+    for system_id in range(1, 21):
+        thinner.set_group(system_id, 0, 2)
+    assert {thinner.interval_us(n, ATTITUDE) for n in range(1, 21)} == {500_000}
 
 
 def test_a_group_of_messages_has_its_rate_until_one_is_asked_for_by_itself() -> None:
