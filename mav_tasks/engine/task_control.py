@@ -9,7 +9,7 @@ from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.goals import MAX_DELAY, flag, number, whole
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.enums import MavCmd, TaskProperty
+from mav_tasks.mavlink.enums import MavCmd, MavSeverity, TaskProperty
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -82,6 +82,12 @@ class TaskControl:
         return 0
 
     def _release(self, asked: Asked, *, now: float) -> int:
+        """Release or skip a held task; a copy decides nothing about what is held since."""
+        copy = asked.receiver.answer_to_copy(asked.command, now=now)
+        if copy is not None:
+            words = f"task {copy.result_param2}: that was decided a moment ago"
+            asked.tell(words, MavSeverity.INFO, now=now)
+            return copy.result_param2
         task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
         how = whole(asked.command, 2, "how", high=SKIP, default=None)
         begun = asked.vehicle.tasks.begun

@@ -96,6 +96,17 @@ class CommandReceiver:
             self._packets.popitem(last=False)
         return pending
 
+    def answer_to_copy(self, command: Command, *, now: float) -> Answer | None:
+        """Give how an equal command was accepted, so lately that this may be a repeat of it."""
+        for pending in reversed(self._packets.values()):
+            answer = pending.answer
+            is_late = now - pending.at > REPEATED
+            if answer is None or answer.result != MavResult.ACCEPTED or is_late:
+                continue
+            if _equal(pending.command, command):
+                return answer
+        return None
+
     def older_copy(self, command: Command, *, before: float, now: float) -> bool:
         """Whether an equal command was carried out before ``before``, so lately that this may be
         a repeat of it whose ack was lost."""

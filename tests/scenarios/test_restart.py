@@ -9,6 +9,7 @@ import pytest
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, DENIED, MOVE
 from tests.kit.mission import Download, Item, Upload, reached
@@ -95,6 +96,23 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
     end = {AGAIN: driven + 5.0, REMAINDER: 5.0, SKIP: driven}[how]
     assert near_pose(world.pose(), (end, 0.0, 90.0), metres=0.04)
     assert world.state(1) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
+
+
+def test_a_copy_of_a_release_does_not_release_what_is_held_since(world: World, path: Path) -> None:
+    """Its ack was lost, say; "again" drives all of the task once more from where the rover is."""
+    world.client.move(3)
+    world.run(3)
+    restart(world, path)
+    assert release(world, 0, AGAIN) == (ACCEPTED, 1)
+    world.until(lambda: world.truth.forward_speed > 0.1, within=2)
+    world.fault(Faults(position_jump=(5.0, 0.0)))
+    world.until_state(1, S.HELD, within=0.5)
+    assert release(world, 0, AGAIN) == (ACCEPTED, 1)
+    world.run(0.5)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    world.run(2.5)
+    assert release(world, 0, AGAIN) == (ACCEPTED, 1)
+    assert world.state(1)[0] in (S.STARTING, S.EXECUTING)
 
 
 def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> None:
