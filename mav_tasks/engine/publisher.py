@@ -58,7 +58,9 @@ class Publisher:
         if task is None:
             return
         for client in self._gcs:
-            if client.uses_dialect and client.submitted(task):
+            # a nonce says it for good: after a restart, or a long silence, the client is another
+            reads = client.uses_dialect or task.marks.nonce
+            if reads and client.submitted(task):
                 client.statuses.changed(task.id)
 
     def _awaits(self, client: GcsClient) -> bool:

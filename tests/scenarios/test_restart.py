@@ -115,6 +115,17 @@ def test_a_copy_of_a_release_does_not_release_what_is_held_since(world: World, p
     assert world.state(1)[0] in (S.STARTING, S.EXECUTING)
 
 
+def test_who_set_a_nonce_is_told_also_by_the_next_server(world: World, path: Path) -> None:
+    script = world.add_client("script", system_id=245, reads_dialect=False)
+    script.move(1, nonce=77)
+    world.run(0.5)
+    restart(world, path)
+    script.received.clear()
+    assert release(world, 0, SKIP) == (ACCEPTED, 1)
+    world.run(0.5)
+    assert script.statuses(1)[-1].state == S.CANCELLED
+
+
 def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> None:
     world.client.move(2.0)
     world.run(3)
