@@ -260,6 +260,7 @@ class Vehicle:
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
+        self.requests.ask_which_again(now=now)
         self._book.record(VehicleSeen(self.system_id, "heard again", now))
         if self.control.phase is Phase.STOPPING:
             self._begin_stop(now=now)
@@ -298,6 +299,7 @@ class Vehicle:
     def _rebooted(self, *, now: float) -> None:
         """Its frame may be another one now, and nothing of ours is in force there."""
         self.where.forget()
+        self.requests.ask_which_again(now=now)
         self.requests.intervals.ask_all_again()
         self.requests.loss_failsafe.forget()
         self.forget_start()
@@ -692,6 +694,7 @@ class Vehicle:
             home=self.where.home,
             is_fence_unknown=self.where.is_fence_unknown,
             turns_on_spot=self.persona.turns_on_spot,
+            is_unknown=self.tasks.has_uid and not self.requests.is_identified,
             drives_on=bool(self.requests.loss_failsafe.why_off),
         )
 
@@ -719,6 +722,8 @@ class Vehicle:
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # nothing is asked of one that cannot answer
             self.requests.ask_which(now=now)
+            if self.tasks.has_uid and self.requests.has_not_said_which(now=now):
+                self.tasks.unidentified(now=now)
             self.requests.ask_for_rates(now=now)
 
     def _note(self, text: str, *, now: float) -> None:

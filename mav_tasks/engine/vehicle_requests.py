@@ -161,6 +161,15 @@ class VehicleRequests:
         for request in self.loss_failsafe.requests():
             self._outlet.send(request, self._source)
 
+    def ask_which_again(self, *, now: float) -> None:
+        """Another vehicle may be there now."""
+        self.is_identified, self._versions_asked, self._ask_version_at = False, 0, now
+
+    def has_not_said_which(self, *, now: float) -> bool:
+        """Whether the vehicle was asked often enough which one it is, and did not say."""
+        is_asked = self._versions_asked >= ASK_WHICH and now >= self._ask_version_at
+        return is_asked and not self.is_identified
+
     def ask_which(self, *, now: float) -> None:
         """Ask which vehicle it is, some times, until it has said so."""
         if self.is_identified or self._versions_asked >= ASK_WHICH or now < self._ask_version_at:

@@ -15,7 +15,7 @@ def start_blocker(
 
     Modes are taken only from HOLD or from one that we set; from MANUAL only while disarmed.
     """
-    if not view.heard:
+    if not view.heard or view.is_unknown:
         return TaskReason.VEHICLE_SILENT
     if view.other_controller:
         return TaskReason.OTHER_CONTROLLER

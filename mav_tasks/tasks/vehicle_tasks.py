@@ -201,7 +201,21 @@ class VehicleTasks:
             return
         before, self._uid = self._uid, uid
         self._book.record(VehicleIdentified(self.vehicle, uid, now))
-        if before and (self.is_driving or self._room.count(self.vehicle)):
+        if before:
+            self._may_be_another(now=now)
+
+    @property
+    def has_uid(self) -> bool:
+        """Whether it is known by its unique id whose tasks these are."""
+        return bool(self._uid)
+
+    def unidentified(self, *, now: float) -> None:
+        """The vehicle does not say which one it is, though the one of these tasks has."""
+        self._uid = ""
+        self._may_be_another(now=now)
+
+    def _may_be_another(self, *, now: float) -> None:
+        if self.is_driving or self._room.count(self.vehicle):
             self._executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
 

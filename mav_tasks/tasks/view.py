@@ -39,6 +39,7 @@ class VehicleView:
     home: GlobalPlace | None = None  # where it returns to
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
     turns_on_spot: bool = True  # and reverses; else it is steered by course
+    is_unknown: bool = False  # it has yet to say whether it is the one whose tasks these are
     drives_on: bool = False  # it is known not to stop by itself when nothing is asked of it
 
     @property

@@ -8,12 +8,14 @@ from typing import Any, TypeVar
 
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.mavlink.address import Address
 from mav_tasks.settings import Settings
 from mav_tasks.store import Store
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task, TaskId
+from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
@@ -42,6 +44,21 @@ PROMPT = replace(ARDUPILOT, announces_changes=True)
 def kinematic_body(start: Pose) -> Body:
     """Give the body that scenarios drive: it slips a little, as a skid-steered one does."""
     return KinematicBody(start=start, slip=0.1, seed=None)
+
+
+def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
+    """Give another vehicle that has the same system id; by its unique id it is another one."""
+    body = kinematic_body(start)
+    autopilot = Autopilot(
+        system_id=99,
+        persona=PROMPT,
+        origin=DEFAULT_ORIGIN,
+        unix_offset=0.0,
+        truth=body.state,
+        now=now,
+    )
+    autopilot.address = Address(number, 1)
+    return Vehicle(body=body, autopilot=autopilot, now=now)
 
 
 def is_ready_to_be_driven(rover: Vehicle) -> bool:
@@ -189,6 +206,12 @@ class World(VirtualWorld):
     def operator_arm(self, armed: bool) -> None:
         """Arm or disarm at the first rover."""
         self.rover.autopilot.operator_arm(armed, now=self.now)
+
+    def replace_rover(self, *, switched_on: float) -> None:
+        """Put another rover, by its unique id, in the place of the first one, with its address."""
+        there = self.truth
+        start = Pose(north=there.north, east=there.east, yaw=there.yaw)
+        self.rovers[0] = self.rover_parties[0].vehicle = twin_of(1, start=start, now=switched_on)
 
     def fault(self, faults: Faults) -> None:
         """Break something in the first rover; ``Faults()`` mends it."""

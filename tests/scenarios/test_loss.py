@@ -8,6 +8,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.client import MOVE
 from tests.kit.world import World, near_pose
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
@@ -143,6 +144,19 @@ def test_a_lost_task_does_not_resume_on_a_disarmed_rover(driving: World) -> None
     world.run(8)
     assert world.state(1)[0] is S.PAUSED
     assert not world.rover.autopilot.armed
+
+
+def test_another_rover_of_the_same_id_is_not_given_what_waited_for_the_lost_one(
+    world: World,
+) -> None:
+    world.client.command(MOVE, 2.0, 0, 0, 0, 0, 12.0)
+    world.run(0.5)
+    world.fault(Faults(silent=True))
+    world.run(6)
+    world.replace_rover(switched_on=0.0)  # for as long
+    world.run(25)
+    assert world.truth.north == 0.0
+    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
 
 
 @pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0)])

@@ -12,17 +12,14 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.links.memory import Conditions
-from mav_tasks.mavlink.address import Address
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.events import TaskChanged, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
-from rover_sim.autopilot import Autopilot
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
-from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
 from tests.kit.client import (
@@ -46,11 +43,7 @@ from tests.kit.client import (
     setpoint,
 )
 from tests.kit.fleet import Fleet, Layout, Radio, packed, start_of
-from tests.kit.world import (
-    PROMPT,
-    kinematic_body,
-    near_pose,
-)
+from tests.kit.world import near_pose, twin_of
 
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
 PRIORITY = 1
@@ -603,21 +596,6 @@ def test_what_runs_after_a_task_that_did_not_complete_fails_on_every_link(
 
 
 # places
-
-
-def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
-    """Give another vehicle that has the same system id; by its unique id it is another one."""
-    body = kinematic_body(start)
-    autopilot = Autopilot(
-        system_id=99,
-        persona=PROMPT,
-        origin=DEFAULT_ORIGIN,
-        unix_offset=0.0,
-        truth=body.state,
-        now=now,
-    )
-    autopilot.address = Address(number, 1)
-    return Vehicle(body=body, autopilot=autopilot, now=now)
 
 
 TWINS: dict[str, Layout] = {

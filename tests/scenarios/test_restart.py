@@ -6,6 +6,7 @@ from shutil import copy
 
 import pytest
 
+from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -17,6 +18,7 @@ from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
+VERSION = 148  # AUTOPILOT_VERSION
 UTC = 1.8e9  # s, when the worlds begin
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
 STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
@@ -203,6 +205,30 @@ def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
     world.client.proceed()
     world.run(1)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
+
+
+@pytest.mark.parametrize("answers_lost", [0, 1, 1000])
+def test_another_rover_of_the_same_id_runs_nothing_unasked(
+    world: World, path: Path, answers_lost: int
+) -> None:
+    """After an evening with the simulated one, say: each rover's system id is 1 when it is new."""
+    world.client.command(MOVE, 2.0, 0, 0, 0, 0, 15.0)
+    world.run(0.5)
+    world.server.engine.handle(Shutdown(), now=world.now)
+    world.run(1.0)
+    world.replace_rover(switched_on=world.now)
+    left = [answers_lost]
+
+    def loses(source: str, _target: str, data: bytes) -> bool:
+        is_lost = source == "rover1" and data[7] == VERSION and left[0] > 0
+        left[0] -= is_lost
+        return is_lost
+
+    world.watched.loses = loses
+    restart(world, path, well=True)
+    world.run(40)
+    assert (world.truth.north, world.truth.forward_speed) == (0.0, 0.0)
+    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
 
 
 @pytest.mark.parametrize(("idle", "paused"), [(60.0, R.NONE), (700.0, R.RESTARTED)])
