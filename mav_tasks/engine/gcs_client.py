@@ -49,6 +49,7 @@ class GcsClient:
         self._text_id = 0
         self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
         self._introduced: set[int] = set()
+        self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
         self._submitters: dict[Address, Submitter] = {}  # made once: each command asks for it
         self._receivers: dict[Address, CommandReceiver] = {}
 

@@ -24,6 +24,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import ParameterSet
 
 MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
+LIST_EACH = 0.2  # s: one packet asks for many, and no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
 
 
@@ -72,7 +73,7 @@ class ParameterDesk:
             if component in (BROADCAST, vehicle.server_component):
                 self._answer(client, vehicle, packet, message, now=now)
             elif component == AUTOPILOT and _begins(message):
-                self._list(client, vehicle)
+                self._list(client, vehicle, now=now)
 
     def _answer(
         self,
@@ -86,9 +87,9 @@ class ParameterDesk:
         is_meant = message.target_component != BROADCAST
         match message:
             case m.ParamRequestList():
-                self._list(client, vehicle)
+                self._list(client, vehicle, now=now)
             case m.ParamRequestRead() if _begins(message):
-                self._list(client, vehicle)
+                self._list(client, vehicle, now=now)
             case m.ParamRequestRead() if is_meant or name_in(message) in PARAMETERS:
                 answer = param_receiver.read(self._values(), message, to=packet.source)
                 client.outlet.send(answer, vehicle.server_address)
@@ -98,7 +99,11 @@ class ParameterDesk:
     def _values(self) -> dict[str, float]:
         return {name: each.value(self._settings) for name, each in PARAMETERS.items()}
 
-    def _list(self, client: GcsClient, vehicle: Vehicle) -> None:
+    def _list(self, client: GcsClient, vehicle: Vehicle, *, now: float) -> None:
+        listed_at = client.listed_at.get(vehicle.system_id)
+        if listed_at is not None and now - listed_at < LIST_EACH:
+            return
+        client.listed_at[vehicle.system_id] = now
         for value in param_receiver.all_values(self._values()):
             client.outlet.send(value, vehicle.server_address)
 

@@ -70,6 +70,19 @@ def test_every_vehicles_server_lists_them(make_world: MakeWorld) -> None:
     assert len(told(world.client, (1, 191))) == len(told(world.client, (2, 191))) > 0
 
 
+def test_lists_are_not_sent_faster_than_anybody_reads_them(world: World) -> None:
+    """One packet asks for nineteen, and setpoints leave by the same loop."""
+    for _ in range(200):
+        world.client.send(ask_all(191))
+        world.run(0.002)
+    assert len(PARAMETERS) <= len(told(world.client)) <= 3 * len(PARAMETERS)
+    world.run(0.2)
+    before = len(told(world.client))
+    world.client.send(ask_all(191))
+    world.run(0.1)
+    assert len(told(world.client)) - before == len(PARAMETERS)
+
+
 def test_one_is_read_by_name_and_by_number(world: World) -> None:
     world.client.send(ask(191, "TSK_SPEED_MAX"))
     world.client.send(ask(191, index=0))
