@@ -132,6 +132,9 @@ async def _run(
 ) -> int:
     now = asyncio.get_running_loop().time()
     engine = Engine(settings, now=now, restored=restored)  # what the store gave back
+    for why in engine.not_in_force:
+        _say(f"not in force, though set before: {why}")
+    sys.stdout.flush()
     tame_collector()
     return await Runner(engine, store, clients=clients, vehicles=vehicles).run()
 

@@ -67,7 +67,9 @@ class Engine:
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         kept = {} if restored is None else restored.parameters
-        configured, (settings, _) = settings, with_all(settings, kept)
+        configured, (settings, why_not) = settings, with_all(settings, kept)
+        #: why parameters that were set in an earlier run have no effect any more
+        self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._journal: list[Event] = []

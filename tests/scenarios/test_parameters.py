@@ -7,10 +7,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.engine import Engine
 from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.restored import Restored
 from tests.kit.client import FakeClient
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World
@@ -170,6 +172,12 @@ def test_a_restart_keeps_what_was_set(make_world: MakeWorld, tmp_path: Path) -> 
     assert told(world.client) == [("TSK_SPEED", 3.0)]
     assert world.server.engine.snapshot(now=world.now).vehicles
     again.close()
+
+
+def test_what_was_kept_and_is_out_of_range_now_is_named() -> None:
+    restored = Restored(parameters={"TSK_SPEED": 0.4, "TSK_SPEED_MAX": 50.0})
+    engine = Engine(Settings(), now=0.0, restored=restored)
+    assert engine.not_in_force == ("TSK_SPEED_MAX 50: not in 0.05..10",)
 
 
 def test_it_is_not_told_before_it_is_stored(make_world: MakeWorld) -> None:

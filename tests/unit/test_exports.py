@@ -24,10 +24,10 @@ def test_the_engine_has_five_methods_and_a_view() -> None:
     assert public(Engine) == sorted([*methods, "snapshot"])
 
 
-def test_the_engine_shows_its_last_words() -> None:
+def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
     engine = Engine(settings.Settings(), now=0.0)
-    assert [name for name in vars(engine) if not name.startswith("_")] == ["last_words"]
-    assert engine.last_words == ()
+    assert public(engine) == ["last_words", "not_in_force"]
+    assert (engine.last_words, engine.not_in_force) == ((), ())
 
 
 def test_time_comes_in_as_a_keyword() -> None:
