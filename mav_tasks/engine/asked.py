@@ -49,7 +49,7 @@ class Asked:
     @property
     def answers_to(self) -> Hashable:
         """What one answer is enough for, however often it was asked."""
-        return self.client.key, type(self), self.command.command
+        return self.client.key, type(self), self.command.command, self.answering
 
     @property
     def is_go_to(self) -> bool:

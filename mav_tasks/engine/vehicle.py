@@ -260,7 +260,7 @@ class Vehicle:
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
-        self.requests.ask_which_again(now=now)
+        self.requests.ask_which_again()
         self._book.record(VehicleSeen(self.system_id, "heard again", now))
         if self.control.phase is Phase.STOPPING:
             self._begin_stop(now=now)
@@ -299,7 +299,7 @@ class Vehicle:
     def _rebooted(self, *, now: float) -> None:
         """Its frame may be another one now, and nothing of ours is in force there."""
         self.where.forget()
-        self.requests.ask_which_again(now=now)
+        self.requests.ask_which_again()
         self.requests.intervals.ask_all_again()
         self.requests.loss_failsafe.forget()
         self.forget_start()

@@ -161,10 +161,6 @@ class VehicleRequests:
         for request in self.loss_failsafe.requests():
             self._outlet.send(request, self._source)
 
-    def ask_which_again(self, *, now: float) -> None:
-        """Another vehicle may be there now."""
-        self.is_identified, self._versions_asked, self._ask_version_at = False, 0, now
-
     def has_not_said_which(self, *, now: float) -> bool:
         """Whether the vehicle was asked often enough which one it is, and did not say."""
         is_asked = self._versions_asked >= ASK_WHICH and now >= self._ask_version_at

@@ -57,11 +57,12 @@ def test_go_to_in_three_forms_is_one_task(world: World) -> None:
 def test_each_form_is_answered_though_none_is_stored_yet(world: World) -> None:
     place = at(2.0, 0.5)
     sent = [
-        world.client.command_int(command, **place, frame=GLOBAL)
+        world.client.command_int(command, **place, frame=GLOBAL, target=target)
         for command in (REPOSITION, WAYPOINT)
+        for target in ((1, 1), (1, 191))
     ]
     world.run(0.3)
-    assert [each.answer for each in sent] == [(ACCEPTED, 1)] * 2
+    assert [each.answer for each in sent] == [(ACCEPTED, 1)] * 4
     assert len(world.tasks()) == 1
 
 
