@@ -11,6 +11,7 @@ from time import monotonic
 
 from mav_tasks.links.base import Peer, PeerChange, PeerState
 from mav_tasks.links.out_queue import OutQueue
+from mav_tasks.links.url import LinkUrl
 from mav_tasks.links.way_out import WayOut
 
 PIECE = 280  # bytes read at once, a MAVLink packet: a piece takes no longer to handle than one
@@ -178,6 +179,39 @@ class Connections:
             except OSError as error:
                 return reason_of(error)
         return None
+
+
+class TcpLink:
+    """What the links have in common that are made of such connections."""
+
+    peers: tuple[Peer, ...] = ()
+    is_stream = True
+
+    def __init__(self, url: LinkUrl, connections: Connections) -> None:
+        self.name = str(url)
+        self.is_local = url.is_loopback
+        self._connections = connections
+
+    @property
+    def lost(self) -> int:
+        """Packets that were dropped, or for nobody."""
+        return self._connections.lost
+
+    def fileno(self) -> int:
+        """Give the descriptor of all of it."""
+        return self._connections.fileno()
+
+    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
+        """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
+        return self._connections.receive(limit)
+
+    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
+        """Send a packet, or let it wait; to who is not there it is lost."""
+        self._connections.send(peer, data, first=first)
+
+    def take_changes(self) -> list[PeerChange]:
+        """Give what became of peers since the last call."""
+        return self._connections.take_changes()
 
 
 def prepare(sock: socket.socket, way: WayOut) -> None:

@@ -4,23 +4,17 @@ import selectors
 import socket
 
 from mav_tasks.errors import LinkOpenError
-from mav_tasks.links.base import Peer, PeerChange
-from mav_tasks.links.tcp import Connection, Connections, reason_of, resolve
+from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
 from mav_tasks.links.url import LinkUrl
 from mav_tasks.links.way_out import WayOut
 
 BACKLOG = 64  # connections that the system keeps until they are accepted
 
 
-class TcpInLink:
+class TcpInLink(TcpLink):
     """A listening TCP socket and its connections."""
 
-    peers: tuple[Peer, ...] = ()
-    is_stream = True
-
     def __init__(self, url: LinkUrl, *, way: WayOut) -> None:
-        self.name = str(url)
-        self.is_local = url.is_loopback
         self.refused = 0  # connections
         try:
             family, address = resolve(url.host, url.port)[0]
@@ -28,7 +22,7 @@ class TcpInLink:
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
         self._most = way.connections
-        self._connections = Connections(way, other=self._accept, ended=self._end)
+        super().__init__(url, Connections(way, other=self._accept, ended=self._end))
         self._is_accepting = False
         self._accept_again()
 
@@ -36,30 +30,9 @@ class TcpInLink:
         return f"TcpInLink({self.name}, {len(self._connections)} connections)"
 
     @property
-    def lost(self) -> int:
-        """Packets that were dropped, or for nobody."""
-        return self._connections.lost
-
-    @property
     def port(self) -> int:
         """The port on which it listens."""
         return int(self._socket.getsockname()[1])
-
-    def fileno(self) -> int:
-        """Give the descriptor of all of it."""
-        return self._connections.fileno()
-
-    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
-        return self._connections.receive(limit)
-
-    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
-        """Send a packet, or let it wait; to who is gone it is lost."""
-        self._connections.send(peer, data, first=first)
-
-    def take_changes(self) -> list[PeerChange]:
-        """Give what became of peers since the last call."""
-        return self._connections.take_changes()
 
     def tend(self) -> None:
         """Look for congestions."""

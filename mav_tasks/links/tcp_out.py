@@ -7,58 +7,32 @@ from time import monotonic
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Peer, PeerChange, PeerState
-from mav_tasks.links.tcp import Connection, Connections, reason_of, resolve
+from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
 from mav_tasks.links.url import LinkUrl
 from mav_tasks.links.way_out import WayOut
 
 CONNECT_LIMIT = 3.0  # s for the other end to answer
 
 
-class TcpOutLink:
+class TcpOutLink(TcpLink):
     """A TCP connection that is made again whenever it is lost.
 
     The host's addresses are looked up once, at the beginning: to look again could take seconds.
     """
 
-    peers: tuple[Peer, ...] = ()
-    is_stream = True
-
     def __init__(self, url: LinkUrl, *, way: WayOut) -> None:
-        self.name = str(url)
-        self.is_local = url.is_loopback
         self._peer: Peer = (url.host, url.port)
         try:
             self._addresses = resolve(url.host, url.port)
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
-        self._connections = Connections(way, other=self._answered, ended=self._end)
+        super().__init__(url, Connections(way, other=self._answered, ended=self._end))
         self._attempts = Attempts()
         self._dialling: socket.socket | None = None
         self._give_up_at = 0.0
 
     def __repr__(self) -> str:
         return f"TcpOutLink({self.name}, {'up' if len(self._connections) else 'down'})"
-
-    @property
-    def lost(self) -> int:
-        """Packets that were dropped, or for nobody."""
-        return self._connections.lost
-
-    def fileno(self) -> int:
-        """Give the descriptor of all of it."""
-        return self._connections.fileno()
-
-    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` pieces; send what waits."""
-        return self._connections.receive(limit)
-
-    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
-        """Send a packet, or let it wait; while nobody is there it is lost."""
-        self._connections.send(peer, data, first=first)
-
-    def take_changes(self) -> list[PeerChange]:
-        """Give what became of the peer since the last call."""
-        return self._connections.take_changes()
 
     def tend(self) -> None:
         """Dial if it is time to; look for congestions."""
