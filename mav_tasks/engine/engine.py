@@ -10,7 +10,6 @@ from typing import assert_never
 
 from mav_tasks.engine.commands import Commands
 from mav_tasks.engine.displays import Displays
-from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import (
     Committed,
@@ -20,7 +19,6 @@ from mav_tasks.engine.inputs import (
     LinkSide,
     Outgoing,
     Packets,
-    Peer,
     PeerChanged,
     SettingsChanged,
     Shutdown,
@@ -31,22 +29,18 @@ from mav_tasks.engine.intake import Intake
 from mav_tasks.engine.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.mission_reports import MissionReports
 from mav_tasks.engine.mode_requests import ModeRequests
-from mav_tasks.engine.motion_gate import may_pass, passed, withheld
 from mav_tasks.engine.operator_watch import OperatorWatch
 from mav_tasks.engine.parameters import MESSAGES as PARAMETER_MESSAGES
 from mav_tasks.engine.parameters import ParameterDesk
+from mav_tasks.engine.passing import Passing
 from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
-from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.codec import Packer, target_of
-from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import file_transfer
+from mav_tasks.mavlink.codec import Packer
 from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
@@ -55,11 +49,6 @@ from mav_tasks.tasks.events import Event, ServerStopped
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.recollection import Recollection
 from mav_tasks.tasks.restored import Restored
-
-EVERYBODY = Address(0, 0)
-SETUP_SIGNING = 256
-#: never forwarded: no client may change a vehicle's keys
-CLAIMED = frozenset({SETUP_SIGNING})
 
 
 class Engine:
@@ -119,6 +108,7 @@ class Engine:
             settings,
         )
         self._publisher = Publisher(self._gcs, self._vehicles, self._book, self._displays)
+        self._passing = Passing(self._vehicles)
         self._operator = OperatorWatch()
         self._stop_by: float | None = None
         self._stopped = False
@@ -144,7 +134,7 @@ class Engine:
                 self._gcs.change_peer(item, now=now)
                 self._vehicles.change_peer(item)
                 if self._gcs.owns(item.link):
-                    self._release(item.link, item.peer, now=now)
+                    self._passing.end(item.link, item.peer, now=now)
             case Congestion():
                 self._gcs.note_congestion(item, now=now)
             case Committed(through=through):
@@ -260,47 +250,12 @@ class Engine:
             client, packet, message, now=now
         ):
             return
-        elif packet.message_id not in CLAIMED:
+        else:
             if isinstance(message, m.Heartbeat):
                 self._operator.receive(message, now=now)
             elif isinstance(message, PARAMETER_MESSAGES):
                 self._parameters.receive(client, packet, message, now=now)
-            elif isinstance(message, m.FileTransferProtocol):
-                self._refuse_file(client, packet, message)
-            self._forward(client, received, now=now)
-
-    def _refuse_file(
-        self, client: GcsClient, packet: Packet, message: m.FileTransferProtocol
-    ) -> None:
-        vehicle = self._vehicles.get(message.target_system)
-        if vehicle is not None and target_of(message) == vehicle.server_address:
-            refusal = file_transfer.refusal(message, to=packet.source)
-            if refusal is not None:
-                client.outlet.send(refusal, vehicle.server_address)
-
-    def _forward(self, client: GcsClient, received: Received, *, now: float) -> None:
-        """Pass a client's packet to the vehicles that it is for; what is for us ends here."""
-        message = received.message
-        target = EVERYBODY if message is None else _target(message)
-        behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
-        for vehicle in self._vehicles.addressed_by(target.system_id):
-            if target != vehicle.server_address:
-                behind.setdefault(vehicle.requests.place, []).append(vehicle)
-        for vehicles in behind.values():
-            if all(may_pass(vehicle, client.key, message) for vehicle in vehicles):
-                for vehicle in vehicles:
-                    passed(vehicle, message, now=now)
-                vehicles[0].requests.forward(received.packet)
-            else:
-                for vehicle in vehicles:
-                    withheld(vehicle, client.key, message, now=now)
-
-    def _release(self, link: str, peer: Peer, *, now: float) -> None:
-        """Whatever a client that is gone was driving is driven by nobody."""
-        for vehicle in self._vehicles:
-            if vehicle.has_granted((link, peer)):
-                self._vehicles.touch(vehicle)
-                vehicle.client_is_gone((link, peer), now=now)
+            self._passing.pass_on(client, packet, message, now=now)
 
     def _watch_operator(self, *, now: float) -> None:
         is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)
@@ -353,10 +308,3 @@ class Engine:
         if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True
             self._book.record(ServerStopped(rolling, now))
-
-
-def _target(message: m.Message) -> Address:
-    """Give whom a message is for, 0 for all."""
-    if isinstance(message, m.ManualControl):  # its field has a name of its own
-        return Address(message.target, 0)
-    return target_of(message)
