@@ -6,7 +6,7 @@ from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_side import GcsSide
-from mav_tasks.engine.goals import wish_of
+from mav_tasks.engine.goals import OURS, wish_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -18,6 +18,8 @@ from mav_tasks.tasks.recollection import Known, Recollection, Rule
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
 R = TaskReason
+
+NONCE = 3  # where it is among the parameters
 
 
 class Submissions:
@@ -72,8 +74,10 @@ class Submissions:
             now=now,
             priority=self._priority_of(submitter),
         )
-        # a stock client cannot read TASK_STATUS, and counts it as a packet lost; none sets a nonce
-        asked.client.uses_dialect |= bool(wish.marks.nonce)
+        # A stock client cannot read TASK_STATUS, and counts it as a packet lost; it fills up with
+        # zeros. A nonce, or NaN for none, comes from somebody who knows these commands.
+        is_ours = command.command in OURS
+        asked.client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         goal = as_driven(wish.goal, turns_on_spot=vehicle.persona.turns_on_spot)
         self._check_reach(vehicle, goal)
         draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)

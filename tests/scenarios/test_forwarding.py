@@ -415,11 +415,12 @@ def test_what_a_stock_client_may_send_brings_it_nothing_that_it_cannot_read(
     assert not [p for p in stock.received if p.message_id in OUR_MESSAGES]
 
 
-@pytest.mark.parametrize("how", ["nonce", "asked", "streamed", "queue"])
+@pytest.mark.parametrize("how", ["nonce", "NaN", "asked", "streamed", "queue"])
 def test_who_knows_our_dialect_is_told_of_its_tasks(world: World, how: str) -> None:
     client = world.add_client("stock", reads_dialect=False)
     world.run(1.2)
-    sent = client.move(0.5, nonce=7 if how == "nonce" else 0)
+    nonce = {"nonce": 7.0, "NaN": nan}.get(how, 0.0)
+    sent = client.command(MOVE, 0.5, 0, 0, nonce, 0, 0, 5)
     world.run(0.1)
     if how == "asked":
         client.request_status(sent.task_id)
