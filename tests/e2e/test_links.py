@@ -30,6 +30,7 @@ HOST = "127.0.0.1"
 BAUD = 57_600
 ANSWER = 0.5  # s, within which each command is acknowledged
 SETPOINT_GAP = 0.5  # s; later than this the server itself would call the tick late
+ASKS_EACH = 0.1  # s; each is 2 KB of answers, and a rover that has more to say is slow by itself
 #: ATTITUDE, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, VFR_HUD, GPS_RAW_INT, SYS_STATUS
 STREAMS = (30, 32, 33, 74, 24, 1)
 MAGIC_V2 = 0xFD
@@ -230,10 +231,12 @@ def test_one_that_reads_nothing_delays_no_answer_and_no_setpoint(tmp_path: Path)
         deaf.sendall(everything_please())
         task_id = running.drive(link, 4.0)
         before = memory(running.server.popen.pid)
-        began, answers = monotonic(), []
+        began, answers, asked_at = monotonic(), [], 0.0
         while monotonic() - began < 6.0:
-            deaf.sendall(everything_please())  # each is answered, and nobody takes the answers
             sent_at = monotonic()
+            if sent_at - asked_at > ASKS_EACH:
+                asked_at = sent_at
+                deaf.sendall(everything_please())  # it is answered, and nobody takes the answers
             submit(link, 512, 148.0, target=(1, 1))  # AUTOPILOT_VERSION
             answers.append(monotonic() - sent_at)
 
