@@ -11,6 +11,9 @@ from random import Random
 
 from mav_tasks.links.base import Peer
 
+#: of the first link: no descriptor is as high, as the kernel counts them in an int
+FIRST_NUMBER = 2**31
+
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
@@ -30,17 +33,28 @@ class MemoryNet:
         self.conditions = conditions or Conditions()
         self._random = Random(seed)
         self._links: dict[str, MemoryLink] = {}
+        self._numbered: list[MemoryLink] = []
         self._under_way: list[tuple[float, int, str, str, bytes]] = []
         self._order = count()
 
     def link(self, name: str, *, peers: tuple[str, ...] = ()) -> "MemoryLink":
         """Give a new link whose peers know it by ``name``."""
-        link = self._links[name] = MemoryLink(self, name, peers)
+        number = FIRST_NUMBER + len(self._numbered)
+        link = self._links[name] = MemoryLink(self, name, peers, number)
+        self._numbered.append(link)
         return link
+
+    def is_readable(self, number: int) -> bool:
+        """Whether something has arrived at the link whose ``fileno`` this is."""
+        return bool(self._numbered[number - FIRST_NUMBER].arrived)
+
+    def conditions_between(self, source: str, target: str) -> Conditions:  # noqa: ARG002
+        """Give how bad this way is; a net whose ways differ says so here."""
+        return self.conditions
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Put a datagram under way, or lose it, or double it."""
-        how = self.conditions
+        how = self.conditions_between(source, target)
         copies = 0 if self._random.random() < how.loss else 1
         if copies and self._random.random() < how.duplication:
             copies = 2
@@ -71,8 +85,9 @@ class MemoryLink:
     is_local = True
     is_stream = False
 
-    def __init__(self, net: MemoryNet, name: str, peers: tuple[Peer, ...]) -> None:
+    def __init__(self, net: MemoryNet, name: str, peers: tuple[Peer, ...], number: int) -> None:
         self._net = net
+        self._number = number
         self.name = name
         self.peers = peers
         self.arrived: deque[tuple[Peer, bytes]] = deque()
@@ -81,8 +96,8 @@ class MemoryLink:
         return f"MemoryLink({self.name})"
 
     def fileno(self) -> int:
-        """There is no descriptor: whoever moves the net's time reads the link."""
-        return -1
+        """Give a number of the link's own; no descriptor: ``MemoryNet.is_readable`` takes it."""
+        return self._number
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
         """Give up to ``limit`` datagrams that have arrived."""

@@ -8,6 +8,7 @@ from mav_tasks.links.url import LinkUrl, is_loopback
 
 RECEIVE_BUFFER = 1 << 20  # bytes; a burst of telemetry waits here while the disk is slow
 MAX_DATAGRAM = 65536
+LOOPBACK = {socket.AF_INET: "127.0.0.1", socket.AF_INET6: "::1"}
 
 
 class UdpLink:
@@ -21,13 +22,18 @@ class UdpLink:
         try:
             family, address = _resolve(url.host, url.port)
             pushed = tuple(_resolve(host, port)[1] for host, port in push)
-            self._socket = _open(family, address if url.kind == "udpin" else None)
+            self.is_local = url.is_loopback and all(is_loopback(host) for host, _ in push)
+            bind_to: tuple[str, int] | None = None
+            if url.kind == "udpin":
+                bind_to = address
+            elif self.is_local:  # else the system has it hear other machines, too
+                bind_to = (LOOPBACK[family], 0)
+            self._socket = _open(family, bind_to)
         except OSError as error:
             reason = error.strerror or str(error)
             raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
         dialled: tuple[tuple[str, int], ...] = (address,) if url.kind == "udpout" else ()
         self.peers: tuple[Peer, ...] = dialled + pushed
-        self.is_local = url.is_loopback and all(is_loopback(host) for host, _ in push)
 
     def __repr__(self) -> str:
         return f"UdpLink({self.name})"

@@ -1,18 +1,21 @@
 """Link URLs: ``udpin`` and ``tcpin`` listen, ``udpout`` and ``tcp`` dial, ``serial`` is a line.
 
-``kind:host:port``, and ``serial:/dev/ttyUSB0:57600`` with the baud rate.
+``kind:host:port``, and ``serial:/dev/ttyUSB0:57600`` with the baud rate. Behind a question mark
+stands what is asked of signatures there: ``unsigned=allow`` or ``refuse``, and ``key=NAME``.
 """
 
 import ipaddress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from mav_tasks.errors import InsecureLinkError, LinkUrlError
+from mav_tasks.errors import LinkUrlError
 
 KINDS = ("udpin", "udpout", "tcpin", "tcp")
 SERIAL = "serial"
 BAUD_RATES = range(1_200, 12_000_001)
 EXPECTED = "expected " + ", ".join(f"{kind}:host:port" for kind in KINDS)
 EXPECTED += f" or {SERIAL}:device:baud"
+OPTIONS = "unsigned=allow, unsigned=refuse and key=NAME"
+UNSIGNED = {"allow": True, "refuse": False}
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +25,9 @@ class LinkUrl:
     kind: str
     host: str
     port: int
+    #: whether unsigned packets are taken, None: it does not say; it is the same link all the same
+    unsigned: bool | None = field(default=None, compare=False)
+    key: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"{self.kind}:{self.host}:{self.port}"
@@ -31,6 +37,11 @@ class LinkUrl:
         """Whether only this machine can be on the other end."""
         return is_loopback(self.host)
 
+    @property
+    def is_udp(self) -> bool:
+        """Whether it is of UDP."""
+        return self.kind.startswith("udp")
+
 
 @dataclass(frozen=True, slots=True)
 class SerialUrl:
@@ -38,6 +49,8 @@ class SerialUrl:
 
     device: str
     baud: int  # bits per second; a byte takes ten
+    unsigned: bool | None = field(default=None, compare=False)  # as that of LinkUrl
+    key: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"{SERIAL}:{self.device}:{self.baud}"
@@ -45,29 +58,53 @@ class SerialUrl:
 
 def parse_url(text: str) -> LinkUrl | SerialUrl:
     """Give the parts of a link URL; LinkUrlError says what is wrong with it."""
-    kind, _, rest = text.partition(":")
+    where, _, options = text.partition("?")
+    unsigned, key = _parse_options(options, what=f"link {text!r}")
+    kind, _, rest = where.partition(":")
     if kind == SERIAL:
-        return _parse_serial(rest, what=f"link {text!r}")
+        device, baud = _parse_serial(rest, what=f"link {text!r}")
+        return SerialUrl(device, baud, unsigned, key)
     if kind not in KINDS:
         raise LinkUrlError(f"link {text!r}: {EXPECTED}")
     host, port = parse_endpoint(rest, what=f"link {text!r}")
-    return LinkUrl(kind, host, port)
+    return LinkUrl(kind, host, port, unsigned, key)
 
 
 def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
     """Give (host, port) of ``host:port``; LinkUrlError names ``what`` they are for."""
     host, _, port = text.removeprefix("//").rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+    host = host.strip("[]")
+    if not host or not _is_number(port) or not 0 < int(port) < 65536:
         raise LinkUrlError(f"{what}: expected host:port with a port from 1 to 65535")
-    return host.strip("[]"), int(port)
+    return host, int(port)
 
 
-def _parse_serial(text: str, *, what: str) -> SerialUrl:
+def _parse_options(text: str, *, what: str) -> tuple[bool | None, str]:
+    options: dict[str, str] = {}
+    for each in text.split("&") if text else ():
+        name, _, value = each.partition("=")
+        if name in options:
+            raise LinkUrlError(f"{what}: {name} is said twice")
+        if name not in ("unsigned", "key"):
+            raise LinkUrlError(f"{what}: no such option {name!r}: there are {OPTIONS}")
+        if not value or (name == "unsigned" and value not in UNSIGNED):
+            raise LinkUrlError(f"{what}: {name}: expected one of {OPTIONS}")
+        options[name] = value
+    unsigned = UNSIGNED[options["unsigned"]] if "unsigned" in options else None
+    return unsigned, options.get("key", "")
+
+
+def _parse_serial(text: str, *, what: str) -> tuple[str, int]:
     device, _, baud = text.rpartition(":")
-    if not device or not baud.isdecimal() or len(baud) > 8 or int(baud) not in BAUD_RATES:
+    if not device or not _is_number(baud) or int(baud) not in BAUD_RATES:
         rates = f"from {BAUD_RATES[0]} to {BAUD_RATES[-1]}"
         raise LinkUrlError(f"{what}: expected {SERIAL}:device:baud with a baud rate {rates}")
-    return SerialUrl(device, int(baud))
+    return device, int(baud)
+
+
+def _is_number(text: str) -> bool:
+    """Whether it is a whole number, of so few digits that Python makes one of it."""
+    return text.isdecimal() and len(text) <= 8
 
 
 def is_loopback(host: str) -> bool:
@@ -78,15 +115,3 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def refuse_insecure(url: LinkUrl | SerialUrl) -> None:
-    """Raise InsecureLinkError for a link that other machines can reach.
-
-    A serial line is a wire that the operator has chosen: nobody can dial it.
-    """
-    if isinstance(url, LinkUrl) and not url.is_loopback:
-        raise InsecureLinkError(
-            f"link {url} reaches beyond this machine and has no signing key: "
-            "anybody there could drive the vehicle; say --insecure if that is meant"
-        )

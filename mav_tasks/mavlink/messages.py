@@ -57,6 +57,7 @@ RcChannelsOverride = d.MAVLink_rc_channels_override_message
 RequestDataStream = d.MAVLink_request_data_stream_message
 SetActuatorControlTarget = d.MAVLink_set_actuator_control_target_message
 SetAttitudeTarget = d.MAVLink_set_attitude_target_message
+SetupSigning = d.MAVLink_setup_signing_message
 SetGpsGlobalOrigin = d.MAVLink_set_gps_global_origin_message
 SetMode = d.MAVLink_set_mode_message
 SetPositionTargetGlobalInt = d.MAVLink_set_position_target_global_int_message
@@ -66,6 +67,7 @@ SystemTime = d.MAVLink_system_time_message
 SysStatus = d.MAVLink_sys_status_message
 TaskQueueStatus = d.MAVLink_task_queue_status_message
 TaskStatus = d.MAVLink_task_status_message
+TaskTiming = d.MAVLink_task_timing_message
 Timesync = d.MAVLink_timesync_message
 VfrHud = d.MAVLink_vfr_hud_message
 

@@ -123,9 +123,14 @@ def with_payload(packet: Packet, at: int, data: bytes) -> Packet:
     return packet._replace(raw=raw)
 
 
+def with_flags(raw: bytes, flags: int) -> bytes:
+    """Give a MAVLink 2 packet's bytes with other incompat flags, corrected as in ``with_seq``."""
+    return _patched(raw, 2, flags)
+
+
 def _unsigned(raw: bytes) -> bytes:
     if raw[0] == MAGIC_V2 and raw[2] & SIGNED:
-        return _patched(raw[:-SIGNATURE_LENGTH], 2, raw[2] & ~SIGNED)
+        return with_flags(raw[:-SIGNATURE_LENGTH], raw[2] & ~SIGNED)
     return raw
 
 

@@ -5,6 +5,10 @@ Outgoing seq = incoming + injected − withheld (mod 256), for each source and r
 
 from mav_tasks.mavlink.address import Address
 
+#: sources whose numbers are kept; those of more that pass through are left as they came. Anybody
+#: can make up 65,536 of them
+MOST = 1_000
+
 
 class SequenceKeeper:
     """The sequence numbers towards one receiver, for each source."""
@@ -16,15 +20,20 @@ class SequenceKeeper:
     def forwarded(self, source: Address, seq: int) -> int:
         """Give the number under which a packet numbered ``seq`` is passed on."""
         number = (seq + self._offset.get(source, 0)) & 0xFF
-        self._next[source] = (number + 1) & 0xFF
+        if source in self._next or len(self._next) < MOST:
+            self._next[source] = (number + 1) & 0xFF
         return number
 
     def withheld(self, source: Address) -> None:
         """Note that a packet of the source is not passed on."""
-        self._offset[source] = (self._offset.get(source, 0) - 1) & 0xFF
+        if source in self._offset or len(self._offset) < MOST:
+            self._offset[source] = (self._offset.get(source, 0) - 1) & 0xFF
 
     def injected(self, source: Address) -> int:
         """Give the number of a packet of our own, put into the source's stream."""
+        for numbers in (self._next, self._offset):
+            if source not in numbers and len(numbers) >= MOST:
+                del numbers[next(iter(numbers))]  # that one begins anew, which looks like a gap
         number = self._next.get(source, 0)
         self._next[source] = (number + 1) & 0xFF
         self._offset[source] = (self._offset.get(source, 0) + 1) & 0xFF

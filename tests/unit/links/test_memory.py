@@ -89,3 +89,24 @@ def test_a_closed_link_has_lost_what_had_arrived() -> None:
     net.deliver()
     b.close()
     assert b.receive(10) == []
+
+
+def test_each_link_has_a_number_that_says_whether_something_has_arrived() -> None:
+    net = MemoryNet()
+    a, b = pair(net)
+    a.send("b", b"x")
+    assert not net.is_readable(b.fileno())
+    net.now = 1.0
+    net.deliver()
+    assert (net.is_readable(a.fileno()), net.is_readable(b.fileno())) == (False, True)
+    b.receive(1)
+    assert not net.is_readable(b.fileno())
+
+
+def test_a_link_in_the_place_of_another_has_a_number_of_its_own() -> None:
+    net = MemoryNet()
+    before, after = net.link("a"), net.link("a")
+    net.link("b").send("a", b"x")
+    net.now = 1.0
+    net.deliver()
+    assert (net.is_readable(before.fileno()), net.is_readable(after.fileno())) == (False, True)

@@ -137,3 +137,29 @@ def test_a_datagram_that_the_system_does_not_take_is_counted(listening: UdpLink)
 
 def test_it_says_what_it_is(listening: UdpLink) -> None:
     assert repr(listening) == f"UdpLink(udpin:{HOST}:0)"
+
+
+@pytest.mark.parametrize("family", [socket.AF_INET, socket.AF_INET6])
+def test_a_link_that_dials_this_machine_hears_no_other(
+    family: socket.AddressFamily, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The system would bind its socket to every address, where anybody may send."""
+    made: list[socket.socket] = []
+    kind = socket.socket
+
+    def noted(*arguments: int) -> socket.socket:
+        made.append(kind(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(socket, "socket", noted)
+    host = HOST if family == socket.AF_INET else "::1"
+    link = UdpLink(LinkUrl("udpout", host, 9))
+    link.send(link.peers[0], b"hello")
+    assert made[0].getsockname()[0] == host
+    link.close()
+
+
+def test_one_that_speaks_to_others_too_hears_them() -> None:
+    link = UdpLink(LinkUrl("udpout", HOST, 9), push=(("192.0.2.1", 9),))
+    assert not link.is_local
+    link.close()

@@ -1,17 +1,18 @@
 """Link URLs; every error names what is wrong."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.errors import InsecureLinkError, LinkUrlError
+from mav_tasks.errors import LinkUrlError
 from mav_tasks.links.url import (
     LinkUrl,
     SerialUrl,
     is_loopback,
     parse_endpoint,
     parse_url,
-    refuse_insecure,
 )
 
 RATES = "from 1200 to 12000000"
@@ -80,6 +81,8 @@ def test_a_url_reads_as_it_is_written(text: str) -> None:
                 "udpin:127.0.0.1:0",
                 "udpin:127.0.0.1:65536",
                 "udpin:127.0.0.1:-1",
+                "udpin:127.0.0.1:" + "1" * 5_000,
+                "udpin:[]:14560",
                 "udpin:127.0.0.1:http",
                 "udpout:",
                 "tcp:host",
@@ -127,19 +130,40 @@ def test_only_this_machine_is_loopback(host: str, loopback: bool) -> None:
     assert is_loopback(host) is loopback
 
 
-def test_a_link_beyond_this_machine_is_refused_and_the_way_out_is_said() -> None:
-    refuse_insecure(parse_url("udpin:127.0.0.1:14560"))
-    with pytest.raises(InsecureLinkError, match=r"udpin:0\.0\.0\.0:14560 .* say --insecure"):
-        refuse_insecure(parse_url("udpin:0.0.0.0:14560"))
+@pytest.mark.parametrize(
+    ("options", "unsigned", "key"),
+    [
+        ("", None, ""),
+        ("?unsigned=allow", True, ""),
+        ("?unsigned=refuse", False, ""),
+        ("?key=rover-1", None, "rover-1"),
+        ("?key=rover-1&unsigned=allow", True, "rover-1"),
+    ],
+)
+@pytest.mark.parametrize("link", ["udpin:0.0.0.0:14560", "serial:/dev/ttyUSB0:57600"])
+def test_a_url_says_what_is_asked_of_signatures(
+    link: str, options: str, unsigned: bool | None, key: str
+) -> None:
+    url = parse_url(link + options)
+    assert (url.unsigned, url.key) == (unsigned, key)
+    assert str(url) == link
+    assert url == parse_url(link), "it is the same link, whatever is asked of it"
 
 
 @pytest.mark.parametrize(
-    "text", ["tcpin:0.0.0.0:5760", "tcp:192.0.2.1:5760", "udpout:rover.local:1"]
+    ("options", "words"),
+    [
+        (
+            "?keys=a",
+            "no such option 'keys': there are unsigned=allow, unsigned=refuse and key=NAME",
+        ),
+        ("?unsigned=yes", "unsigned: expected one of "),
+        ("?unsigned", "unsigned: expected one of "),
+        ("?key=", "key: expected one of "),
+        ("?key=a&key=b", "key is said twice"),
+        ("?key=a&", "no such option ''"),
+    ],
 )
-def test_who_can_be_reached_over_a_net_is_refused_by_any_kind_of_link(text: str) -> None:
-    with pytest.raises(InsecureLinkError):
-        refuse_insecure(parse_url(text))
-
-
-def test_a_serial_line_is_a_wire_that_the_operator_has_chosen() -> None:
-    refuse_insecure(parse_url("serial:/dev/ttyUSB0:57600"))
+def test_an_unknown_option_is_refused_by_name(options: str, words: str) -> None:
+    with pytest.raises(LinkUrlError, match=re.escape(words)):
+        parse_url(f"tcp:127.0.0.1:1{options}")

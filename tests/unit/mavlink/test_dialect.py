@@ -32,6 +32,13 @@ def test_task_queue_status_is_as_the_contract_draws_it() -> None:
     assert m.TaskQueueStatus.array_lengths[5] == STATES
 
 
+def test_task_timing_is_as_the_contract_draws_it() -> None:
+    assert (m.TaskTiming.id, m.TaskTiming.unpacker.size) == (54002, 34)
+    assert m.TaskTiming.unpacker.format == "<IIIIffffBB"
+    assert m.TaskTiming.ordered_fieldnames == m.TaskTiming.fieldnames
+    assert struct.calcsize("<4I4f2B") == 34
+
+
 def test_protocol_version_has_the_public_crc_extra() -> None:
     assert (m.ProtocolVersion.id, m.ProtocolVersion.crc_extra) == (300, 217)
 
@@ -93,5 +100,5 @@ def test_every_readable_name_stands_for_a_message_of_the_dialect() -> None:
 def test_our_numbers_are_in_the_range_that_is_free() -> None:
     messages = sorted(number for number in m.ALL if 54000 <= number < 60000)
     commands = [number for number in _dialect.enums["MAV_CMD"] if 54000 <= number < 60000]
-    assert messages == [54000, 54001]
+    assert messages == [54000, 54001, 54002]
     assert sorted(commands)[:9] == [54000, 54001, 54002, 54003, 54010, 54011, 54012, 54013, 54014]

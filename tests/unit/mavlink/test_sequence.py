@@ -1,7 +1,7 @@
 """Outgoing seq = incoming + injected − withheld, for each source."""
 
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.sequence import SequenceKeeper
+from mav_tasks.mavlink.sequence import MOST, SequenceKeeper
 
 ROVER = Address(1, 1)
 SERVER = Address(1, 191)
@@ -53,3 +53,27 @@ def test_sources_are_numbered_apart() -> None:
     keeper.injected(SERVER)
     keeper.withheld(SERVER)
     assert [keeper.forwarded(ROVER, 9), keeper.injected(SERVER)] == [9, 1]
+
+
+def test_sources_that_somebody_makes_up_are_not_all_remembered() -> None:
+    keeper = SequenceKeeper()
+    ours, made_up = Address(250, 191), [Address(s, c) for s in range(1, 200) for c in range(256)]
+    assert [keeper.injected(ours) for _ in range(3)] == [0, 1, 2]
+    for source in made_up:
+        assert keeper.forwarded(source, 7) == 7
+        keeper.withheld(source)
+    assert keeper.injected(ours) == 3
+    assert keeper.forwarded(made_up[0], 8) == 7, "the first ones are kept"
+    assert keeper.forwarded(made_up[-1], 8) == 8
+    assert len(keeper._next) <= MOST + 1
+    assert len(keeper._offset) <= MOST + 1
+
+
+def test_nor_are_those_in_whose_name_is_sent() -> None:
+    keeper = SequenceKeeper()
+    for number in range(5 * MOST):
+        source = Address(number % 250, number // 250)
+        keeper.withheld(Address(number % 250, 100 + number // 250))
+        assert keeper.injected(source) == 0
+        assert keeper.injected(source) == 1
+    assert max(len(keeper._next), len(keeper._offset)) <= MOST

@@ -1,0 +1,123 @@
+"""Where a key ring is kept: a file that its user alone can read and write, or it is none."""
+
+import os
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from fcntl import LOCK_EX, flock
+from pathlib import Path
+from typing import NamedTuple
+
+from platformdirs import user_config_path
+
+from mav_tasks.config.toml_file import LARGEST, decoded
+from mav_tasks.errors import ConfigError, KeyRingError
+from mav_tasks.key_ring.ring import KeyRing
+from mav_tasks.key_ring.toml_form import ring_of, text_of
+
+FILE_NAME = "keys.toml"
+OTHERS = stat.S_IRWXG | stat.S_IRWXO
+
+#: what changes when a file does: device, inode, times of data and of state, size
+Mark = tuple[int, int, int, int, int]
+
+
+class Loaded(NamedTuple):
+    """A ring, and the mark of the file that it was read from."""
+
+    ring: KeyRing
+    mark: Mark
+
+
+def path_of_ring(text: str) -> Path:
+    """Give where the ring is: "" is in the user's configuration folder. KeyRingError."""
+    if not text:
+        return user_config_path("mav-tasks", appauthor=False) / FILE_NAME
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:
+        raise KeyRingError(f"{text}: {error}") from None
+
+
+def mark_of(found: os.stat_result) -> Mark:
+    """Give the mark of a file."""
+    times = (found.st_mtime_ns, found.st_ctime_ns)
+    return (found.st_dev, found.st_ino, *times, found.st_size)
+
+
+def load(path: Path) -> Loaded:
+    """Read a ring; KeyRingError says why not, or what is wrong with it."""
+    try:
+        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe: no waiting
+        try:
+            found = os.fstat(number)
+            _check(path, found)
+            with os.fdopen(number, "rb", closefd=False) as file:
+                data = file.read(LARGEST + 1)
+        finally:
+            os.close(number)
+    except FileNotFoundError:
+        raise KeyRingError(f"key ring {path}: not there; mav-tasks keys add makes one") from None
+    except OSError as error:
+        raise KeyRingError(f"key ring {path}: {error.strerror}") from error
+    try:
+        text = decoded(data, name=str(path))
+    except ConfigError as error:
+        raise KeyRingError(*error.faults) from None
+    return Loaded(ring_of(text, name=str(path)), mark_of(found))
+
+
+def change(path: Path, to: Callable[[KeyRing], KeyRing]) -> None:
+    """Have a ring, or a new one if there is none, become what ``to`` gives. KeyRingError.
+
+    Who reads it meanwhile reads the one or the other, and of two who change it one waits.
+    """
+    try:
+        path = path.resolve()  # a link stays one
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with _locked(path.parent):
+            ring = load(path).ring if path.exists() else KeyRing()
+            _write(path, text_of(to(ring)))
+    except (OSError, RuntimeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "too many links"
+        raise KeyRingError(f"key ring {path}: {reason}") from error
+
+
+def _check(path: Path, found: os.stat_result) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        raise KeyRingError(f"key ring {path}: not a file")
+    if found.st_uid != os.geteuid():
+        raise KeyRingError(f"key ring {path}: it is another user's: it must belong to who reads it")
+    if found.st_mode & OTHERS:
+        mode = stat.S_IMODE(found.st_mode)
+        raise KeyRingError(
+            f"key ring {path}: others can get at it (mode {mode:04o}): chmod 600 {path}, "
+            "and if they could read it, make new keys"
+        )
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[int]:
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        flock(number, LOCK_EX)
+        yield number
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
+def _write(path: Path, text: str) -> None:
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    with suppress(FileNotFoundError):  # of one that ended in the middle
+        beside.unlink()
+    number = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+    try:
+        with os.fdopen(number, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(number)
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,145 @@
+"""The key ring of a running server: a change is in force at once, without being told of it.
+
+A thread looks at the file, and reads it: a stuck disk must not keep a setpoint. A ring that is
+broken, or gone, changes nothing: the keys in force stay, so that no door opens by it.
+"""
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from mav_tasks.errors import KeyRingError
+from mav_tasks.key_ring.ring_file import Loaded, Mark, load, mark_of
+from mav_tasks.mavlink.signing import Key
+
+log = logging.getLogger("mav_tasks")
+
+LOOK = 0.1  # s, between two looks at the file
+AGAIN = 10  # looks, until a file that could not be read is tried again, though it is the same
+
+#: takes keys into force
+Put = Callable[[tuple[Key, ...]], None]
+
+
+class RingWatch:
+    """Watches one file; ``begin`` and ``close`` belong to the loop's thread."""
+
+    def __init__(self, path: Path, loaded: Loaded | None) -> None:
+        """``loaded`` is what is in force; None: there was no file."""
+        self.path = path
+        #: in force; None: there is no ring
+        self.keys = None if loaded is None else loaded.ring.keys
+        self._mark: Mark | None = None if loaded is None else loaded.mark
+        self._is_over = threading.Event()
+
+    def __repr__(self) -> str:
+        keys = "no ring" if self.keys is None else f"{len(self.keys)} keys"
+        return f"RingWatch({self.path}, {keys})"
+
+    def begin(self, put: Put) -> None:
+        """Watch from now on, and give ``put`` the keys of each change; called in the loop."""
+        loop = asyncio.get_running_loop()
+        # A daemon: the server ends, however long the disk takes.
+        threading.Thread(target=self._watch, args=(loop, put), name="key ring", daemon=True).start()
+
+    def close(self) -> None:
+        """Look no more."""
+        self._is_over.set()
+
+    # in the thread
+
+    def _watch(self, loop: asyncio.AbstractEventLoop, put: Put) -> None:
+        looker = _Looker(self.path, self._mark)
+        with suppress(RuntimeError):  # the loop has ended meanwhile
+            while not self._is_over.wait(LOOK):
+                news = looker.look()
+                if news is not None:
+                    loop.call_soon_threadsafe(self._take, news, put)
+
+    # in the loop
+
+    def _take(self, news: tuple[Key, ...] | str, put: Put) -> None:
+        if self._is_over.is_set():
+            return
+        if isinstance(news, str):
+            still = "there is no ring" if self.keys is None else "the keys in force stay"
+            log.error("%s: %s", news, still)
+            return
+        before, self.keys = self.keys, news
+        if news == before:
+            log.info("key ring %s: in order, nothing has changed", self.path)
+            return
+        put(news)
+        for words in changes(before or (), news):
+            log.warning("key ring: %s", words)
+
+
+class _Looker:
+    """One look after the other at a file."""
+
+    def __init__(self, path: Path, mark: Mark | None) -> None:
+        self._path = path
+        self._mark = mark
+        self._is_settled = True
+        self._fault = ""
+        self._keys: tuple[Key, ...] | None = None
+        self._was_there = mark is not None
+        self._looks = 0  # since it was read
+
+    def look(self) -> tuple[Key, ...] | str | None:
+        """Give the keys if the file is another one, or in words why it cannot be read; or None."""
+        self._looks += 1
+        try:
+            mark = mark_of(self._path.stat())
+        except FileNotFoundError:
+            return self._failed(f"key ring {self._path}: it is gone") if self._was_there else None
+        except OSError as error:
+            return self._failed(f"key ring {self._path}: {error.strerror}")
+        is_due = bool(self._fault) and self._looks >= AGAIN
+        if mark == self._mark and self._is_settled and not is_due:
+            return None
+        self._looks = 0
+        # Once more when it is the same at the next look: within one tick of the file system's clock
+        # it may have been written to twice.
+        is_same, self._is_settled = mark == self._mark, mark == self._mark
+        self._mark, self._was_there = mark, True
+        try:
+            keys = load(self._path).ring.keys
+        except KeyRingError as error:
+            return self._failed("; ".join(error.faults))
+        except Exception:  # our own mistake must not leave us blind for ever
+            log.exception("key ring: internal error")
+            return self._failed(f"key ring {self._path}: it could not be read")
+        was_faulty, self._fault = bool(self._fault), ""
+        if is_same and keys == self._keys and not was_faulty:
+            return None
+        self._keys = keys
+        return keys
+
+    def _failed(self, words: str) -> str | None:
+        if words == self._fault:
+            return None
+        self._fault = words
+        return words
+
+
+def changes(before: tuple[Key, ...], after: tuple[Key, ...]) -> Iterator[str]:
+    """Say what is otherwise, by the names of the keys."""
+    old, new = ({key.name: key for key in keys} for keys in (before, after))
+    for name in sorted(old.keys() | new.keys()):
+        was, now = old.get(name), new.get(name)
+        if was == now:
+            continue
+        if now is None:
+            yield f"key {name} is gone"
+        elif not now.secret:
+            yield f"key {name} is revoked"
+        elif was is None:
+            yield f"key {name} is added, {now.role or 'of vehicles'}"
+        elif was.fingerprint != now.fingerprint or not was.secret:
+            yield f"key {name} has another secret, {now.role or 'of vehicles'}"
+        else:
+            yield f"key {name} is {now.role or 'of vehicles'} now"

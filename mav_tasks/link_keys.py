@@ -1,0 +1,46 @@
+"""Whether the keys that links need are in the ring: UsageError says which is not."""
+
+from mav_tasks.errors import InsecureLinkError, KeyRingError, UsageError
+from mav_tasks.key_ring.ring import KeyRing
+from mav_tasks.links.asked import AskedLink, links_of
+from mav_tasks.links.policy import MEANT, is_nearby
+from mav_tasks.settings import Links
+
+
+def check_keys(links: Links, ring: KeyRing | None, *, where: str) -> None:
+    """Raise UsageError for a link whose key there is not, or that nobody could sign for.
+
+    ``ring`` None: there is none, ``where`` it would be.
+    """
+    for link in links_of(links):
+        if link.policy.key:
+            _check_key(link, ring or KeyRing(), where)
+        is_far = not is_nearby(link.url) or link.pushes_far
+        is_for_none = not any(key.role for key in (ring or KeyRing()).usable)
+        if link.side == "clients" and is_far and is_for_none and not links.insecure:
+            raise InsecureLinkError(
+                f"link {link.url} reaches beyond this machine, and nobody there has a signing key: "
+                f'"mav-tasks keys add" makes one, in {where}; or {MEANT}'
+            )
+
+
+def _check_key(link: AskedLink, ring: KeyRing, where: str) -> None:
+    try:
+        key = ring.usable_key(link.policy.key)
+    except KeyRingError as error:
+        raise UsageError(f"link {link.url}: {error}, in {where}") from None
+    if link.side == "clients" and not key.role:
+        raise UsageError(f"link {link.url}: key {key.name} is of vehicles: no client may sign so")
+    if link.side == "vehicles" and key.role:
+        raise UsageError(
+            f"link {link.url}: key {key.name} is of clients, {key.role}: what a rover is told with "
+            "it could be sent back as theirs; give the rover one of its own, of vehicles"
+        )
+
+
+def in_words(link: AskedLink, *, has_ring: bool) -> str:
+    """Give what is asked of signatures on a link; without keys and questions nothing."""
+    own = f", key {link.policy.key}" if link.policy.key else ""
+    if link.policy.takes_unsigned:
+        return f", unsigned, too{own}" if has_ring else own
+    return f", signed only{own}"

@@ -1,0 +1,43 @@
+"""A file that is there as a whole or as it was: no reader, and no crash, finds half of it."""
+
+import os
+import stat
+from contextlib import suppress
+from pathlib import Path
+from secrets import token_hex
+
+FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write or replace a file of the user's choosing. OSError: it is as it was before.
+
+    It keeps its mode; a new one has what the umask leaves, as any document. A link stays one, and
+    what is no file (a terminal, a pipe) is written to as it is.
+    """
+    path = Path(os.path.realpath(path))  # Path.resolve has an error of its own for a ring of links
+    mode = _mode_of(path)
+    if mode is not None and not stat.S_ISREG(mode):
+        path.write_text(text, encoding="utf-8")
+        return
+    beside = path.with_name(f".{path.name[:100]}.{token_hex(8)}")
+    fd = os.open(beside, FLAGS, 0o666)
+    try:
+        with os.fdopen(fd, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            if mode is not None:
+                os.fchmod(fd, stat.S_IMODE(mode))
+            os.fsync(fd)
+        beside.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink()
+        raise
+
+
+def _mode_of(path: Path) -> int | None:
+    try:
+        return path.stat().st_mode
+    except FileNotFoundError:
+        return None
