@@ -72,6 +72,7 @@ class Clients:
     push_lost: float = 5.0  # s, an address pushed to that is silent for longer gets heartbeats only
     stream_interval: float = 0.1  # s, between telemetry messages of one id, unless asked otherwise
     text_rate: float = 10.0  # STATUSTEXT per second to one client; beyond they are only counted
+    packet_rate: float = 2_000.0  # datagrams per second of one client; beyond: not looked at
     status_rate: float = 50.0  # pushed TASK_STATUS per second to one client; beyond: coalesced
     #: priority of the standard commands of a client, 0–10, by its MAVLink address, "255/190", or by
     #: address and endpoint, "255/190@127.0.0.1:14550"; of others 5
@@ -95,10 +96,74 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True)
+class Signing:
+    """What is asked of MAVLink 2 signatures; the keys are no settings."""
+
+    window: float = 60.0  # s, that a sender heard for the first time may be behind
+    #: SETUP_SIGNING of a client: "refuse", or "known": what goes to it is signed with that key
+    #: from then on, if it is one of ours; nobody's rights change by it
+    setup: str = "known"
+
+
+#: who somebody is to the server, from the least rights to the most
+ROLES = ("observer", "submitter", "operator", "safety")
+#: kinds of tasks, as limits name them
+TASK_KINDS = ("move", "rotate", "drive", "goto", "return", "wait", "plan")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a role may do at the most; each client for itself."""
+
+    tasks: tuple[str, ...] = TASK_KINDS  # kinds that it may submit
+    max_priority: int = 10
+    max_speed: float = 10.0  # m/s, of its tasks
+    quota: int = 100_000  # waiting tasks; no more than ``queueing.quota`` says for everybody
+    rate: float = 200.0  # requests per second in the long run, of which 5 s may come at once
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """Who may do what. Who signs has the role of his key, whatever his address."""
+
+    #: of who does not sign, where that is allowed, and is not named in ``addresses``
+    unsigned: str = "safety"
+    #: of unsigned clients by MAVLink address, "255/190", or by address and endpoint,
+    #: "255/190@127.0.0.1:14550"
+    addresses: Mapping[str, str] = field(default_factory=dict)
+    observer: Limits = field(default_factory=Limits)
+    submitter: Limits = field(default_factory=Limits)
+    operator: Limits = field(default_factory=Limits)
+    safety: Limits = field(default_factory=Limits)
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleProfile:
+    """What a probe has measured of one vehicle; what it does not know is "" or None."""
+
+    system_id: int = 0
+    uid: str = ""  # of AUTOPILOT_VERSION, in hex; "": the vehicle does not say
+    autopilot: str = ""  # name of the persona
+    firmware: str = ""  # version and hash, as AUTOPILOT_VERSION has them
+    probed: str = ""  # when, UTC
+    yaw_rate: str = ""  # "honoured", also on the spot, or "ignored"
+    reverse: str = ""  # "yes" or "no"
+    #: velocity setpoints that it has followed: "BODY_NED 0x05C7"
+    setpoints: tuple[str, ...] = ()
+    loss_stop: str = ""  # whether it stops by itself when setpoints stop: "yes" or "no"
+    setpoint_timeout: float | None = None  # s, from the last setpoint until it slows down
+    speed: float | None = None  # m/s, at which the stop was measured
+    stopping_distance: float | None = None  # m, from the first zero until it stood
+    stopping_time: float | None = None  # s, the same
+
+
+@dataclass(frozen=True, slots=True)
 class Settings:
     """All settings of one server."""
 
     identity: Identity = field(default_factory=Identity)
+    signing: Signing = field(default_factory=Signing)
+    roles: Roles = field(default_factory=Roles)
     driving: Driving = field(default_factory=Driving)
     watch: Watch = field(default_factory=Watch)
     queueing: Queueing = field(default_factory=Queueing)
@@ -119,3 +184,54 @@ class Settings:
     on_failure: str = "pause"
     #: after an unclean end, or a long one: "pause" the queues or "continue"
     on_restart: str = "pause"
+    #: what is known of vehicles; each is used for the one that it was measured of, and no other
+    profiles: tuple[VehicleProfile, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """Where clients and vehicles are; link URLs as ``links/url.py`` reads them."""
+
+    clients: tuple[str, ...] = ("udpin:127.0.0.1:14560",)
+    #: host:port, where clients listen on UDP and are spoken to unasked
+    push: tuple[str, ...] = ("127.0.0.1:14550", "127.0.0.1:14540")
+    vehicles: tuple[str, ...] = ("udpout:127.0.0.1:14580",)
+    insecure: bool = False  # whether other machines may reach a link unsigned
+    #: where unsigned packets are taken: on "loopback" links, or "nowhere"; a link's URL may say
+    #: otherwise
+    unsigned: str = "loopback"
+    keys: str = ""  # path of the key ring, "" for the one in the user's configuration folder
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What is written down of a run, beside the store; "" is nothing."""
+
+    tlog: str = ""  # folder of the telemetry logs
+    tlog_size: int = 50_000_000  # bytes, of one file; the next is begun then
+    tlog_files: int = 10  # kept at the most; the oldest goes first
+    decisions: str = ""  # folder of the records that can be replayed, one for each run
+    decisions_size: int = 200_000_000  # bytes, of one record; it ends there
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """What is said on standard error while the server runs."""
+
+    format: str = "text"  # or "json", one object a line
+    level: str = "info"  # the least that is said: "debug", "info", "warning" or "error"
+
+
+@dataclass(frozen=True, slots=True)
+class ServerSettings:
+    """All that one server process is told: what it serves, and its surroundings."""
+
+    engine: Settings = field(default_factory=Settings)
+    links: Links = field(default_factory=Links)
+    #: path of the store, ":memory:" for none, "" for the one in the user's data folder
+    store: str = ""
+    #: file or folder of the profiles that ``mav-tasks probe`` writes, "none" for none, "" for the
+    #: folder in the user's configuration
+    profiles: str = ""
+    recording: Recording = field(default_factory=Recording)
+    log: Log = field(default_factory=Log)

@@ -1,0 +1,174 @@
+"""The table of keys: every setting has one, and its default is a value that it may have."""
+
+import dataclasses
+import tomllib
+from collections.abc import Iterator
+from math import degrees, inf, nan, radians
+from typing import Any
+
+import pytest
+
+from mav_tasks.errors import SettingError
+from mav_tasks.setting_keys.key import Key
+from mav_tasks.setting_keys.literals import in_digits, literal
+from mav_tasks.setting_keys.shapes import (
+    ByClient,
+    Choice,
+    Flag,
+    Number,
+    Text,
+    Texts,
+)
+from mav_tasks.setting_keys.table import BOUNDED, KEYS, check_bounds
+from mav_tasks.settings import ServerSettings
+from mav_tasks.tasks.task import Submitter
+
+EACH = pytest.mark.parametrize("key", KEYS.values(), ids=lambda key: key.name)
+DEFAULTS = ServerSettings()
+
+
+def paths_of(settings: Any, before: str = "") -> Iterator[str]:
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if dataclasses.is_dataclass(value):
+            yield from paths_of(value, f"{before}{field.name}.")
+        else:
+            yield before + field.name
+
+
+def test_every_setting_has_exactly_one_key() -> None:
+    read_from_a_file = {"engine.profiles"}  # of which vehicles.profiles is the name
+    paths = set(paths_of(DEFAULTS)) - read_from_a_file
+    assert sorted(key.path for key in KEYS.values()) == sorted(paths)
+
+
+PRIORITIES = ByClient(Number(0, 10, is_whole=True), example=7)
+
+
+@EACH
+def test_the_default_comes_back_from_how_people_write_it(key: Key) -> None:
+    plain = key.plain_of(DEFAULTS)
+    assert key.shape.kept(plain) == key.of(DEFAULTS)
+    assert tomllib.loads(f"x = {literal(plain)}") == {"x": plain}
+    assert key.put(DEFAULTS, key.shape.kept(plain)) == DEFAULTS
+
+
+@EACH
+def test_a_key_says_what_it_means_in_one_line(key: Key) -> None:
+    assert key.meaning
+    assert key.shape.valid
+    assert (key.meaning + key.shape.valid).isprintable()
+    table, _, last = key.name.partition(".")
+    assert (table + last).replace("_", "").replace(".", "").isalpha()
+
+
+@EACH
+def test_what_is_no_value_is_refused_and_never_breaks(key: Key) -> None:
+    for plain in (nan, inf, -inf, -1, 10**400, None, object(), [1], {"a": []}, b""):
+        with pytest.raises(SettingError):
+            key.shape.kept(plain)
+
+
+@pytest.mark.parametrize(
+    ("shape", "plain", "says"),
+    [
+        (Number(0.05, 10, "m/s"), 50, "not in 0.05..10 m/s"),
+        (Number(0.05, 10, "m/s"), "1", "not a number: 0.05..10 m/s"),
+        (Number(0.05, 10, "m/s"), True, "not a number: 0.05..10 m/s"),
+        (Number(1, 1e5, is_whole=True), 1.5, "not a whole number: 1..100000, whole"),
+        (Number(0, 1, "days", none="forever"), 2, 'not in 0..1 days, or "forever"'),
+        (Choice(("a", "b")), "c", "expected one of a, b"),
+        (Flag(), 1, "expected true or false"),
+        (Text("a path"), "a\0b", "not a text: a path"),
+        (Texts("a list of x"), "x", "not a list of texts: a list of x"),
+        (Texts("a list of x", words=("x",)), ["y"], "'y': expected a list of x"),
+        (PRIORITIES, {"255/190": 11}, "255/190: not in 0..10, whole"),
+        (PRIORITIES, {"255/190": True}, "255/190: not a number: 0..10, whole"),
+        (PRIORITIES, {"0/190": 1}, "'0/190': no client"),
+        (PRIORITIES, {"256/1": 1}, "'256/1': no client"),
+        (PRIORITIES, {"qgc": 1}, "'qgc': no client"),
+    ],
+)
+def test_what_is_wrong_is_said(shape: Any, plain: object, says: str) -> None:
+    with pytest.raises(SettingError) as raised:
+        shape.kept(plain)
+    assert str(raised.value).startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kept"),
+    [
+        ("driving.speed", "0.8", 0.8),
+        ("driving.turn_rate_deg", "90", radians(90)),
+        ("queueing.quota", "7", 7),
+        ("store.keep_days", "forever", None),
+        ("store.keep_days", "1", 86_400.0),
+        ("rules.claim", "False", False),
+        ("rules.guided", "now", "now"),
+        ("links.push", "", ()),
+        ("links.clients", "udpin:127.0.0.1:1, tcp:a:2", ("udpin:127.0.0.1:1", "tcp:a:2")),
+        ("clients.priorities", "255/190=7,1/2@h:3=0", {"255/190": 7, "1/2@h:3": 0}),
+        ("clients.priorities", "", {}),
+    ],
+)
+def test_a_text_is_read(name: str, text: str, kept: object) -> None:
+    shape = KEYS[name].shape
+    assert shape.kept(shape.read(text)) == kept
+
+
+@EACH
+def test_a_text_that_means_nothing_is_refused(key: Key) -> None:
+    if isinstance(key.shape, Number | Choice | Flag | ByClient):
+        for text in ("nan", "inf", "1e999", "ten", "=", "9" * 5000, "²"):
+            with pytest.raises(SettingError):
+                key.shape.kept(key.shape.read(text))
+
+
+def test_a_client_is_written_as_the_server_writes_it() -> None:
+    someone = Submitter("udpin:127.0.0.1:14560", "[::1]:14550", 255, 190)
+    priorities = {someone.address: 3, someone.place: 9}
+    assert PRIORITIES.kept(priorities) == priorities
+
+
+def test_angles_are_degrees_and_days_are_days() -> None:
+    assert KEYS["driving.turn_rate_deg"].plain_of(DEFAULTS) == 40
+    assert degrees(DEFAULTS.engine.driving.turn_rate) == pytest.approx(40)
+    assert KEYS["store.keep_days"].plain_of(DEFAULTS) == 30
+    for key in KEYS.values():
+        assert key.name.endswith("_deg") == (key.shape.unit.partition("/")[0] == "deg")
+
+
+def test_defaults_keep_their_bounds_and_a_broken_one_is_named() -> None:
+    for key, bound in BOUNDED:
+        check_bounds(DEFAULTS, key, bound)
+        assert key.shape.unit == bound.shape.unit
+    faster = KEYS["driving.speed"].put(DEFAULTS, 3.0)
+    with pytest.raises(SettingError, match=r"^3 is more than driving\.max_speed, 2 m/s$"):
+        check_bounds(faster, KEYS["driving.speed"], KEYS["driving.max_speed"])
+
+
+@pytest.mark.parametrize(
+    ("plain", "toml"),
+    [
+        (True, "true"),
+        (5, "5"),
+        (1e6, "1000000"),
+        (0.05, "0.05"),
+        ('a"\\\n\x7f', '"a\\"\\\\\\n\\U0000007f"'),
+        (["a", "b"], '["a", "b"]'),
+        ({}, "{}"),
+        ({"255/190": 7}, '{ "255/190" = 7 }'),
+    ],
+)
+def test_a_value_is_written_as_toml(plain: object, toml: str) -> None:
+    assert literal(plain) == toml
+    assert tomllib.loads(f"x = {toml}")["x"] == plain
+
+
+def test_numbers_are_written_in_digits() -> None:
+    assert [in_digits(n) for n in (0.05, 10.0, 1e9, 1e10)] == [
+        "0.05",
+        "10",
+        "1000000000",
+        "1" + "0" * 10,
+    ]
