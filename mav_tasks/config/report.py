@@ -1,0 +1,99 @@
+"""What is in force, key by key, and who says so: for people as TOML, for scripts as JSON."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from mav_tasks.config.configuration import Configuration
+from mav_tasks.config.given import Source, suggestion
+from mav_tasks.errors import UsageError
+from mav_tasks.services.parameter_table import NAMES, with_all
+from mav_tasks.setting_keys.key import value_at
+from mav_tasks.setting_keys.literals import literal
+from mav_tasks.setting_keys.table import KEYS, PLACES
+
+ENGINE = "engine."
+
+
+def chosen(names: Sequence[str]) -> list[str]:
+    """Give the keys that are meant, of a table all; UsageError names what is none. None: all."""
+    found: list[str] = []
+    for name in names:
+        if name in PLACES:
+            found += [key for key in KEYS if key.startswith(f"{name}.")]
+        elif name in KEYS:
+            found.append(name)
+        else:
+            raise UsageError(f"{name}: no such key{suggestion(name, [*KEYS, *PLACES])}")
+    return found or list(KEYS)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One key: its plain value, its unit, and who says it."""
+
+    key: str
+    value: object
+    unit: str
+    source: Source
+    where: str
+
+
+class Report:
+    """The configuration, and over it what clients have set as MAVLink parameters."""
+
+    def __init__(self, configuration: Configuration, parameters: Mapping[str, float]) -> None:
+        self._configuration = configuration
+        self._parameters = parameters
+        self._engine, why_not = with_all(configuration.settings.engine, parameters)
+        self._why_not = why_not
+        #: why some of the parameters have no effect
+        self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
+
+    def entry(self, name: str) -> Entry:
+        """Give one key."""
+        key, given = KEYS[name], self._configuration.given.get(name)
+        parameter = NAMES.get(name, "")
+        if parameter in self._parameters and parameter not in self._why_not:
+            value = key.shape.plain(value_at(self._engine, key.path.removeprefix(ENGINE)))
+            return Entry(name, value, key.shape.unit, Source.PARAMETER, parameter)
+        value = key.plain_of(self._configuration.settings)
+        if given is None:
+            return Entry(name, value, key.shape.unit, Source.DEFAULT, "")
+        return Entry(name, value, key.shape.unit, given.source, given.where)
+
+    def as_toml(self, names: Iterable[str]) -> str:
+        """Give a line for each key, which ``config check`` takes as a file."""
+        entries = [self.entry(name) for name in names]
+        lines = [f"{entry.key} = {literal(entry.value)}" for entry in entries]
+        width = min(max(map(len, lines)), 48)
+        return "".join(
+            f"{line:{width}}  # {_remark(entry)}\n"
+            for line, entry in zip(lines, entries, strict=True)
+        )
+
+    def as_json(self, names: Iterable[str]) -> str:
+        """Give the file that was read, and each key."""
+        file = self._configuration.file
+        told = {
+            "file": None if file is None else str(file),
+            "keys": {
+                entry.key: {
+                    "value": entry.value,
+                    "unit": entry.unit,
+                    "source": entry.source.value,
+                    "where": entry.where,
+                    "live": KEYS[entry.key].is_live,
+                }
+                for entry in map(self.entry, names)
+            },
+            "not_in_force": list(self.not_in_force),
+        }
+        return json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+
+
+def _remark(entry: Entry) -> str:
+    where = entry.where or entry.source.value
+    if entry.source is Source.PARAMETER:
+        where = f"{entry.where}, set by a client"
+    return f"{entry.unit}, {where}" if entry.unit else where

@@ -1,0 +1,79 @@
+"""The environment and the flags of a command as values for keys."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from mav_tasks.config.given import Layer, Source, shown, suggestion
+from mav_tasks.setting_keys.table import KEYS
+
+PREFIX = "MAV_TASKS_"
+FILE_VARIABLE = "MAV_TASKS_CONFIG"  # which file is read; "" for none
+SERVER_VARIABLE = "MAV_TASKS_SERVER"  # to which server the commands of a client speak
+SIGN_VARIABLE = "MAV_TASKS_SIGN"  # with which key they sign
+STORE_VARIABLE = "MAV_TASKS_STORE"  # shorter than the rule, as it was before there was one
+
+
+#: they are no keys
+OTHERS = (FILE_VARIABLE, SERVER_VARIABLE, SIGN_VARIABLE)
+
+
+def variable_of(name: str) -> str:
+    """Give the environment variable of a key."""
+    return STORE_VARIABLE if name == "store.path" else PREFIX + name.upper().replace(".", "_")
+
+
+VARIABLES: Mapping[str, str] = {variable_of(name): name for name in KEYS}
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """One flag of a command, or ``--set``: a text, or a plain value, for a key by its name."""
+
+    where: str
+    name: str
+    value: object
+
+
+def of_environment(environment: Mapping[str, str]) -> Layer:
+    """Give what the environment says."""
+    layer = Layer(Source.ENVIRONMENT)
+    for variable in sorted(environment):
+        if variable in OTHERS or not variable.startswith(PREFIX):
+            continue
+        if variable in VARIABLES:
+            layer.read(KEYS[VARIABLES[variable]], environment[variable], variable)
+        else:
+            near = suggestion(variable, VARIABLES)
+            layer.faults.append(f"{shown(variable)}: no such variable{near}")
+    return layer
+
+
+def of_flags(flags: Sequence[Flag]) -> Layer:
+    """Give what the flags say; one key is said by one of them."""
+    layer = Layer(Source.FLAG)
+    for flag in flags:
+        key = KEYS.get(flag.name)
+        if key is None:
+            near = suggestion(flag.name, KEYS)
+            layer.faults.append(f"{shown(flag.where)}: no such key{near}")
+        elif key.name in layer.given:
+            before = layer.given[key.name].where
+            layer.refuse(key, f"{flag.where}: {key.name} is said by {before}, too")
+        elif flag.value is None:
+            layer.refuse(key, f"{flag.where}: expected {key.name}=VALUE")
+        elif isinstance(flag.value, str):
+            layer.read(key, flag.value, flag.where)
+        else:
+            layer.take(key, flag.value, flag.where)
+    return layer
+
+
+def flag_of_set(text: str) -> Flag:
+    """Give the flag that ``--set KEY=VALUE`` is; its value None where there is no "="."""
+    name, equals, value = text.partition("=")
+    return Flag(f"--set {name.strip()}", name.strip(), value.strip() if equals else None)
+
+
+def given_flags(*flags: tuple[str, str, object]) -> list[Flag]:
+    """Give the flags of those (flag, key, value) that were given: whose value is not None."""
+    return [Flag(where, name, value) for where, name, value in flags if value is not None]

@@ -1,0 +1,158 @@
+"""``mav-tasks config`` and what ``serve`` says of a configuration, without processes."""
+
+import json
+import re
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.cli.app import main
+from mav_tasks.store.reading import read_parameters
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.events import ParameterSet
+
+Result = tuple[int, str, str]
+Run = Callable[..., Result]
+
+
+@pytest.fixture
+def run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Iterator[Run]:
+    """Give what runs a command line; gives exit code, standard output and error."""
+    hangup = signal.getsignal(signal.SIGHUP)
+
+    def command(*arguments: str, environment: dict[str, str] | None = None) -> Result:
+        with monkeypatch.context() as context:
+            variables = {"MAV_TASKS_STORE": ":memory:", "MAV_TASKS_CONFIG": ""}
+            for name, value in {**variables, **(environment or {})}.items():
+                context.setenv(name, value)
+            context.setattr(sys, "argv", ["mav-tasks", *arguments])
+            with pytest.raises(SystemExit) as ended:
+                main()
+        said = capsys.readouterr()
+        return int(ended.value.code or 0), said.out, said.err
+
+    yield command
+    signal.signal(signal.SIGHUP, hangup)
+
+
+def assert_one_clear_line(result: Result, *words: str) -> None:
+    code, _, error = result
+    assert code == 2, error
+    assert len(error.splitlines()) == 1, error
+    for word in words:
+        assert word in error
+
+
+def test_what_is_wrong_with_a_configuration_is_told_line_by_line(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text("[driving]\nspeed = 50\nsped = 1\n", encoding="utf-8")
+    wanted = [
+        f"mav-tasks: {path}:2: driving.speed = 50: not in 0.05..10 m/s",
+        f"mav-tasks: {path}:3: driving.sped: no such key; did you mean driving.speed?",
+    ]
+    for command in (("config", "check", str(path)), ("serve", "--config", str(path))):
+        code, output, error = run(*command)
+        assert (code, output, error.splitlines()) == (2, "", wanted)
+    variable = {"MAV_TASKS_DRIVNG_SPEED": "1"}
+    result = run("serve", environment=variable)
+    assert_one_clear_line(result, "MAV_TASKS_DRIVNG_SPEED", "did you mean MAV_TASKS_DRIVING_SPEED?")
+    expected = "--set driving.speed: expected driving.speed=VALUE"
+    assert_one_clear_line(run("serve", "--set", "driving.speed"), expected)
+    assert_one_clear_line(run("serve", "--keep-days", "-1"), "--keep-days=-1", "0..36500 days")
+    assert_one_clear_line(run("config", "show", "driving.sped"), "did you mean driving.speed?")
+    assert_one_clear_line(run("config", "check", str(tmp_path)), str(tmp_path), "not a file")
+
+
+def test_the_sample_is_begun_checked_and_never_written_over(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    assert run("config", "init", str(path)) == (0, f"wrote {path}\n", "")
+    code, printed, _ = run("config", "init")
+    assert (code, printed) == (0, path.read_text(encoding="utf-8"))
+    assert run("config", "check", str(path)) == (0, "ok\n", "")
+    assert_one_clear_line(run("config", "init", str(path)), str(path), "exists")
+    assert_one_clear_line(run("config", "init", str(tmp_path / "no" / "c")), "No such file")
+
+
+def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) -> None:
+    path, again = tmp_path / "c.toml", tmp_path / "again.toml"
+    path.write_text("[driving]\nspeed = 0.8\n", encoding="utf-8")
+    environment = {"MAV_TASKS_QUEUEING_QUOTA": "7", "MAV_TASKS_CONFIG": str(path)}
+    code, output, error = run("config", "show", environment=environment)
+    assert (code, error) == (0, "")
+    assert re.search(r"^driving\.speed = 0\.8 +# m/s, .*c\.toml:2$", output, re.MULTILINE)
+    assert re.search(r"^queueing\.quota = 7 +# MAV_TASKS_QUEUEING_QUOTA$", output, re.MULTILINE)
+    assert re.search(r"^store\.path = \":memory:\" +# MAV_TASKS_STORE$", output, re.MULTILINE)
+    assert re.search(r"^driving\.max_speed = 2 +# m/s, default$", output, re.MULTILINE)
+    again.write_text(output, encoding="utf-8")
+    assert run("config", "check", str(again)) == (0, "ok\n", "")
+    code, output, _ = run(
+        "config", "show", "driving.speed", "log", "--json", environment=environment
+    )
+    told = json.loads(output)
+    assert told["file"] == str(path)
+    assert list(told["keys"]) == ["driving.speed", "log.format", "log.level"]
+    assert told["keys"]["driving.speed"] == {
+        "value": 0.8,
+        "unit": "m/s",
+        "source": "file",
+        "where": f"{path}:2",
+        "live": True,
+    }
+
+
+def test_what_a_client_has_set_is_shown_from_the_store(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    variable = {"MAV_TASKS_STORE": str(path)}
+    command = ("config", "show", "driving.speed", "driving.max_speed")
+    assert "default" in run(*command, environment=variable)[1]
+    assert not path.exists()
+    with closing(SqliteStore(path, wall_offset=lambda: 0.0)) as store:
+        store.append([ParameterSet("TSK_SPEED", 2.5, "255/190@x:1", 1.0)])
+    faster = {**variable, "MAV_TASKS_DRIVING_MAX_SPEED": "3"}
+    with closing(SqliteStore(path, wall_offset=lambda: 0.0)):  # in use
+        code, output, error = run(*command, environment=faster)
+    assert (code, error) == (0, "")
+    is_set = r"^driving\.speed = 2\.5 +# m/s, TSK_SPEED, set by a client$"
+    assert re.search(is_set, output, re.MULTILINE)
+    code, output, error = run(*command, environment=variable)
+    assert (code, error) == (
+        0,
+        "mav-tasks: not in force, though set before: TSK_SPEED 2.5 is more than TSK_SPEED_MAX 2\n",
+    )
+    assert re.search(r"^driving\.speed = 0\.5 +# m/s, default$", output, re.MULTILINE)
+    before = path.read_bytes()
+    assert read_parameters(path) == {"TSK_SPEED": 2.5}
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["tasks.sqlite3", "~/tasks.sqlite3"])
+def test_a_store_is_looked_at_by_whatever_name_the_server_takes(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    with closing(SqliteStore(name, wall_offset=lambda: 0.0)) as store:
+        store.append([ParameterSet("TSK_SPEED", 1.5, "255/190@x:1", 1.0)])
+    shown = run("config", "show", "driving.speed", environment={"MAV_TASKS_STORE": name})
+    assert shown == (0, "driving.speed = 1.5  # m/s, TSK_SPEED, set by a client\n", "")
+
+
+@pytest.mark.parametrize("text", ["no database", ""])
+def test_a_store_that_cannot_be_looked_at_keeps_nothing_from_being_shown(
+    run: Run, tmp_path: Path, text: str
+) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    path.write_text(text, encoding="utf-8")
+    code, output, error = run(
+        "config", "show", "driving", environment={"MAV_TASKS_STORE": str(path)}
+    )
+    assert code == 0
+    assert "driving.speed = 0.5" in output
+    assert bool(text) is (f"parameters set by clients are not shown: store {path}" in error)
+    assert path.read_text(encoding="utf-8") == text

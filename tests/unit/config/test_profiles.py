@@ -1,0 +1,177 @@
+"""Profiles of rovers: written whole and for nobody else to read; read, and checked."""
+
+import asyncio
+import json
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.config import profiles
+from mav_tasks.config.configuration import Sources
+from mav_tasks.errors import ConfigError
+from mav_tasks.recording.surroundings import settings_of, settings_to_json
+from mav_tasks.settings import Settings, VehicleProfile
+from tests.unit.config.test_reload import Server, Watched
+
+FULL = VehicleProfile(
+    system_id=7,
+    uid="3c0031",
+    autopilot="px4",
+    firmware='1.15.4 "99c4"',
+    probed="2026-11-21T10:00:00Z",
+    yaw_rate="honoured",
+    reverse="yes",
+    setpoints=("BODY_NED 0x05C7", "LOCAL_NED 0x0DC7"),
+    loss_stop="yes",
+    setpoint_timeout=1.13,
+    speed=0.298,
+    stopping_distance=0.085,
+    stopping_time=0.36,
+)
+LEAST = VehicleProfile(system_id=1, autopilot="px4", firmware="1.0.0", probed="2026-11-21")
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's folder of profiles, which is not there yet."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    folder = profiles.usual_folder()
+    assert folder.is_relative_to(tmp_path)
+    return folder
+
+
+def faults_of(text: str) -> tuple[str, ...]:
+    with pytest.raises(ConfigError) as raised:
+        profiles.profile_of(text, name="p.toml")
+    return raised.value.faults
+
+
+@pytest.mark.parametrize("profile", [FULL, LEAST])
+def test_what_was_written_is_read(home: Path, profile: VehicleProfile) -> None:
+    path = profiles.write(profile, None)
+    assert path.parent == home
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert profiles.read("") == (profile,)
+    assert list(home.iterdir()) == [path]
+
+
+def test_each_rover_has_a_file_and_the_last_one_counts(home: Path) -> None:
+    profiles.write(FULL, None)
+    profiles.write(replace(FULL, uid="another"), None)
+    again = replace(FULL, yaw_rate="ignored")
+    profiles.write(again, None)
+    assert set(profiles.read(str(home))) == {again, replace(FULL, uid="another")}
+
+
+def test_a_file_of_ones_own_can_be_named(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    assert profiles.write(FULL, str(path)) == path
+    assert profiles.read(str(path)) == (FULL,)
+
+
+def test_a_file_that_cannot_be_written_leaves_the_one_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "mine.toml"
+    profiles.write(FULL, str(path))
+
+    def full(_fd: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(ConfigError, match=r"mine\.toml: No space left on device"):
+        profiles.write(LEAST, str(path))
+    assert (profiles.read(str(path)), list(tmp_path.iterdir())) == ((FULL,), [path])
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"none/p\.toml: No such file"):
+        profiles.write(FULL, str(tmp_path / "none" / "p.toml"))
+    with pytest.raises(ConfigError, match=r"none: No such file"):
+        profiles.read(str(tmp_path / "none"))
+
+
+def test_where_nothing_is_known_there_is_nothing(home: Path) -> None:
+    assert profiles.read("") == ()
+    profiles.write(FULL, None)
+    assert profiles.read("none") == ()
+
+
+NEEDED = 'system_id = 1\nautopilot = "px4"\nfirmware = "1"\nprobed = "2026"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "faults"),
+    [
+        ("", [f"p.toml: {n} is missing" for n in ("system_id", "autopilot", "firmware", "probed")]),
+        (NEEDED + "yaw = 1", ["p.toml: 'yaw': no such key of a profile"]),
+        (
+            NEEDED + 'yaw_rate = "perhaps"',
+            ["p.toml: yaw_rate: expected one of honoured, ignored"],
+        ),
+        (NEEDED + "stopping_distance = nan", ["p.toml: stopping_distance: not in 0..100 m"]),
+        (NEEDED + "speed = 0", ["p.toml: speed: not in 0.01..10 m/s"]),
+        (NEEDED + "setpoints = 1", ["p.toml: setpoints: not a list of texts: a list of setpoints"]),
+        (NEEDED.replace("= 1\n", "= 256\n"), ["p.toml: system_id: not in 1..255, whole"]),
+        ("system_id = ", ["p.toml: Invalid value (at line 1, column 13)"]),
+    ],
+)
+def test_each_fault_of_a_file_is_named(text: str, faults: list[str]) -> None:
+    found = faults_of(text)
+    assert [each.replace("end of document", "line 1, column 13") for each in found] == faults
+
+
+def test_the_server_has_them_with_its_settings(tmp_path: Path, home: Path) -> None:
+    assert Sources("", {}).load().settings.engine.profiles == ()
+    profiles.write(FULL, None)
+    profiles.write(LEAST, str(tmp_path / "p.toml"))
+    assert Sources(None, {}).load().settings.engine.profiles == (FULL,)
+    assert Sources("", {}).load().settings.engine.profiles == (), "no file at all"
+    assert Sources(None, {"MAV_TASKS_CONFIG": ""}).load().settings.engine.profiles == ()
+    named = {"MAV_TASKS_VEHICLES_PROFILES": str(tmp_path / "p.toml")}
+    assert Sources("", named).load().settings.engine.profiles == (LEAST,)
+    named = {"MAV_TASKS_VEHICLES_PROFILES": "none"}
+    assert Sources(None, named).load().settings.engine.profiles == ()
+
+
+def test_a_faulty_profile_is_a_fault_of_the_configuration(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text("system_id = 0", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"bad\.toml: autopilot is missing"):
+        Sources("", {"MAV_TASKS_VEHICLES_PROFILES": str(tmp_path)}).load()
+
+
+def test_sighup_reads_them_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path, server = tmp_path / "p.toml", Server()
+    profiles.write(FULL, str(path))
+    changed = replace(FULL, yaw_rate="ignored")
+    config = f'vehicles.profiles = "{path}"\n'
+
+    async def run() -> None:
+        reload.begin(server.take)
+        await reload.outcome()
+        profiles.write(changed, str(path))
+        reload.begin(server.take)
+        await reload.outcome()
+
+    file = tmp_path / "c.toml"
+    file.write_text(config, encoding="utf-8")
+    sources = Sources(str(file), {})
+    reload = Watched(sources, sources.load())
+    try:
+        with caplog.at_level(logging.DEBUG, "mav_tasks"):
+            asyncio.run(run())
+    finally:
+        logging.getLogger("mav_tasks").setLevel(logging.NOTSET)
+    assert [record.getMessage() for record in caplog.records] == [
+        "configuration: read again, nothing has changed",
+        "vehicles.profiles: read again, 1 in force",
+    ]
+    assert [settings.profiles for settings in server.put] == [(changed,)]
+
+
+@pytest.mark.parametrize("given", [(), (FULL,), (FULL, LEAST)])
+def test_a_record_of_a_run_has_them(given: tuple[VehicleProfile, ...]) -> None:
+    settings = Settings(profiles=given)
+    assert settings_of(json.loads(json.dumps(settings_to_json(settings)))) == settings

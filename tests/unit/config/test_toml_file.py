@@ -1,0 +1,250 @@
+"""A file gives settings, or all its faults, each by file, line and key."""
+
+import os
+import string
+import tomllib
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from mav_tasks.config.configuration import Configuration, merged
+from mav_tasks.config.toml_file import LARGEST, decoded, layer_of, read_text
+from mav_tasks.config.toml_lines import lines_of
+from mav_tasks.errors import ConfigError
+from mav_tasks.setting_keys.table import KEYS, PLACES
+from mav_tasks.settings import ServerSettings
+
+
+def read(text: str) -> Configuration:
+    return merged([layer_of(text, name="c.toml")])
+
+
+def faults(text: str) -> list[str]:
+    with pytest.raises(ConfigError) as raised:
+        read(text)
+    assert all(fault.isprintable() and len(fault) < 250 for fault in raised.value.faults)
+    assert str(raised.value) == "\n".join(raised.value.faults)
+    return list(raised.value.faults)
+
+
+def test_values_are_taken_with_their_lines() -> None:
+    text = "[driving]\nspeed = 0.8\nturn_rate_deg = 90\n\n"
+    text += '[links]\nclients = [\n "tcpin:127.0.0.1:1",\n]\n'
+    text += 'push = []\n[clients.priorities]\n"255/190" = 7\n'
+    got = read(text)
+    assert got.settings.engine.driving.speed == 0.8
+    assert got.settings.engine.driving.turn_rate == got.settings.engine.driving.max_turn_rate
+    assert got.settings.links.clients == ("tcpin:127.0.0.1:1",)
+    assert got.settings.links.push == ()
+    assert got.settings.engine.clients.priorities == {"255/190": 7}
+    assert {name: each.where for name, each in got.given.items()} == {
+        "driving.speed": "c.toml:2",
+        "driving.turn_rate_deg": "c.toml:3",
+        "links.clients": "c.toml:6",
+        "links.push": "c.toml:9",
+        "clients.priorities": "c.toml:10",
+    }
+
+
+def test_nothing_gives_the_defaults() -> None:
+    assert read("").settings == read("[driving]\n[watch]").settings == ServerSettings()
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("[driving]\nspeed = 50", "c.toml:2: driving.speed = 50: not in 0.05..10 m/s"),
+        ("driving.speed = nan", "c.toml:1: driving.speed = nan: not in 0.05..10 m/s"),
+        ("driving.speed = -inf", "c.toml:1: driving.speed = -inf: not in 0.05..10 m/s"),
+        ('driving.speed = "1"', "c.toml:1: driving.speed = 1: not a number: 0.05..10 m/s"),
+        ("driving.speed = true", "c.toml:1: driving.speed = true: not a number: 0.05..10 m/s"),
+        (
+            "[driving]\nsped = 1",
+            "c.toml:2: driving.sped: no such key; did you mean driving.speed?",
+        ),
+        ("speed = 1", "c.toml:1: speed: no such key; did you mean driving.speed?"),
+        (
+            '"driving.speed" = 1',
+            'c.toml:1: "driving.speed": no such key; did you mean driving.speed?',
+        ),
+        ("[drivin]\nspeed = 1", "c.toml:1: drivin: no such table; did you mean driving?"),
+        ("[zzz]", "c.toml:1: zzz: no such table"),
+        ("driving = 1", "c.toml:1: driving: expected a table, [driving]"),
+        ("[[driving]]\nspeed = 1", "c.toml:1: driving: expected a table, [driving]"),
+        (
+            "[driving.speed]\nx = 1",
+            'c.toml:1: driving.speed = { "x" = 1 }: not a number: 0.05..10 m/s',
+        ),
+        (
+            "[rules]\narming = 'me'",
+            "c.toml:2: rules.arming = me: expected one of auto, server, operator",
+        ),
+        (
+            "queueing.quota = 1.5",
+            "c.toml:1: queueing.quota = 1.5: not a whole number: 1..100000, whole",
+        ),
+        (
+            "\n[driving]\nspeed = 3",
+            "c.toml:3: driving.speed: 3 is more than driving.max_speed, 2 m/s",
+        ),
+        (
+            "driving.max_speed = 0.2",
+            "c.toml:1: driving.speed: 0.5 is more than driving.max_speed, 0.2 m/s",
+        ),
+        ("a = 1\nb = ", "c.toml:2: Invalid value"),
+        ("a = 1\na = 2", "c.toml:2: Cannot overwrite a value"),
+        ("a = [1,\n2\n\n", "c.toml:2: Unclosed array"),
+        ("a = 'x", 'c.toml:1: Expected "\'"'),
+        ("x = " + "9" * 5000, "c.toml: Exceeds the limit (4300 digits)"),
+        ("queueing.quota = 0x" + "f" * 9000, "c.toml:1: queueing.quota = a int too large to show"),
+        ("x = " + "[" * 5000 + "]" * 5000, "c.toml: tables or lists too deep"),
+        (
+            "links.vehicles = ['udpin:127.0.0.1']",
+            "c.toml:1: links.vehicles: link 'udpin:127.0.0.1': expected",
+        ),
+        ("links.push = ['a']", "c.toml:1: links.push: push 'a': expected host:port"),
+        (
+            "[links]\nvehicles = ['udpin:0.0.0.0:1']",
+            "c.toml:2: links.vehicles: link udpin:0.0.0.0:1 reaches beyond this machine",
+        ),
+        (
+            "links.vehicles = ['tcp:127.0.0.1:1', 'tcp:127.0.0.1:1']",
+            "c.toml:1: links.vehicles: link tcp:127.0.0.1:1 is given twice",
+        ),
+        ("links.clients = []", "c.toml:1: links.clients = []: fewer than 1"),
+        ("x\u0000y = 1", "c.toml:1: "),
+        ('"a\\nb" = 1', 'c.toml:1: "a\\nb": no such key'),
+    ],
+)
+def test_a_fault_is_named_with_its_line(text: str, fault: str) -> None:
+    (only,) = faults(text)
+    assert only.startswith(fault)
+
+
+def test_all_faults_are_told_at_once() -> None:
+    text = "[driving]\nspeed = 0\nsped = 1\n[watch]\nstuck = 'x'\n[zoo]\n"
+    text += "[links]\npush = ['x', 'y:0']\n"
+    assert [fault.partition(": ")[0] for fault in faults(text)] == [
+        *("c.toml:2", "c.toml:3", "c.toml:5", "c.toml:6"),
+        *("c.toml:8", "c.toml:8"),
+    ]
+
+
+def test_a_value_that_is_none_breaks_no_bound() -> None:
+    assert len(faults("driving.max_speed = 0.2\ndriving.speed = 99")) == 1
+
+
+def test_other_machines_may_be_let_in() -> None:
+    assert read(
+        "links.insecure = true\nlinks.clients = ['udpin:0.0.0.0:1']"
+    ).settings.links.insecure
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda path: None, "No such file"),
+        (lambda path: path.mkdir(), "not a file"),
+        (os.mkfifo, "not a file"),
+        (lambda path: path.write_bytes(b"a = 1\n\xff"), ":2: not UTF-8"),
+        (lambda path: path.write_bytes(b"#" * (LARGEST + 1)), "larger than 256 kB"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_named(
+    tmp_path: Path, make: Callable[[Path], Any], says: str
+) -> None:
+    path = tmp_path / "c.toml"
+    make(path)
+    with pytest.raises(ConfigError, match=says) as raised:
+        read_text(path)
+    assert str(raised.value).startswith(str(path))
+
+
+def test_a_byte_order_mark_is_passed_over() -> None:
+    assert (
+        read(decoded(b"\xef\xbb\xbfdriving.speed = 1", name="x")).settings.engine.driving.speed == 1
+    )
+
+
+def outcome(text: str | bytes) -> tuple[ServerSettings | None, tuple[str, ...]]:
+    """The settings, or the faults; any other exception is a failure."""
+    try:
+        if isinstance(text, bytes):
+            text = decoded(text, name="c.toml")
+        return read(text).settings, ()
+    except ConfigError as error:
+        return None, error.faults
+
+
+KEY_TEXTS = st.sampled_from([*KEYS, *PLACES, "x", "driving.speed.x", '"driving.speed"'])
+VALUES = st.sampled_from(
+    [
+        "1",
+        "0.5",
+        "-1",
+        "nan",
+        "'a'",
+        "[]",
+        "{}",
+        "[1]",
+        "true",
+        "{a=1}",
+        '"""\n"""',
+        "07:32:00",
+        "1e400",
+    ]
+)
+LINES = st.one_of(
+    st.builds("{} = {}".format, KEY_TEXTS, VALUES),
+    st.builds("[{}]".format, KEY_TEXTS),
+    st.text(string.printable + "ü\u2028\x00", max_size=30),
+)
+
+
+@settings(deadline=None)
+@given(st.lists(LINES, max_size=8).map("\n".join))
+@example("[" * 3000)
+@example("a={" * 3000)
+@example("a." * 3000 + "a=1")
+def test_any_text_gives_settings_or_a_clear_fault(text: str) -> None:
+    got, told = outcome(text)
+    if got is None:
+        assert told
+        assert all(each.startswith("c.toml") and each.isprintable() for each in told)
+    else:
+        for key in KEYS.values():
+            assert key.shape.kept(key.plain_of(got)) == key.of(got)
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_give_settings_or_a_clear_fault(data: bytes) -> None:
+    _, told = outcome(data)
+    assert all(each.startswith("c.toml") for each in told)
+
+
+@given(st.text(max_size=200))
+def test_the_finder_of_lines_ends_whatever_the_text(text: str) -> None:
+    with suppress(tomllib.TOMLDecodeError):  # of a text that tomllib has not understood before
+        assert all(line >= 1 for line in lines_of(text).values())
+
+
+@pytest.mark.parametrize("key", ["a" + ".a" * 100_000, "'a'" + ' . "a"' * 40_000])
+@pytest.mark.parametrize(
+    "text", ["{} = 1", "[{}]", "[driving]\nspeed = 1\n{} = 1", "x = {{{} = 1}}"]
+)
+def test_a_key_of_very_many_parts_costs_nothing(key: str, text: str) -> None:
+    """``tomllib`` would want 40 GB for it, while a rover drives: SIGHUP reads files, too."""
+    (fault,) = faults(text.format(key))
+    assert fault == f"c.toml:{text.count(chr(10)) + 1}: a key of too many parts"
+
+
+def test_of_very_many_faults_only_some_are_told() -> None:
+    """Each is a line of the log when the file is read again, and looked at by the loop."""
+    said = faults("".join(f"[t{number}]\n" for number in range(20_000)))
+    assert len(said) < 100
+    assert said[-1] == "c.toml: there is more that is wrong"
