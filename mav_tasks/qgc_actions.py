@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mav_tasks.errors import UsageError
 from mav_tasks.mavlink.enums import MavCmd, MavComponent
+from mav_tasks.whole_file import write_whole
 
 #: file types, each also the name of the folder in which QGroundControl looks for such a file
 MAVLINK_ACTIONS, CUSTOM_ACTIONS = "MavlinkActions", "CustomActions"
@@ -110,9 +111,7 @@ def install(documents: Path, actions: Sequence[Action], *, component: int) -> li
         path = documents / "QGroundControl" / file_type / FILE_NAME
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(
-                file_of(actions, file_type=file_type, component=component), encoding="utf-8"
-            )
+            write_whole(path, file_of(actions, file_type=file_type, component=component))
         except OSError as error:
             raise UsageError(f"{path}: {error.strerror}") from error
         written.append(path)

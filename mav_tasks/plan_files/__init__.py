@@ -1,6 +1,11 @@
-"""Mission files to values: QGroundControl's .plan and "QGC WPL 110". Nothing is sent from here."""
+"""Mission files and their values: QGroundControl's .plan and "QGC WPL 110". Nothing is sent.
 
-from mav_tasks.plan_files.reader import parse_plan, read_plan
+What reads and writes files is loaded when it is first used: a script that has none need not wait.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from mav_tasks.plan_files.values import (
     FenceCircle,
     FencePolygon,
@@ -11,6 +16,22 @@ from mav_tasks.plan_files.values import (
     rally_items,
 )
 
+if TYPE_CHECKING:
+    from mav_tasks.plan_files.fetched import fence_of, mission_of
+    from mav_tasks.plan_files.reader import parse_plan, read_plan
+    from mav_tasks.plan_files.writer import format_for, format_plan, format_wpl, write_plan
+
+_HOME_OF = {
+    "fence_of": "fetched",
+    "mission_of": "fetched",
+    "parse_plan": "reader",
+    "read_plan": "reader",
+    "format_for": "writer",
+    "format_plan": "writer",
+    "format_wpl": "writer",
+    "write_plan": "writer",
+}
+
 __all__ = [
     "FenceCircle",
     "FencePolygon",
@@ -18,7 +39,20 @@ __all__ = [
     "PlanFile",
     "PlanItem",
     "fence_items",
+    "fence_of",
+    "format_for",
+    "format_plan",
+    "format_wpl",
+    "mission_of",
     "parse_plan",
     "rally_items",
     "read_plan",
+    "write_plan",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOME_OF.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{home}"), name)

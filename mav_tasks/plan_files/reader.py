@@ -19,6 +19,14 @@ def read_plan(path: Path) -> PlanFile:
             data = file.read(MAX_SIZE + 1)
     except OSError as error:
         raise PlanFileError(f"{path}: {error.strerror}") from error
+    try:
+        return parse_plan_bytes(data)
+    except PlanFileError as error:
+        raise PlanFileError(f"{path}: {error}") from error
+
+
+def parse_plan_bytes(data: bytes) -> PlanFile:
+    """Give what the bytes of a file say; PlanFileError, and nothing else, if they are no plan."""
     refuse_more("bytes", len(data), MAX_SIZE)
     try:
         text = data.decode("utf-8")

@@ -1,0 +1,56 @@
+"""``mav-tasks qgc-actions``: buttons for QGroundControl."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mav_tasks.errors import UsageError
+
+
+def qgc_actions(
+    custom: Annotated[
+        bool, typer.Option("--custom", help="The older format, of QGroundControl 4.3 and 4.4.")
+    ] = False,
+    action: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LABEL=COMMAND,P1,...", help="One more button; repeatable."),
+    ] = None,
+    only: Annotated[
+        bool, typer.Option("--only", help="The buttons of --action, and no others.")
+    ] = False,
+    component: Annotated[
+        int, typer.Option(min=1, max=255, help="Of the task server, if it is another.")
+    ] = 191,
+    install: Annotated[
+        bool,
+        typer.Option("--install", help="Write both formats to where QGroundControl looks."),
+    ] = False,
+    documents: Annotated[
+        str | None,
+        typer.Option(metavar="FOLDER", help="For --install: instead of your documents folder."),
+    ] = None,
+) -> None:
+    """Print buttons for QGroundControl."""
+    from mav_tasks import qgc_actions as files  # noqa: PLC0415
+
+    actions = [] if only else list(files.ACTIONS)
+    actions += [files.parse_action(text) for text in action or []]
+    if not actions:
+        raise UsageError("--only: give at least one --action")
+    if not install:
+        file_type = files.CUSTOM_ACTIONS if custom else files.MAVLINK_ACTIONS
+        sys.stdout.write(files.file_of(actions, file_type=file_type, component=component))
+        return
+    for path in files.install(_documents(documents), actions, component=component):
+        sys.stdout.write(f"wrote {path}\n")
+    sys.stdout.write("Choose it in QGroundControl: Application Settings, Fly View\n")
+
+
+def _documents(folder: str | None) -> Path:
+    if folder is not None:
+        return Path(folder)
+    from platformdirs import user_documents_path  # noqa: PLC0415
+
+    return user_documents_path()
