@@ -10,6 +10,7 @@ from mav_tasks.tasks.events import (
     PlanStored,
     QueueContinued,
     QueuePaused,
+    SignaturesSeen,
     TaskAdvanced,
     TaskChanged,
     TaskModified,
@@ -48,7 +49,13 @@ class Batch:
         self.plans: dict[tuple[int, int], tuple[Any, ...]] = {}  # vehicle, kind, plan_id, source
         self.parameters: dict[str, tuple[Any, ...]] = {}  # name, value
         self.vehicles: dict[tuple[str, int], Any] = {}  # column and vehicle -> value
+        #: key, link, system, component -> timestamp, None: forgotten
+        self.signatures: dict[tuple[Any, ...], int | None] = {}
+        self.signed_until = 0
         for number, event in enumerate(events, first):
+            if isinstance(event, SignaturesSeen):
+                self._note_signatures(event)
+                continue
             row = encoder.row(event, offset=offset)
             row.insert(0, format_id)
             body = dumps(row)
@@ -63,6 +70,12 @@ class Batch:
 
     def __repr__(self) -> str:
         return f"Batch({self.first} to {self.last})"
+
+    def _note_signatures(self, event: SignaturesSeen) -> None:
+        for time in (*event.times, *event.gone):
+            sender = (time.key, time.link_id, time.system_id, time.component_id)
+            self.signatures[sender] = time.timestamp or None
+        self.signed_until = max(self.signed_until, event.signed_until)
 
     def _note(self, event: Event, number: int, body: str, utc: float) -> None:
         task_id = getattr(event, "task_id", None)

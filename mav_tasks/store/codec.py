@@ -60,9 +60,13 @@ def format_of(*kinds: type) -> dict[str, tuple[str, ...]]:
 
 
 class Encoder:
-    """Makes rows of values of some kinds, in the order of ``format_of``."""
+    """Makes rows of values of some kinds, in the order of ``format_of``.
 
-    def __init__(self) -> None:
+    ``is_exact``: times are left as they are, bit for bit, and ``offset`` means nothing.
+    """
+
+    def __init__(self, *, is_exact: bool = False) -> None:
+        self._moved: frozenset[str] = frozenset() if is_exact else MONOTONIC
         self._encoders: dict[type, Callable[[Any, float], list[Any]]] = {}
 
     def row(self, value: Any, *, offset: float) -> list[Any]:
@@ -92,7 +96,7 @@ class Encoder:
         return encode
 
     def _converter(self, path: str, hint: Any) -> Converter | None:
-        if path.rpartition(".")[2] in MONOTONIC:
+        if path.rpartition(".")[2] in self._moved:
             return lambda value, offset: value + offset
         inner = _records(hint)
         if get_origin(hint) is tuple:
@@ -109,9 +113,15 @@ class Encoder:
 
 
 class Decoder:
-    """Makes values of rows that were written in a format: many at once, column by column."""
+    """Makes values of rows that were written in a format: many at once, column by column.
 
-    def __init__(self, written: Format) -> None:
+    ``is_exact`` as the Encoder was; then no value is shared by those that have an equal one, which
+    -0.0 and 0.0 are.
+    """
+
+    def __init__(self, written: Format, *, is_exact: bool = False) -> None:
+        self._moved: frozenset[str] = frozenset() if is_exact else MONOTONIC
+        self._shares = not is_exact
         self._written = written
         self._decoders: dict[type, _Decode] = {}
 
@@ -142,7 +152,7 @@ class Decoder:
             for path, hint in _leaves(kind)
             if path in places and (convert := self._converter(path, hint)) is not None
         ]
-        build = _builder(kind, places)
+        build = _builder(kind, places, shares=self._shares)
 
         def decode(columns: list[Sequence[Any]], offset: float) -> list[Any]:
             for index, convert in special:
@@ -153,7 +163,7 @@ class Decoder:
 
     def _converter(self, path: str, hint: Any) -> "_Decode | None":
         """Give what converts a column; None: it is as it is in JSON."""
-        if path.rpartition(".")[2] in MONOTONIC:
+        if path.rpartition(".")[2] in self._moved:
             return lambda column, offset: [None if v is None else v - offset for v in column]
         inner = {kind.__name__: kind for kind in _records(hint)}
         if get_origin(hint) is tuple:
@@ -194,7 +204,7 @@ _Decode = Callable[[Any, float], list[Any]]
 
 
 def _builder(
-    kind: type, places: Mapping[str, int], prefix: str = ""
+    kind: type, places: Mapping[str, int], prefix: str = "", *, shares: bool
 ) -> Callable[[list[Sequence[Any]]], list[Any]]:
     """Give what makes dataclasses of columns; a field not in ``places`` has its default."""
     hints = get_type_hints(kind)
@@ -204,14 +214,14 @@ def _builder(
         if path in places:
             sources[field.name] = itemgetter(places[path])
         elif any(place.startswith(f"{path}.") for place in places):
-            sources[field.name] = _builder(hints[field.name], places, f"{path}.")
+            sources[field.name] = _builder(hints[field.name], places, f"{path}.", shares=shares)
     takes = tuple(sources.values())
     make = _maker(kind, tuple(sources))
     shared: dict[tuple[Any, ...], Any] = {}
 
     def build(columns: list[Sequence[Any]]) -> list[Any]:
         parts = [take(columns) for take in takes]
-        if not prefix:
+        if not prefix or not shares:
             return list(map(make, *parts))
         rows = list(zip(*parts, strict=True))
         if 2 * len(set(rows[:SAMPLE])) > len(rows[:SAMPLE]):  # as marks are: all different

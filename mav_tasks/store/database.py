@@ -5,8 +5,9 @@ WAL with synchronous=FULL: a transaction is on the disk when its COMMIT returns.
 
 import os
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from errno import ENOENT
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from mav_tasks.store.schema import transaction
 from mav_tasks.tasks.events import Event
 
 BUSY_TIMEOUT = 0.25  # s, that SQLite waits for another program's lock
+GONE = "the file was removed or replaced while it was in use"
+ANOTHER = "it is not the file that was opened: put that back, or end the server and look"
 MOST_ROWS = 128  # in one INSERT: seven columns of them are below SQLite's oldest limit, 999 values
 
 _PRAGMAS = (
@@ -48,6 +51,7 @@ class Database:
                 row = self._meta("next_id, last_number, last_write, ended_well")
                 with transaction(self._connection):  # durable before anything is moved
                     self._connection.execute("UPDATE meta SET ended_well = 0")
+                self._files = _identities(path)
             except BaseException:
                 self._connection.close()
                 raise
@@ -64,12 +68,18 @@ class Database:
         return f"Database({self._path.name}, event {self.last_number})"
 
     def reopen(self) -> None:
-        """Open the file anew after a failure, and look which events are in it."""
+        """Open the file anew after a failure, and look which events are in it.
+
+        Only the file that it was: another one in its place lacks what was promised to be in it.
+        """
         with suppress(sqlite3.Error):
             self._connection.close()
+        if _identity(self._path) != self._files[0]:
+            raise OSError(ENOENT, ANOTHER)
         self._connection = _connect(self._path)
         _set_up(self._connection)
         (self.last_number,) = self._meta("last_number")
+        self._files = _identities(self._path)
 
     def write(self, batch: Batch, *, utc: float) -> None:
         """Make a batch durable, all of it or nothing."""
@@ -110,10 +120,15 @@ class Database:
                     f" ON CONFLICT (vehicle) DO UPDATE SET {column} = excluded.{column}",
                     (vehicle, value),
                 )
+            if batch.signatures:
+                _keep_signatures(connection, batch.signatures)
             connection.execute(
-                "UPDATE meta SET next_id = max(next_id, ?), last_number = ?, last_write = ?",
-                (batch.next_id, batch.last, utc),
+                "UPDATE meta SET next_id = max(next_id, ?), last_number = ?, last_write = ?,"
+                " signed_until = max(signed_until, ?)",
+                (batch.next_id, batch.last, utc, batch.signed_until),
             )
+        if _identities(self._path) != self._files:
+            raise OSError(ENOENT, GONE)  # what was just written is nowhere that it can be found
         self.last_number = batch.last
 
     def is_certain(self) -> bool:
@@ -177,6 +192,19 @@ def _create(path: Path) -> None:
         os.close(folder)
 
 
+def _identities(path: Path) -> tuple[tuple[int, int], ...]:
+    """Give which files the store and its log are; OSError where one is not there."""
+    return _identity(path), _identity(path.with_name(f"{path.name}-wal"))
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise OSError(ENOENT, GONE) from error
+    return found.st_dev, found.st_ino
+
+
 def _connect(path: Path) -> sqlite3.Connection:
     return sqlite3.connect(
         f"{path.as_uri()}?mode=rw",  # never a new, empty one in place of what was removed
@@ -198,6 +226,20 @@ def _check_whole(connection: sqlite3.Connection) -> None:
     (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if found != "ok":
         raise StoreError(f"it is damaged ({found.splitlines()[-1]})")
+
+
+def _keep_signatures(
+    connection: sqlite3.Connection, times: Mapping[tuple[Any, ...], int | None]
+) -> None:
+    connection.executemany(
+        "DELETE FROM signatures"
+        " WHERE key = ? AND link_id = ? AND system_id = ? AND component_id = ?",
+        [sender for sender, time in times.items() if time is None],
+    )
+    connection.executemany(
+        "INSERT OR REPLACE INTO signatures VALUES (?, ?, ?, ?, ?)",
+        [(*sender, time) for sender, time in times.items() if time is not None],
+    )
 
 
 def _insert(connection: sqlite3.Connection, into: str, rows: list[tuple[Any, ...]]) -> None:

@@ -3,6 +3,7 @@
 The file stays when the lock goes: who removed it could remove one that another has just locked.
 """
 
+import errno
 import fcntl
 import os
 from contextlib import suppress
@@ -18,8 +19,12 @@ class Lock:
         self._fd: int | None = None
         path = store.with_name(f"{store.name}.lock")
         try:
-            fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            # never through a link: whoever planted it would have another file cut off
+            fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         except OSError as error:
+            if error.errno == errno.ELOOP:
+                words = f"{path.name} is a symbolic link: remove it"
+                raise StoreError(f"store {store}: {words}") from None
             raise StoreError(f"store {store}: {path.name}: {error.strerror}") from error
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)

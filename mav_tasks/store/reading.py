@@ -1,6 +1,6 @@
-"""What a store file holds, read back: the state to go on from, and the journal as events.
+"""What a store file holds, read back: the state to go on from.
 
-Each reading has a connection of its own, and so sees one state of the file whatever is written.
+The reading has a connection of its own, and so sees one state of the file whatever is written.
 """
 
 import sqlite3
@@ -10,13 +10,19 @@ from dataclasses import fields, replace
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store.codec import Decoder, Unreadable, loads
 from mav_tasks.store.failures import words_for
-from mav_tasks.tasks import events
-from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskSubmitted
+from mav_tasks.store.schema import check
+from mav_tasks.tasks.events import (
+    SignatureTime,
+    TaskAdvanced,
+    TaskChanged,
+    TaskModified,
+    TaskSubmitted,
+)
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
@@ -34,7 +40,9 @@ _OF_TASK = {
 def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
     """Give the state that a store file holds, its times moved by ``offset``. StoreError."""
     with _opened(path) as (connection, rows):
-        (next_id,) = connection.execute("SELECT next_id FROM meta").fetchone()
+        next_id, signed_until = connection.execute(
+            "SELECT next_id, signed_until FROM meta"
+        ).fetchone()
         found = connection.execute(
             "SELECT submitted, changed, modified, advanced FROM tasks ORDER BY id"
         )
@@ -47,6 +55,9 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
         vehicles = connection.execute("SELECT vehicle, paused, uid, speed FROM vehicles").fetchall()
         plans = connection.execute("SELECT vehicle, kind, plan_id, source FROM plans").fetchall()
         parameters = connection.execute("SELECT name, value FROM parameters").fetchall()
+        signatures = connection.execute(
+            "SELECT key, link_id, system_id, component_id, timestamp FROM signatures"
+        ).fetchall()
         return Restored(
             tasks=tuple(tasks),
             next_id=next_id,
@@ -55,25 +66,29 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
             speeds={row[0]: row[3] for row in vehicles if row[3] is not None},
             plans={(row[0], row[1]): (row[2], row[3]) for row in plans if row[2]},
             parameters={name: value for name, value in parameters if value is not None},
+            signatures=tuple(SignatureTime(*row) for row in signatures),
+            signed_until=signed_until,
             ended_well=ended_well,
             idle=idle,
             wall_offset=offset,
         )
 
 
-def read_journal(path: Path, *, offset: float) -> Iterator[tuple[int, Event]]:
-    """Give every event that is kept, with its number over the life of the file. StoreError."""
-    with _opened(path) as (connection, rows):
-        found = connection.execute(
-            "SELECT number, kind, body FROM journal"
-            " UNION ALL SELECT number, 'TaskSubmitted', submitted FROM tasks ORDER BY number"
-        )
-        for number, kind, body in found:
-            (event,) = rows.values(getattr(events, kind), [body], offset)
-            yield number, cast(Event, event)
+def read_parameters(path: Path) -> dict[str, float]:
+    """Give what clients have set, by the parameter's name; of a store in use, too. StoreError.
+
+    Nothing is written, and an older file, which may have none, is left as it is.
+    """
+    with _connected(path, mode="ro") as connection:
+        check(connection)
+        query = "SELECT count(*) FROM sqlite_master WHERE name = 'parameters'"
+        if not connection.execute(query).fetchone()[0]:
+            return {}
+        found = connection.execute("SELECT name, value FROM parameters").fetchall()
+        return {name: value for name, value in found if value is not None}
 
 
-class _Rows:
+class Rows:
     """Makes values of stored texts, each of the format that it was written in."""
 
     def __init__(self, connection: sqlite3.Connection) -> None:
@@ -91,7 +106,7 @@ class _Rows:
         return values
 
 
-def _changed(task: Task, rows: _Rows, texts: Sequence[str | None], offset: float) -> Task:
+def _changed(task: Task, rows: Rows, texts: Sequence[str | None], offset: float) -> Task:
     latest: list[TaskChanged | TaskModified | TaskAdvanced] = []
     for kind, text in zip(_OF_TASK, texts, strict=True):
         if text is not None:
@@ -105,13 +120,30 @@ def _changed(task: Task, rows: _Rows, texts: Sequence[str | None], offset: float
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[sqlite3.Connection, _Rows]]:
+def _opened(path: Path) -> Iterator[tuple[sqlite3.Connection, Rows]]:
+    with _connected(path, mode="rw") as connection:
+        yield connection, Rows(connection)
+
+
+@contextmanager
+def _connected(path: Path, *, mode: str) -> Iterator[sqlite3.Connection]:
+    with (
+        in_one_line(path),
+        closing(sqlite3.connect(f"{path.as_uri()}?mode={mode}", uri=True)) as connection,
+    ):
+        connection.execute("BEGIN")  # one state of the file for every query
+        yield connection
+
+
+@contextmanager
+def in_one_line(path: Path) -> Iterator[None]:
+    """Make a StoreError of all that can be wrong with a file that is read."""
     try:
-        with closing(sqlite3.connect(f"{path.as_uri()}?mode=rw", uri=True)) as connection:
-            connection.execute("BEGIN")  # one state of the file for every query
-            yield connection, _Rows(connection)
+        yield
     except Unreadable as error:
         raise StoreError(f"store {path}: it cannot be understood: {error}") from error
+    except StoreError as error:
+        raise StoreError(f"store {path}: {error}") from error
     except (ValueError, LookupError) as error:  # not JSON, or not what we write
         raise StoreError(f"store {path}: it is damaged ({error})") from error
     except sqlite3.Error as error:

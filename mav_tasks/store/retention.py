@@ -1,5 +1,7 @@
 """What is forgotten: finished tasks with their events, and other events, in bounded steps.
 
+Events of no task are bounded in number as well as in age: anybody who may send can cause them.
+
 A task that waits or is under way is never deleted, nor any event of it.
 """
 
@@ -10,6 +12,7 @@ from mav_tasks.settings import Retention
 
 STEP = 250  # tasks deleted in one transaction
 SWEEP = 2_000  # journal rows looked at in one transaction
+MOST_OTHERS = 200_000  # events of no task: refusals, parameters, what happened to rovers
 
 _OVER = "state >= 9"  # the terminal states; as the index has it
 
@@ -24,7 +27,8 @@ class Trimmer:
     def step(self, connection: sqlite3.Connection, *, utc: float) -> bool:
         """Delete some of what is too old or too many; True: there may be more."""
         deleted = self._delete_tasks(connection, utc)
-        return self._sweep(connection, utc) or deleted >= STEP
+        others = self._delete_others(connection)
+        return self._sweep(connection, utc) or deleted >= STEP or others >= SWEEP
 
     def _delete_tasks(self, connection: sqlite3.Connection, utc: float) -> int:
         ids: list[tuple[int]] = []
@@ -38,6 +42,19 @@ class Trimmer:
         connection.executemany("DELETE FROM journal WHERE task_id = ?", ids)
         connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
         return len(ids)
+
+    def _delete_others(self, connection: sqlite3.Connection) -> int:
+        """Whoever has things noted, again and again, does not fill the disk by it."""
+        query = "SELECT count(*) FROM journal WHERE task_id IS NULL"
+        (count,) = connection.execute(query).fetchone()
+        excess = min(count - MOST_OTHERS, SWEEP)
+        if excess > 0:
+            connection.execute(
+                "DELETE FROM journal WHERE number IN (SELECT number FROM journal"
+                " WHERE task_id IS NULL ORDER BY number LIMIT ?)",
+                (excess,),
+            )
+        return int(max(excess, 0))
 
     def _sweep(self, connection: sqlite3.Connection, utc: float) -> bool:
         """Delete old events that are of no task (any more); True: more rows are to be looked at."""

@@ -45,6 +45,15 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         ),
     ),
     ("CREATE TABLE parameters (name TEXT PRIMARY KEY, value REAL)",),
+    (  # times of signatures, in 10 µs since 2015; keys by their fingerprints
+        (
+            "CREATE TABLE signatures (key TEXT NOT NULL, link_id INTEGER NOT NULL,"
+            " system_id INTEGER NOT NULL, component_id INTEGER NOT NULL,"
+            " timestamp INTEGER NOT NULL,"
+            " PRIMARY KEY (key, link_id, system_id, component_id)) WITHOUT ROWID"
+        ),
+        "ALTER TABLE meta ADD COLUMN signed_until INTEGER NOT NULL DEFAULT 0",
+    ),
 )
 
 
@@ -57,6 +66,11 @@ def check(connection: sqlite3.Connection, *, known: int = len(MIGRATIONS)) -> No
         raise StoreError("a database of another program")
     if version > known:
         raise StoreError(f"written by a newer version (schema {version}, this one knows {known})")
+
+
+def is_empty(connection: sqlite3.Connection) -> bool:
+    """Whether a checked database has no table yet."""
+    return _number(connection, "user_version") == 0
 
 
 def migrate(

@@ -1,16 +1,20 @@
 """The store on a disk: a SQLite file that one server owns, written by a thread of its own."""
 
+import os
+import stat
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from mav_tasks.errors import StoreError
 from mav_tasks.settings import Retention
 from mav_tasks.store.base import Outcome
 from mav_tasks.store.database import Database
+from mav_tasks.store.journal import Journal
 from mav_tasks.store.lock import Lock
 from mav_tasks.store.mailbox import Mailbox
-from mav_tasks.store.reading import read_journal, read_restored
+from mav_tasks.store.reading import read_restored
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
@@ -71,7 +75,8 @@ class SqliteStore:
 
     def journal(self) -> Iterator[tuple[int, Event]]:
         """Give every event that is kept, numbered over the life of the file. StoreError."""
-        return read_journal(self._path, offset=self._wall_offset())
+        with closing(Journal(self._path)) as journal:
+            yield from journal.take(offset=self._wall_offset())
 
     def append(self, events: Sequence[Event]) -> None:
         """Take events to be made durable; waits for nothing. ValueError once it is closed."""
@@ -102,7 +107,9 @@ class SqliteStore:
 def _real_path(path: Path) -> Path:
     """Give the one name of a file, in a folder that is there."""
     try:
-        path = path.expanduser().resolve()
+        path = path.expanduser()
+        _refuse_planted(path)
+        path = path.resolve()
         missing = [folder for folder in path.parents if not folder.is_dir()]
         for folder in reversed(missing):
             folder.mkdir(mode=0o700, exist_ok=True)
@@ -110,3 +117,16 @@ def _real_path(path: Path) -> Path:
         words = getattr(error, "strerror", None) or str(error)
         raise StoreError(f"store {path}: its folder cannot be made: {words}") from error
     return path
+
+
+def _refuse_planted(path: Path) -> None:
+    """Follow no link of another user, as the kernel does not where all may write.
+
+    We look where it leads before the kernel is asked, so it could not.
+    """
+    try:
+        found = path.lstat()
+    except OSError:  # there is nothing, or what comes next says why not
+        return
+    if stat.S_ISLNK(found.st_mode) and found.st_uid not in (0, os.geteuid()):
+        raise StoreError(f"store {path}: it is a symbolic link of another user")

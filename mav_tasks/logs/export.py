@@ -1,0 +1,78 @@
+"""The journal as lines for people, JSON for scripts, or a table: as the log has it, time in UTC."""
+
+import csv
+import io
+import json
+import re
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from mav_tasks.errors import UsageError
+from mav_tasks.logs.rendering import clean, event_values, utc_text
+from mav_tasks.tasks.events import Event
+
+#: number of an event over the life of the store, the event with its time in UTC -> a line
+EntryOf = Callable[[int, Event], str]
+
+TIMING = ("period", "count", "p50", "p99", "longest", "late")
+
+COLUMNS = (
+    "number",
+    "time",
+    "event",
+    "vehicle",
+    "task",
+    "version",
+    "old",
+    "new",
+    "reason",
+    "actor",
+    "words",
+    # of the setpoints of a task that has been driven, in seconds
+    *TIMING,
+)
+
+_SECONDS = {"s": 1, "m": 60, "h": 3_600, "d": 86_400}
+
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
+
+
+def text_entry(_number: int, event: Event) -> str:
+    """Give the time and the words."""
+    return f"{utc_text(event.at)} {clean(str(event))}\n"
+
+
+def json_entry(number: int, event: Event) -> str:
+    """Give one object."""
+    return _encode({"number": number} | event_values(event, offset=0.0)) + "\n"
+
+
+def csv_entry(number: int, event: Event) -> str:
+    """Give a row of COLUMNS; what an event does not have is empty."""
+    values = event_values(event, offset=0.0)
+    # of a submission: what it has become by it
+    values = {"new": values.get("state")} | values | {"number": number, "words": values["message"]}
+    values |= values.get("timing") or {}
+    return csv_row([values.get(column) for column in COLUMNS])
+
+
+def csv_row(cells: Sequence[Any]) -> str:
+    """Give a row of a table."""
+    row = io.StringIO()
+    csv.writer(row, lineterminator="\n").writerow(cells)
+    return row.getvalue()
+
+
+def parse_since(text: str, *, now: float) -> float:
+    """Give the UTC seconds that are meant: so long before ``now``, or a date. UsageError."""
+    ago = re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", text)
+    if ago is not None:
+        return now - float(ago[1]) * _SECONDS[ago[2]]
+    try:
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    except (ValueError, OverflowError):
+        raise UsageError(
+            f"--since {text}: expected 30m, 2h, 7d, or a time in UTC as 2026-11-20T10:00"
+        ) from None

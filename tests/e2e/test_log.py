@@ -1,0 +1,263 @@
+"""The log of a real server, and ``mav-tasks log`` beside it."""
+
+import csv
+import fcntl
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Encoder
+from mav_tasks.tasks.events import VehicleSeen
+from tests.kit.processes import (
+    Process,
+    Stand,
+    command_long,
+    free_udp_ports,
+    process,
+    stand,
+    submit,
+    wait_for,
+    wait_until,
+)
+from tests.unit.store.samples import opened
+
+MOVE, STOP, CONTINUE = 54000, 54003, 193
+PLAIN = ("event", "level", "message", "task", "vehicle", "old", "new", "reason", "actor", "text")
+TALKER = 42  # system id of a vehicle that only talks
+
+
+@contextmanager
+def unread(folder: Path) -> Iterator[Stand]:
+    """A server and a rover; the server's standard error is a pipe, full from the beginning."""
+    client_port, rover_port = free_udp_ports(2)
+    truth, output = folder / "truth.csv", folder / "server.log"
+    read, write = os.pipe()
+    fcntl.fcntl(write, fcntl.F_SETPIPE_SZ, 4096)
+    os.write(write, b"x" * 4096)
+    command = [sys.executable, "-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:"]
+    command += ["--client", f"udpin:127.0.0.1:{client_port}"]
+    command += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
+    rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic"]
+    with (
+        process(*rover, "--truth", str(truth), folder=folder, name="rover") as rover_process,
+        output.open("wb") as sink,
+    ):
+        server = subprocess.Popen(command, stdout=sink, stderr=write)
+        os.close(write)
+        it = Stand(Process(server, output), rover_process, client_port, rover_port, 0, truth)
+        try:
+            it.server.wait_for("store")
+            wait_until(truth.exists, within=20, what="the truth file")
+            yield it
+        finally:
+            it.close()
+            server.kill()
+            server.wait(10)
+            os.close(read)
+
+
+def drained(link: Any) -> bool:
+    """Read what came: an answer is lost where there is no room for it."""
+    while link.recv_match(blocking=False) is not None:
+        pass
+    return True
+
+
+@pytest.mark.slow
+def test_a_server_whose_log_nobody_reads_goes_on_driving_and_ends(tmp_path: Path) -> None:
+    with unread(tmp_path) as running:
+        link = running.connect()
+        running.drive(link, 20.0)
+        for number in range(300):  # each is refused, with 25 kB of log altogether
+            link.mav.command_long_send(1, 191, MOVE, 0, 1e6 + number, 0, 0, 0, 0, 0, 0)
+        way = running.truth()[-1]["north"] + 1
+        wait_until(
+            lambda: drained(link) and running.truth()[-1]["north"] > way,
+            within=10,
+            what="the way to go on",
+        )
+        submit(link, STOP)
+        wait_until(lambda: drained(link) and running.speed() < 0.01, within=5, what="standstill")
+        submit(link, CONTINUE, 1)
+        running.drive(link, 20.0)
+        asked_at = running.truth()[-1]["time"]
+        took = running.server.end()
+        assert running.server.popen.returncode == 0
+        assert took < 4
+        wait_until(lambda: running.speed() < 0.01, within=5, what="the rover to stand")
+        assert running.truth()[-1]["time"] - asked_at < 2.5  # not by its own time-out
+
+
+def test_what_a_rover_says_is_in_the_log_and_gives_no_orders_to_the_terminal(
+    tmp_path: Path,
+) -> None:
+    with socket.socket(type=socket.SOCK_DGRAM) as talker:
+        talker.bind(("127.0.0.1", 0))
+        port = talker.getsockname()[1]
+        with stand(tmp_path, "--vehicle", f"udpout:127.0.0.1:{port}", "-v") as running:
+            talker.settimeout(10)
+            server = talker.recvfrom(300)[1]  # its heartbeat
+            rover = Encoder(Address(TALKER, 1))
+            text = rover.encode(m.Statustext(4, b"PreArm: \x1b[31mred\nERROR forged"))
+            for _ in range(40):
+                talker.sendto(text, server)
+            talker.sendto(rover.encode(m.Statustext(7, b"that is all")), server)
+            running.server.wait_for("DEBUG vehicle 42 says: that is all")
+            running.server.end()
+            lines = [line for line in running.server.text.splitlines() if "vehicle 42" in line]
+    assert [line.split(" ", 2)[2] for line in lines] == [
+        "WARNING vehicle 42 says: PreArm: [31mred ERROR forged",
+        "DEBUG vehicle 42 says: that is all",
+    ] + [line.split(" ", 2)[2] for line in lines[2:]]
+    assert "\x1b" not in running.server.text
+    assert any("more in" in line for line in lines[2:])
+
+
+def export(*options: str) -> tuple[int, str, str]:
+    """Run ``mav-tasks log``; gives exit code, standard output and error."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", "log", *options],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_the_log_in_json_and_the_journal_beside_the_server_say_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    with stand(tmp_path, "--store", str(path), "--log-json") as running:
+        follow = ["--follow", "--json", "--task", "1"]
+        with begun(path, *follow, stdout=subprocess.PIPE) as follower:
+            try:
+                link = running.connect()
+                submit(link, MOVE, 0.2)
+                wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=30)
+                assert command_long(link, MOVE, 1e6).result != 0
+                followed = [json.loads(line) for line in lines_until(follower, '"new":"completed"')]
+                follower.send_signal(signal.SIGINT)
+                assert follower.wait(10) == 0
+            finally:
+                follower.kill()
+        submit(link, MOVE, 0.2)  # nobody holds anything of the store
+        running.server.end()
+        text = running.server.text
+    code, exported, _ = export("--store", str(path), "--json")
+    assert code == 0
+    kept = [json.loads(line) for line in exported.splitlines()]
+    assert followed == [event for event in kept if event.get("task") == 1]
+    assert (followed[0]["event"], followed[0]["goal"]["kind"]) == ("TaskSubmitted", "Move")
+    assert (followed[-1]["old"], followed[-1]["new"]) == ("executing", "completed")
+    assert kept[-1]["event"] == "ServerStopped"
+
+    said = [json.loads(line) for line in text.splitlines() if not line.startswith("mav-tasks: ")]
+    texts = [each for each in said if each.get("event") == "VehicleText"]
+    assert {each["vehicle"] for each in texts} == {1}  # the simulated autopilot said something
+    logged = [each for each in said if "event" in each and each not in texts]
+    assert [essence(each) for each in logged] == [essence(each) for each in kept]
+    assert "SubmissionRefused" in {each["event"] for each in logged}
+
+
+def essence(entry: dict[str, Any]) -> dict[str, Any]:
+    """What a line says but for times, of which the log has its own."""
+    return {key: value for key, value in entry.items() if key in PLAIN}
+
+
+def test_the_table_of_a_store_that_no_server_has(full: Path) -> None:
+    rows = list(csv.DictReader(export("--store", str(full), "--csv")[1].splitlines()))
+    assert [row["number"] for row in rows] == [str(number) for number in range(1, 5_001)]
+    assert {(row["event"], row["vehicle"], row["task"]) for row in rows} == {
+        ("VehicleSeen", "1", "")
+    }
+    assert export("--store", str(full), "--vehicle", "7") == (0, "", "")
+
+
+def lines_until(follower: "subprocess.Popen[bytes]", words: str) -> Iterator[str]:
+    assert follower.stdout is not None
+    for line in map(bytes.decode, follower.stdout):
+        yield line
+        if words in line:
+            return
+
+
+@pytest.fixture
+def full(tmp_path: Path) -> Path:
+    """A store with more in it than a pipe holds."""
+    path = tmp_path / "full.sqlite3"
+    with opened(path) as store:
+        store.append([VehicleSeen(1, f"seen {number}", 1.0) for number in range(5_000)])
+    return path
+
+
+def begun(path: Path, *options: str, **streams: Any) -> "subprocess.Popen[bytes]":
+    command = [sys.executable, "-m", "mav_tasks.cli", "log", "--store", str(path), *options]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, **streams)
+
+
+@pytest.mark.parametrize("follow", [(), ("--follow",)])
+def test_who_has_read_enough_ends_it_quietly(full: Path, follow: tuple[str, ...]) -> None:
+    with begun(full, *follow, stdout=subprocess.PIPE) as it:
+        assert it.stdout is not None
+        assert it.stderr is not None
+        assert it.stdout.readline().endswith(b" vehicle 1: seen 0\n")
+        if follow:  # all of it, and then nobody waits for more
+            while b"seen 4999" not in it.stdout.readline():
+                pass
+        it.stdout.close()
+        assert it.wait(10) == 0
+        assert it.stderr.read() == b""
+
+
+def test_a_full_disk_is_told(full: Path) -> None:
+    with Path("/dev/full").open("wb") as sink, begun(full, stdout=sink) as it:
+        assert it.stderr is not None
+        assert it.stderr.read() == b"mav-tasks: standard output: No space left on device\n"
+        assert it.wait(10) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--store", "/nowhere/at.all"), "there is no such file"),
+        (("--store", ":memory:"), "expected the path"),
+        (("--json", "--csv"), "choose one"),
+        (("--since", "yesterday"), "--since yesterday"),
+        (("--task", "9" * 30), "there is no such number"),
+        (("--vehicle", "-" + "9" * 30), "there is no such number"),
+    ],
+)
+def test_what_cannot_be_printed_is_told_in_one_line(options: tuple[str, ...], words: str) -> None:
+    code, said, error = export(*options)
+    assert (code, said) == (2, "")
+    assert words in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize("closed", [">&-", ">/dev/full 2>&-", ">/dev/full 2>/dev/full"])
+def test_a_server_serves_though_nobody_can_be_told(tmp_path: Path, closed: str) -> None:
+    client_port, rover_port = free_udp_ports(2)
+    command = f"exec {sys.executable} -m mav_tasks.cli serve --store :memory: --no-push"
+    command += f" --client udpin:127.0.0.1:{client_port} --vehicle udpout:127.0.0.1:{rover_port}"
+    with socket.socket(type=socket.SOCK_DGRAM) as rover:
+        rover.bind(("127.0.0.1", rover_port))
+        rover.settimeout(20)
+        server = subprocess.Popen(["sh", "-c", f"{command} {closed}"], cwd=tmp_path)
+        try:
+            rover.recv(300)  # its heartbeat
+            server.send_signal(signal.SIGTERM)
+            assert server.wait(10) == 0
+        finally:
+            server.kill()
+            server.wait(10)

@@ -1,0 +1,223 @@
+"""The journal of a store file, read page by page beside whoever writes it."""
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.errors import StoreError
+from mav_tasks.store import journal as module
+from mav_tasks.store import schema
+from mav_tasks.store.journal import PAGE, Journal, Which
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
+from mav_tasks.tasks.task import TaskId
+from tests.unit.store.samples import OFFSET, finish, opened, submitted, wait_for
+from tests.unit.tasks.samples import draft
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "tasks.sqlite3"
+
+
+@pytest.fixture
+def store(path: Path) -> Iterator[SqliteStore]:
+    with opened(path) as it:
+        yield it
+
+
+def history(count: int, *, vehicle: int = 1, at: float = 10.0) -> list[Event]:
+    """Tasks submitted and cancelled, one after the other."""
+    book = TaskBook()
+    for number in range(1, count + 1):
+        book.submit(draft(vehicle=vehicle), now=at + number)
+        finish(book, number, now=at + number + 0.5)
+    return list(book.take_events())
+
+
+def keep(store: SqliteStore, events: list[Event], *, through: int | None = None) -> list[Event]:
+    store.append(events)
+    wait_for(store, through or len(events))
+    return events
+
+
+def read(path: Path, which: Which | None = None) -> list[tuple[int, Event]]:
+    with closing(Journal(path, which)) as it:
+        return list(it.take(offset=OFFSET))
+
+
+@pytest.mark.parametrize("count", [0, 1, PAGE // 2, PAGE // 2 + 1, 2 * PAGE + 7])
+def test_every_event_is_given_once_in_its_order(store: SqliteStore, path: Path, count: int) -> None:
+    events: list[Event] = [VehicleSeen(1, "found", 1.0), *history(count)]
+    assert read(path) == []
+    keep(store, events)
+    assert read(path) == list(enumerate(events, 1))
+
+
+def test_many_submissions_in_one_piece_and_then_their_ends(store: SqliteStore, path: Path) -> None:
+    tasks: list[Event] = [submitted(number) for number in range(1, 2 * PAGE + 4)]
+    notes: list[Event] = [VehicleSeen(1, str(number), 1.0) for number in range(3 * PAGE)]
+    events = keep(store, tasks + notes)
+    assert read(path) == list(enumerate(events, 1))
+
+
+def test_what_comes_later_is_given_to_who_goes_on_reading(store: SqliteStore, path: Path) -> None:
+    first = history(3)
+    then: list[Event] = [VehicleSeen(1, "found", 99.0), submitted(4)]
+    keep(store, first)
+    with closing(Journal(path)) as it:
+        seen = it.version()
+        assert [event for _, event in it.take(offset=OFFSET)] == first
+        assert it.version() == seen
+        keep(store, then, through=len(first) + 2)
+        assert it.version() != seen
+        assert list(it.take(offset=OFFSET)) == list(enumerate(then, len(first) + 1))
+        assert list(it.take(offset=OFFSET)) == []
+
+
+def test_a_submission_that_was_withdrawn_stays_in_the_journal(
+    store: SqliteStore, path: Path
+) -> None:
+    events = keep(store, [submitted(1), submitted(2), TaskWithdrawn(TaskId(1), 1, 100.5)])
+    assert read(path) == list(enumerate(events, 1))
+
+
+def test_some_of_it(store: SqliteStore, path: Path) -> None:
+    ours, theirs = history(4), VehicleSeen(2, "found", 50.0)
+    keep(store, [*ours, theirs])
+    assert [event for _, event in read(path, Which(task=3))] == ours[4:6]
+    assert [event for _, event in read(path, Which(vehicle=2))] == [theirs]
+    assert [event for _, event in read(path, Which(vehicle=1))] == ours
+    late = read(path, Which(since=OFFSET + 13.5))  # the third is submitted before, ends after it
+    assert [event for _, event in late] == [*ours[5:], theirs]
+    assert read(path, Which(task=3, vehicle=2)) == []
+
+
+def test_a_reader_that_stays_keeps_nothing_from_the_writer(store: SqliteStore, path: Path) -> None:
+    keep(store, history(PAGE))
+    with closing(Journal(path)) as it, closing(sqlite3.connect(path)) as other:
+        events = it.take(offset=OFFSET)
+        assert len(list(islice(events, 10))) == 10  # the pager has no room for more
+        keep(store, [VehicleSeen(1, "found", 99.0)], through=2 * PAGE + 1)
+        busy, pages, done = other.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
+        assert (busy, pages) == (0, done)
+        assert len(list(events)) == 2 * PAGE + 1 - 10
+
+
+def test_reading_changes_nothing_and_needs_no_lock(store: SqliteStore, path: Path) -> None:
+    keep(store, history(3))
+    before = path.read_bytes()
+    assert len(read(path)) == 6
+    assert path.read_bytes() == before
+    store.close()
+    assert len(read(path)) == 6
+    with opened(path) as again:
+        assert again.load().ended_well
+
+
+def test_no_more_is_read_than_a_page_ahead(store: SqliteStore, path: Path) -> None:
+    keep(store, history(3 * PAGE))
+    with closing(Journal(path)) as it:
+        for number, _ in it.take(offset=OFFSET):
+            ahead = int(repr(it).removesuffix(")").rpartition(" ")[2])
+            assert number <= ahead < number + 2 * PAGE
+        assert number == 6 * PAGE
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_store_is_read_where_nobody_may_write(path: Path) -> None:
+    with opened(path) as store:
+        keep(store, history(3))
+    path.parent.chmod(0o500)
+    try:
+        assert len(read(path)) == 6
+    finally:
+        path.parent.chmod(0o700)
+
+
+def test_where_sqlite_may_not_write_its_index_the_file_is_read_as_it_stands(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with opened(path) as store:
+        keep(store, history(3))
+    checked, asked = module._checked, list[str]()
+
+    def refuse(path: Path, how: str) -> sqlite3.Connection:
+        asked.append(how)
+        if how == "mode=ro":
+            raise sqlite3.OperationalError("unable to open database file")
+        return checked(path, how)
+
+    monkeypatch.setattr(module, "_checked", refuse)
+    assert len(read(path)) == 6
+    assert asked == ["mode=ro", "immutable=1"]
+
+
+def damaged(path: Path) -> None:
+    path.write_bytes(b"not a database at all, but long enough to be one" * 40)
+
+
+def foreign(path: Path) -> None:
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("CREATE TABLE theirs (x)")
+
+
+def newer(path: Path) -> None:
+    with opened(path):
+        pass
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute(f"PRAGMA user_version = {len(schema.MIGRATIONS) + 1}")
+
+
+def unknown_event(path: Path) -> None:
+    with opened(path) as store:
+        keep(store, [VehicleSeen(1, "found", 1.0)])
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE journal SET kind = 'Later'")
+
+
+def no_json(path: Path) -> None:
+    with opened(path) as store:
+        keep(store, [submitted(1)])
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE tasks SET submitted = '[1, what'")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda path: None, "there is no such file"),
+        (lambda path: path.mkdir(), "there is no such file"),
+        (lambda path: path.touch(), "nothing was ever written to it"),
+        (damaged, "damaged"),
+        (foreign, "another program"),
+        (newer, "newer version"),
+        (unknown_event, "Later is unknown to this version"),
+        (no_json, "damaged"),
+    ],
+)
+def test_what_is_no_store_is_told_in_one_line(path: Path, spoil: object, words: str) -> None:
+    assert callable(spoil)
+    spoil(path)
+    before = sorted(path.parent.iterdir())
+    with pytest.raises(StoreError, match=words) as told:
+        read(path)
+    assert str(path) in str(told.value)
+    assert "\n" not in str(told.value)
+    assert {each.name for each in before} >= {
+        each.name for each in path.parent.iterdir() if not each.name.endswith(("-wal", "-shm"))
+    }
+
+
+def test_a_file_of_the_first_schema_is_read_without_being_changed(path: Path) -> None:
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        schema.migrate(connection, migrations=schema.MIGRATIONS[:1])
+    assert read(path) == []
+    with closing(sqlite3.connect(path)) as connection:
+        assert connection.execute("PRAGMA user_version").fetchone() == (1,)
