@@ -20,6 +20,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
 from mav_tasks.tasks.task import MAX_TASK_ID, Draft, Progress, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.timing import Timing
 
 KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
 
@@ -108,16 +109,22 @@ class TaskBook:
         actor: str,
         now: float,
         progress: Progress | None = None,
+        timing: Timing | None = None,
     ) -> Task:
-        """Move a task along an edge of the lifecycle table; IllegalTransition if it has none."""
+        """Move a task along an edge of the lifecycle table; IllegalTransition if it has none.
+
+        None for progress or timing: as they were.
+        """
         old = self._tasks[task_id]
         check_transition(old.state, new)
+        timing = timing or old.timing
         task = replace(
             old,
             state=new,
             reason=reason,
             version=old.version + 1,
             progress=old.progress if progress is None else progress,
+            timing=timing.final if timing and new in TERMINAL else timing,
         )
         self._tasks[task_id] = task
         self._count(old, -1)
@@ -133,6 +140,7 @@ class TaskBook:
                 actor=actor,
                 at=now,
                 progress=task.progress,
+                timing=task.timing,
             )
         )
         self._last_event[task_id] = self.recorded

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Progress, Task, TaskId, Terms
+from mav_tasks.tasks.timing import Timing
 
 SERVER = "server"
 
@@ -30,7 +31,10 @@ class TaskSubmitted:
 
 @dataclass(frozen=True, slots=True)
 class TaskChanged:
-    """A task moved along one edge of the lifecycle table."""
+    """A task moved along one edge of the lifecycle table.
+
+    ``timing`` is that of its setpoints so far; it says something new where ``old`` is EXECUTING.
+    """
 
     task_id: TaskId
     vehicle: int
@@ -41,11 +45,13 @@ class TaskChanged:
     actor: str
     at: float
     progress: Progress
+    timing: Timing | None = None
 
     def __str__(self) -> str:
         why = f": {words_of(self.reason)}" if self.reason else ""
         who = "" if self.actor == SERVER else f", by {self.actor}"
-        return f"task {self.task_id} {self.new.name.lower()}{why}{who}"
+        driven = f"; {self.timing}" if self.timing and self.old is TaskState.EXECUTING else ""
+        return f"task {self.task_id} {self.new.name.lower()}{why}{who}{driven}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,6 +226,37 @@ class ParameterSet:
 
 
 @dataclass(frozen=True, slots=True)
+class SignatureTime:
+    """The time of the last signed packet that was accepted of one sender, in 10 µs since 2015.
+
+    ``key`` is the fingerprint of the key that it was signed with.
+    """
+
+    key: str
+    link_id: int
+    system_id: int
+    component_id: int
+    timestamp: int
+
+
+@dataclass(frozen=True, slots=True)
+class SignaturesSeen:
+    """Up to which times signatures are used up, so that none is accepted twice.
+
+    ``gone`` are senders of which nothing is remembered any more; ``signed_until``: no signature of
+    our own is later than this. Kept, but no part of the journal: there are many.
+    """
+
+    times: tuple[SignatureTime, ...]
+    gone: tuple[SignatureTime, ...]
+    signed_until: int
+    at: float
+
+    def __str__(self) -> str:
+        return f"signatures: {len(self.times)} senders heard"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleSeen:
     """A vehicle was found, or is heard again."""
 
@@ -275,6 +312,7 @@ Event = (
     | VehicleIdentified
     | VehicleSpeedSet
     | ParameterSet
+    | SignaturesSeen
     | VehicleSeen
     | VehicleNoted
     | ServerStopped

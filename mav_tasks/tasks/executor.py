@@ -5,13 +5,15 @@ non-zero velocity waits until EXECUTING is durable; zeros never wait.
 """
 
 from dataclasses import replace
+from math import copysign
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
+from mav_tasks.tasks.astray import AstrayWatch
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.events import SERVER
+from mav_tasks.tasks.events import SERVER, VehicleNoted
 from mav_tasks.tasks.goal import Move, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
@@ -22,6 +24,7 @@ from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.stage import course_of, look_on_the_way, may_go_on_rolling, set_out
 from mav_tasks.tasks.stuck import StuckWatch
 from mav_tasks.tasks.task import Progress, Task, TaskId
+from mav_tasks.tasks.timing import Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
 from mav_tasks.tasks.way_back import is_off_line, way_back
 
@@ -49,9 +52,11 @@ class Executor:
         self._last_tick = 0.0
         self._moved_at = 0.0  # when a velocity other than zero was last asked for
         self._stuck = StuckWatch()
+        self._astray = AstrayWatch()
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
         self._resumes_by_itself = False
         self._is_coming_back = False  # from outside the fence
+        self._meter: TimingMeter | None = None  # while EXECUTING
 
     def __repr__(self) -> str:
         return f"Executor({self.task!r})"
@@ -60,6 +65,17 @@ class Executor:
     def task(self) -> Task | None:
         """The begun task."""
         return None if self._task_id is None else self._book[self._task_id]
+
+    @property
+    def timing(self) -> Timing | None:
+        """How evenly the begun task's setpoints have left up to now."""
+        measured = None if self._meter is None else self._meter.timing()
+        return measured or (None if self.task is None else self.task.timing)
+
+    def setpoint_left(self, *, now: float) -> None:
+        """A setpoint leaves for the vehicle now."""
+        if self._meter is not None:
+            self._meter.note(now=now)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -175,6 +191,7 @@ class Executor:
         )
         if not self._last_velocity.is_zero:
             self._moved_at = now
+        self._astray.commanded(self._last_velocity)
         self._stuck.commanded(self._last_velocity, seconds=self._settings.watch.setpoint_period)
         return Demand(DemandKind.DRIVE, self._last_velocity)
 
@@ -220,7 +237,7 @@ class Executor:
         progress = self._set_out(task, task.progress, seen, motion, now=now)
         if progress is None:
             return view.HOLD
-        self._way_back = None
+        self._way_back, self._astray = None, AstrayWatch()
         if task.progress.anchor is not None:
             goal, turns = present_goal(task.goal, progress), seen.turns_on_spot
             self._way_back = way_back(goal, progress, motion, turns_on_spot=turns)
@@ -246,7 +263,7 @@ class Executor:
             return None
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         self._course = course_of(task.goal, here, seen, driving=self._settings.driving)
-        self._stuck.begin(now=now)
+        self._begin_leg(now=now)
         return here
 
     def _refuse_stage(self, task: Task, *, now: float) -> None:
@@ -295,16 +312,31 @@ class Executor:
         if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
             self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
             return view.HOLD
+        if self._astray.is_astray(course, motion):
+            self._set_aside_as_astray(task, now=now)
+            return view.HOLD
         speed = None if course is self._way_back else course.progress.speed
         wish = course.steer(motion, driving=self._settings.driving, speed=speed)
-        velocity = self._within_fence(course, wish, motion, seen)
+        top = task.terms.top_speed
+        if top is not None and abs(wish.forward) > top:
+            wish = replace(wish, forward=copysign(top, wish.forward))
+        velocity = self._within_fence(course, wish, motion, seen, now=now)
         if velocity is None:
             self._change(S.HELD, R.FENCE, actor=SERVER, now=now)
             return view.HOLD
         return Demand(DemandKind.DRIVE, velocity)
 
+    def _begin_leg(self, *, now: float) -> None:
+        self._stuck.begin(now=now)
+        self._astray.begin_leg()
+
+    def _set_aside_as_astray(self, task: Task, *, now: float) -> None:
+        words = "does not go where it is told to: is its heading right?"
+        self._book.record(VehicleNoted(task.vehicle, words, now))
+        self._change(S.HELD, R.OFF_LINE, actor=SERVER, now=now)
+
     def _within_fence(
-        self, course: Course, wish: Velocity, motion: Motion, seen: VehicleView
+        self, course: Course, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
     ) -> Velocity | None:
         """Slow down before the fence; None: stop. A vehicle that began outside may come back in."""
         if self._is_coming_back and isinstance(course.leg, Move | Rotate):
@@ -312,13 +344,13 @@ class Executor:
             if self._is_coming_back:
                 return wish
         fence = self._bounds.local(seen.origin)
-        return within_fence(wish, motion, fence, driving=self._settings.driving)
+        return within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
 
     def _arrive(
         self, task: Task, course: Course, seen: VehicleView, motion: Motion, now: float
     ) -> None:
         """The end of a leg: the next one, the next step, back to the task itself, or all done."""
-        self._stuck.begin(now=now)
+        self._begin_leg(now=now)
         if course.advance(motion):
             if course.by_course and course.misses > MISSES:
                 self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
@@ -442,14 +474,24 @@ class Executor:
         progress: Progress | None = None,
     ) -> None:
         assert self._task_id is not None
-        old = self._book[self._task_id]
+        old, timing = self._book[self._task_id], None
         if old.state is S.EXECUTING:
             self._executed_before += now - self._since
             progress = replace(old.progress, execution_time=self._executed_before)
+            timing, self._meter = self.timing, None
         self._since = now
         self._book.change(
-            self._task_id, new, reason=reason, actor=actor, now=now, progress=progress
+            self._task_id,
+            new,
+            reason=reason,
+            actor=actor,
+            now=now,
+            progress=progress,
+            timing=timing,
         )
+        if new is S.EXECUTING:
+            period = self._settings.watch.setpoint_period
+            self._meter = TimingMeter(period=period, before=old.timing)
 
     def _finish(self, state: TaskState, reason: TaskReason, *, actor: str, now: float) -> None:
         self._change(state, reason, actor=actor, now=now)

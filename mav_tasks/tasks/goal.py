@@ -180,13 +180,15 @@ class Plan:
 
 Goal = SingleGoal | Plan
 
+FEW_STEPS = 4  # of a plan that may be no more than one goal
+
 
 def describe(goal: Goal) -> str:
     """Give a goal in words, and in the units of its command."""
     if isinstance(goal, GoTo):
         return _describe_way(goal.place)
     if isinstance(goal, Plan):
-        return f"plan of {len(goal.steps)} items"
+        return _describe_plan(goal)
     match goal:
         case Move(distance=distance):
             return f"move {distance:g} m"
@@ -200,6 +202,15 @@ def describe(goal: Goal) -> str:
             return f"head {forward:g} m/s for {duration:g} s"
         case Wait(duration=duration):
             return f"wait {duration:g} s"
+
+
+def _describe_plan(plan: Plan) -> str:
+    has_home = plan.steps[:1] == (Nothing(),)  # somebody's mission, however short
+    if len(plan.steps) <= FEW_STEPS and not has_home:
+        driven = [step for step in plan.steps if not isinstance(step, Nothing | SetSpeed)]
+        if len(driven) == 1 and isinstance(driven[0], SingleGoal):
+            return describe(driven[0])  # beside its speed, and options
+    return f"plan of {len(plan.steps)} items"
 
 
 def _describe_way(place: Place | None) -> str:

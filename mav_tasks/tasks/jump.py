@@ -1,12 +1,16 @@
-"""Whether a measured position has moved further than its vehicle can have driven."""
+"""Whether a vehicle's position or heading has moved further than it can have driven or turned."""
 
-from mav_tasks.tasks.guidance import Motion
+from math import radians
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.guidance import Motion, wrap
 
 JUMP = 2.0  # m, beyond what the vehicle can have driven meanwhile
+TURN = radians(45)  # rad, the same of a heading
 
 
 class JumpWatch:
-    """The last position of one vehicle."""
+    """The last pose of one vehicle."""
 
     def __init__(self) -> None:
         self._last: Motion | None = None
@@ -16,8 +20,8 @@ class JumpWatch:
         """Where it was at the last look."""
         return self._last
 
-    def has_jumped(self, motion: Motion | None, *, max_speed: float) -> bool:
-        """Look at the present position; whether nobody can have driven there, at m/s."""
+    def has_jumped(self, motion: Motion | None, *, driving: Driving) -> bool:
+        """Look at the present pose; whether nobody can have driven or turned there."""
         last = self._last
         if motion is None or motion is last:
             return False
@@ -27,5 +31,8 @@ class JumpWatch:
         elapsed = max(0.0, motion.at - last.at)
         north = motion.pose.north - last.pose.north
         east = motion.pose.east - last.pose.east
-        reach = JUMP + 2 * max_speed * elapsed
+        reach = JUMP + 2 * driving.max_speed * elapsed
+        turned = abs(wrap(motion.pose.yaw - last.pose.yaw))
+        if turned > TURN + 2 * driving.max_turn_rate * elapsed:
+            return True
         return north * north + east * east > reach * reach

@@ -11,30 +11,33 @@ from mav_tasks.tasks.fence import LocalFence
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity, wrap
 
 MARGIN = 0.05  # m left between a vehicle and its fence
-LATENCY = 0.3  # s in which a vehicle does not yet do what it is told
+LATENCY = 0.3  # s in which a vehicle does not yet do what it is told; what it says is that old, too
+USUAL_AGE = 0.1  # s, of telemetry at 10 Hz: as much is in LATENCY; older, the way since then counts
 TURNS_ON = LATENCY + 0.3  # s in which a vehicle that is told to stand still turns
 APART = 0.1  # rad, at the most, between directions that are looked in
 CREEP = 0.02  # m/s; slower than this is standing
 
 
 def within_fence(
-    wish: Velocity, motion: Motion, fence: LocalFence | None, *, driving: Driving
+    wish: Velocity, motion: Motion, fence: LocalFence | None, *, driving: Driving, now: float
 ) -> Velocity | None:
     """Give what may be asked for so that the vehicle can stop before the fence; None: stop now.
 
     It goes by the room ahead, or behind for one that reverses, in every direction in which the
-    vehicle may point until it stands.
+    vehicle may point until it stands; and it has driven on since it was measured.
     """
     if fence is None or wish.forward == 0.0:
         return wish
     ahead = wish.forward > 0.0
     speed, braking = abs(wish.forward), driving.acceleration
-    needed = speed * LATENCY + speed * speed / (2 * braking) + MARGIN
+    unseen = max(speed, abs(motion.forward)) * max(0.0, now - motion.at - USUAL_AGE)
+    lost = unseen + MARGIN
+    needed = speed * LATENCY + speed * speed / (2 * braking) + lost
     room = needed
     for yaw in _headings(wish, motion):
         room = min(room, fence.room(replace(motion.pose, yaw=yaw), forward=ahead, limit=room))
-    room -= MARGIN
-    if room >= needed - MARGIN:
+    room -= lost
+    if room >= needed - lost:
         return wish
     lag = braking * LATENCY
     most = sqrt(lag * lag + 2 * braking * max(room, 0.0)) - lag
@@ -79,6 +82,18 @@ def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float)
         ),
         wish.course,
     )
+
+
+def safe_braking(driving: Driving, speed: float, distance: float) -> float:
+    """Give the deceleration to plan for where a stop from ``speed`` took ``distance``.
+
+    The settings', or less if it took more room than is planned for; all of it counts as braking
+    then, for a lag at low speed says little of a higher one. It makes more careful, never less.
+    """
+    planned = driving.acceleration
+    if distance <= speed * LATENCY + speed * speed / (2 * planned):
+        return planned
+    return min(planned, speed * speed / (2 * distance))
 
 
 def _ramped(wish: float, last: float, *, top: float, step: float) -> float:

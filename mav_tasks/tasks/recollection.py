@@ -68,7 +68,7 @@ class Recollection:
     def __init__(self, book: TaskBook) -> None:
         self._book = book
         self._clients: dict[Submitter, _Client] = {}
-        self._nonces: dict[tuple[int, int, int], TaskId] = {}
+        self._nonces: dict[tuple[str, int, int, int], TaskId] = {}
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Remember the tasks of an earlier run, oldest first: all nonces, and what came lately."""
@@ -178,7 +178,7 @@ class Recollection:
             raise Rejection(TaskReason.NONCE_REUSED, words)
         return Known(task_id, Rule.NONCE)
 
-    def _keep_nonce(self, key: tuple[int, int, int], task_id: TaskId) -> None:
+    def _keep_nonce(self, key: tuple[str, int, int, int], task_id: TaskId) -> None:
         self._nonces[key] = task_id
         if len(self._nonces) > 2 * len(self._book) + SPARE:  # most are of tasks not kept any more
             kept = {k: t for k, t in self._nonces.items() if self._book.get(t) is not None}
@@ -191,9 +191,9 @@ class Recollection:
             del self._clients[next(iter(self._clients))]
 
 
-def _key(submitter: Submitter, nonce: int) -> tuple[int, int, int]:
+def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
     """A client that comes back from another endpoint is still the same."""
-    return submitter.system_id, submitter.component_id, nonce
+    return submitter.key, submitter.system_id, submitter.component_id, nonce
 
 
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:

@@ -13,7 +13,7 @@ from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
 FULL_TURNS = 2 * pi  # rad that it turns by itself towards its course, at the most; more is a circle
-BLIND = 1.0  # m or rad towards the goal commanded without progress: the same, but sooner
+BLIND = 1.0  # m or rad commanded without progress, or without motion: the same, but sooner
 
 
 class StuckWatch:
@@ -56,6 +56,8 @@ class StuckWatch:
                 self._progressed(now)
         elif not seen.still or not (forward or turned):
             self._progressed(now)
+        else:
+            self._commanded += max(forward, turned)
         return now - self._progress_at > limit or self._commanded > BLIND
 
     def _turns_by_itself(self, seen: VehicleView) -> bool:

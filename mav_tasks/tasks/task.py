@@ -5,6 +5,7 @@ from typing import NewType
 
 from mav_tasks.tasks.goal import Goal, LocalPlace
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.timing import Timing
 
 TaskId = NewType("TaskId", int)
 MAX_TASK_ID = 16_777_215  # 2**24 - 1: exact in a float32 command parameter
@@ -48,7 +49,7 @@ def same_frame(one: Frame | None, other: Frame | None) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Submitter:
-    """Who submitted a task: link, endpoint on it, and MAVLink address.
+    """Who submitted a task: link, endpoint on it, MAVLink address, and key.
 
     All QGroundControls are 255/190 and all MAVSDK scripts 245/190: only the endpoint tells two of
     them apart.
@@ -58,12 +59,25 @@ class Submitter:
     endpoint: str
     system_id: int
     component_id: int
+    #: name of the key that signed it, "" for none
+    key: str = ""
 
     def __hash__(self) -> int:
         return hash(self.endpoint)  # nearly unique, and a string keeps its hash
 
     def __str__(self) -> str:
+        signed = f" signed {self.key}" if self.key else ""
+        return f"{self.place}{signed}"
+
+    @property
+    def place(self) -> str:
+        """MAVLink address and endpoint in words, as settings name a client."""
         return f"{self.address}@{self.endpoint}"
+
+    @property
+    def owner(self) -> str:
+        """Whose its tasks are: of all who sign with its key, or of its endpoint."""
+        return f"key {self.key}" if self.key else f"{self.link} {self.endpoint}"
 
     @property
     def address(self) -> str:
@@ -90,7 +104,8 @@ class Terms:
 
     ``start_at`` and ``deadline`` are monotonic seconds: not begun before, begun by then;
     ``start_utc`` is in seconds since 1970. ``after`` is the id of the task that must complete
-    first, 0 for none. ``is_staged``: waits until somebody starts it.
+    first, 0 for none. ``is_staged``: waits until somebody starts it. ``top_speed`` in m/s: it is
+    driven no faster, whatever speed is set; None: as fast as the settings allow.
     """
 
     priority: int = DEFAULT_PRIORITY
@@ -101,6 +116,7 @@ class Terms:
     is_preemptible: bool = True
     is_preemptive: bool = False
     is_staged: bool = False
+    top_speed: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +161,10 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One task as its events have left it; ``version`` counts them."""
+    """One task as its events have left it; ``version`` counts them.
+
+    ``timing`` is that of its setpoints, as of the last time that it stopped being driven.
+    """
 
     id: TaskId
     vehicle: int
@@ -159,6 +178,7 @@ class Task:
     reason: TaskReason = TaskReason.NONE
     version: int = 1
     progress: Progress = Progress()
+    timing: Timing | None = None
 
     @property
     def priority(self) -> int:

@@ -28,9 +28,11 @@ from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, sk
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.limits import safe_braking
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
-from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
 from mav_tasks.tasks.way_back import is_off_line
@@ -56,6 +58,7 @@ class VehicleTasks:
         self._led_away = LedAway()
         self._uid = ""  # of the vehicle, as far as it was heard
         self._speed: float | None = None  # of what names none; None: the settings' one
+        self._stop: tuple[float, float] | None = None  # m/s and m of one that was measured
         self._paused = R.NONE
         self._urgent: TaskId | None = None  # runs although the queue is paused
         self._is_halting = False  # killed: nothing begins before the vehicle stands
@@ -153,6 +156,11 @@ class VehicleTasks:
         """Give what keeps the next task from beginning; NONE for others."""
         return self._blocker if self._blocked == task_id else R.NONE
 
+    def timing_of(self, task: Task) -> Timing | None:
+        """Give how evenly a task's setpoints have left, None if it was not driven."""
+        begun = self.begun
+        return self._executor.timing if begun is not None and begun.id == task.id else task.timing
+
     @property
     def is_held_ahead(self) -> bool:
         """Whether a held task keeps all others from beginning."""
@@ -173,9 +181,17 @@ class VehicleTasks:
 
     @property
     def driving(self) -> Driving:
-        """The settings for driving, with the speed that a client has set."""
+        """The settings for driving, with the speed that a client has set, and known brakes."""
         driving = self._settings.driving
+        if self._stop is not None:
+            driving = replace(driving, acceleration=safe_braking(driving, *self._stop))
         return driving if self._speed is None else replace(driving, speed=self._speed)
+
+    def brakes(self, stop: tuple[float, float] | None) -> None:
+        """Note how it was seen to stop, m/s and the metres that it took; None: that is unknown."""
+        if stop != self._stop:
+            self._stop = stop
+            self._apply_driving()
 
     def restore(
         self, tasks: Iterable[Task], *, paused: TaskReason, speed: float | None, uid: str
@@ -218,6 +234,10 @@ class VehicleTasks:
         if self.is_driving or self._room.count(self.vehicle):
             self._executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
+
+    def count_of(self, submitter: Submitter) -> int:
+        """Give how many tasks of a submitter wait, on any vehicle."""
+        return self._room.count_of(submitter)
 
     def submit(self, draft: Draft, *, now: float) -> Task:
         """Take a task in; Rejection when too many wait."""
@@ -265,7 +285,10 @@ class VehicleTasks:
             self._room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
 
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
-        """Call a task off, or (kill) end it at once; the vehicle stands before anything begins."""
+        """Call a task off, or (kill) end it at once; the vehicle stands before anything begins.
+
+        One that somebody else has is not made to stand: that is what STOP is for.
+        """
         state = S.KILLED if kill else S.CANCELLED
         if task.state in WAITING:
             self._room.end(task, state, reason, actor=actor, now=now)
@@ -276,13 +299,18 @@ class VehicleTasks:
             self._book.change(task.id, state, reason=reason, actor=actor, now=now)
             self._room.ended(task.id, now=now)
         elif kill:
+            self._is_halting |= not self._is_of_another_driver(task)
             self._executor.kill(reason, actor=actor, now=now)
-            self._is_halting = True
             self._ended(task.id, now=now)
         else:
             self._executor.cancel(reason, actor=actor, now=now)
             if self.begun is None:
                 self._ended(task.id, now=now)
+
+    def _is_of_another_driver(self, task: Task) -> bool:
+        """Whether a begun task stands because somebody else has the vehicle, who keeps it."""
+        was_taken = self._paused is R.TAKEOVER and task.reason is R.FRAME_RESET
+        return task.reason is R.TAKEOVER or was_taken
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change a task's terms; Rejection when it would wait for itself, or for nothing."""
@@ -453,9 +481,13 @@ class VehicleTasks:
 
     # time
 
+    def setpoint_left(self, *, now: float) -> None:
+        """A setpoint leaves for the vehicle now."""
+        self._executor.setpoint_left(now=now)
+
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Begin what can begin, and give what the vehicle must be made to do now."""
-        has_jumped = self._jumps.has_jumped(seen.motion, max_speed=self._settings.driving.max_speed)
+        has_jumped = self._jumps.has_jumped(seen.motion, driving=self._settings.driving)
         if has_jumped and self.is_driving:
             self.hold(R.FRAME_RESET, now=now)
         if self.is_stopped:

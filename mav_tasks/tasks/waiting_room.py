@@ -39,7 +39,7 @@ class WaitingRoom:
         self._waiters: dict[TaskId, _Waiter] = {}
         self._queues: dict[int, TaskQueue] = {}
         self._of_vehicle: dict[int, int] = {}  # how many wait
-        self._of_client: dict[Submitter, int] = {}
+        self._of_owner: dict[str, int] = {}
         self._dependents: dict[TaskId, dict[TaskId, None]] = {}
         self._starts: list[tuple[float, TaskId]] = []  # heaps; entries out of date are passed over
         self._deadlines: list[tuple[float, TaskId]] = []
@@ -63,6 +63,10 @@ class WaitingRoom:
     def count(self, vehicle: int) -> int:
         """Give how many tasks of a vehicle wait, ready or not."""
         return self._of_vehicle.get(vehicle, 0)
+
+    def count_of(self, submitter: Submitter) -> int:
+        """Give how many tasks of a submitter wait, of all who are the same owner."""
+        return self._of_owner.get(submitter.owner, 0)
 
     def of(self, vehicle: int) -> list[TaskId]:
         """Give all waiting tasks of a vehicle: first those that are ready, in order."""
@@ -140,7 +144,7 @@ class WaitingRoom:
         queueing = self._settings.queueing
         if self.count(draft.vehicle) >= queueing.capacity:
             raise full(queueing.capacity)
-        if self._of_client.get(draft.submitter, 0) >= queueing.quota:
+        if self.count_of(draft.submitter) >= queueing.quota:
             words = f"quota: {queueing.quota} tasks of this client wait"
             raise Rejection(R.QUOTA, words)
 
@@ -158,7 +162,8 @@ class WaitingRoom:
         own = self._own_rank(task, now)
         self._waiters[task.id] = _Waiter(now, own, own)
         self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
-        self._of_client[task.submitter] = self._of_client.get(task.submitter, 0) + 1
+        owner = task.submitter.owner
+        self._of_owner[owner] = self._of_owner.get(owner, 0) + 1
         self._note_times(task)
         if task.terms.after:
             self._dependents.setdefault(TaskId(task.terms.after), {})[task.id] = None
@@ -282,11 +287,12 @@ class WaitingRoom:
         del self._waiters[task.id]
         self.queue(task.vehicle).discard(task.id)
         self._of_vehicle[task.vehicle] -= 1
-        left = self._of_client[task.submitter] - 1
+        owner = task.submitter.owner
+        left = self._of_owner[owner] - 1
         if left:
-            self._of_client[task.submitter] = left
+            self._of_owner[owner] = left
         else:
-            del self._of_client[task.submitter]
+            del self._of_owner[owner]
         self._forget_dependent(task.id, task.terms.after)
         self._woken.add(task.vehicle)
 

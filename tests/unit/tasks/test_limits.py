@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.guidance import ZERO, Velocity
-from mav_tasks.tasks.limits import limited
+from mav_tasks.tasks.limits import limited, safe_braking
 
 DRIVING = Driving(acceleration=0.5, turn_acceleration=2.0, max_speed=2.0, max_turn_rate=1.5)
 TICK = 0.05  # s
@@ -62,3 +62,18 @@ def test_no_wish_makes_a_jump(
     assert abs(sent.forward) <= max(abs(last), DRIVING.acceleration * elapsed + abs(last))
     assert abs(sent.forward) <= DRIVING.max_speed
     assert abs(sent.yaw_rate) <= DRIVING.max_turn_rate
+
+
+@pytest.mark.parametrize(
+    ("speed", "distance", "planned"),
+    [
+        (0.3, 0.0, 0.5),
+        (0.3, 0.18, 0.5),  # 0.3 s of lag and 0.5 m/s²: as planned
+        (0.3, 0.19, 0.3**2 / (2 * 0.19)),
+        (1.0, 4.0, 0.125),
+    ],
+)
+def test_a_measured_stop_makes_more_careful_and_never_less(
+    speed: float, distance: float, planned: float
+) -> None:
+    assert safe_braking(DRIVING, speed, distance) == pytest.approx(planned)

@@ -1,0 +1,322 @@
+"""What a rover measures of itself is wrong: how far it drives at the most until that is seen."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, hypot, nan, pi, radians, sin
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.body import Body, Pose
+from rover_sim.faults import Faults
+from rover_sim.kinematic import KinematicBody
+from rover_sim.personas import Mode, Persona
+from tests.kit import px4
+from tests.kit.client import MOVE
+from tests.kit.world import PROMPT, World, at, near_pose
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_fence import INCLUSION, box, fenced
+
+DRIVE, REPOSITION, RELEASE = 54002, 192, 54013
+AGAIN, REMAINDER = 0, 1
+SLOW, FAST = 0.5, 2.0  # m/s
+#: m from where it was that it drives at the most: half a metre the wrong way, and what it takes to
+#: stop from the speed that it has by then
+WRONG = {SLOW: 0.75, FAST: 1.0}
+#: the same of one whose position stands: a metre is asked for
+BLIND = {SLOW: 1.4, FAST: 2.0}
+#: the same where it has its full speed when that begins, with 2.7 m to stop
+BLIND_AT_SPEED = {SLOW: 1.6, FAST: 4.5}
+STANDS = 4.0  # s, from the end of a task to standing
+
+Start = Callable[[World, float], object]
+GOALS: dict[str, Start] = {
+    "move": lambda w, speed: w.client.move(20, speed=speed),
+    "drive": lambda w, speed: w.client.command(DRIVE, speed, 0, 60),
+    "go to": lambda w, speed: w.client.command_int(
+        REPOSITION, speed, 0, 0, nan, **at(20, 0), frame=6
+    ),
+}
+MAKES: dict[str, Persona] = {"ardupilot": PROMPT, "px4": px4.PROMPT_PX4}
+
+
+@dataclass
+class Way:
+    """How far a rover gets from where it is now."""
+
+    world: World
+    furthest: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._north, self._east, _ = self.world.pose()
+        self.world.watch(self._look)
+
+    def _look(self, _now: float) -> None:
+        truth = self.world.truth
+        away = hypot(truth.north - self._north, truth.east - self._east)
+        self.furthest = max(self.furthest, away)
+
+
+def driving(world: World, goal: str, speed: float) -> World:
+    """A rover at full speed on a task, another task waits."""
+    GOALS[goal](world, speed)
+    world.until(lambda: world.truth.forward_speed > 0.95 * speed, within=15)
+    world.client.rotate(90)
+    world.run(0.2)
+    return world
+
+
+def is_over(world: World) -> bool:
+    return world.state(1)[0] in (S.HELD, S.FAILED)
+
+
+def nothing_follows(world: World) -> None:
+    """The rover stands in HOLD, the next task does not begin."""
+    world.until(world.stands, within=STANDS)
+    world.run(5)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert len(world.tasks()) == 1 or world.state(2)[0] is S.QUEUED
+
+
+OPPOSITE = [
+    (180.0, make, goal, speed) for make in MAKES for goal in GOALS for speed in (SLOW, FAST)
+]
+ACROSS = [(90.0, make, "move", FAST) for make in MAKES] + [(-90.0, "ardupilot", "drive", FAST)]
+
+
+@pytest.mark.parametrize(("error", "make", "goal", "speed"), OPPOSITE + ACROSS)
+def test_a_wrong_heading_is_found_within_half_a_metre(
+    make_world: MakeWorld, error: float, make: str, goal: str, speed: float
+) -> None:
+    world = make_world(persona=MAKES[make], settings=Settings(on_failure="continue"))
+    world.fault(Faults(heading_error=radians(error)))
+    world.run(0.5)
+    way = Way(world)
+    GOALS[goal](world, speed)
+    world.until(lambda: is_over(world), within=20)
+    world.client.rotate(90)
+    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    nothing_follows(world)
+    assert way.furthest < WRONG[speed]
+    assert any("is its heading right?" in text for text in world.client.texts())
+
+
+@pytest.mark.parametrize("speed", [SLOW, FAST])
+def test_wheels_that_turn_the_wrong_way_are_found_within_half_a_metre(
+    make_world: MakeWorld, speed: float
+) -> None:
+    class Reversed(KinematicBody):
+        def drive(self, forward_speed: float, yaw_rate: float) -> None:
+            super().drive(-forward_speed, yaw_rate)
+
+    def body(start: Pose) -> Body:
+        return Reversed(start=start, slip=0.1, seed=None)
+
+    world = make_world(body=body)
+    way = Way(world)
+    world.client.move(20, speed=speed)
+    world.until(lambda: is_over(world), within=20)
+    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    nothing_follows(world)
+    assert way.furthest < WRONG[speed]
+
+
+@pytest.mark.parametrize(("speed", "beside"), [(SLOW, 1.3), (FAST, 2.2)])
+def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_line(
+    make_world: MakeWorld, speed: float, beside: float
+) -> None:
+    world = make_world()
+    world.fault(Faults(heading_error=radians(50)))
+    world.run(0.5)
+    furthest = 0.0
+
+    def look(_now: float) -> None:
+        nonlocal furthest
+        truth, yaw = world.truth, radians(50)
+        furthest = max(furthest, abs(truth.east * cos(yaw) - truth.north * sin(yaw)))
+
+    world.watch(look)
+    world.client.move(20, speed=speed)
+    world.until(lambda: is_over(world), within=30)
+    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    nothing_follows(world)
+    assert 1.0 < furthest < beside
+
+
+def test_a_heading_a_little_wrong_is_made_up_for(make_world: MakeWorld) -> None:
+    """The line is the one that the heading meant: nobody can know better."""
+    world = make_world()
+    world.fault(Faults(heading_error=radians(30)))
+    world.run(0.5)
+    world.client.move(6)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    north, east, _ = world.pose()
+    assert hypot(north, east) == pytest.approx(6.0, abs=0.05)
+    beside = abs(east * cos(radians(30)) - north * sin(radians(30)))
+    assert beside < 0.6
+
+
+@pytest.mark.parametrize("turned", [180, -90, 60])
+@pytest.mark.parametrize("goal", GOALS)
+def test_a_heading_that_jumps_holds_the_task_at_once(
+    world: World, goal: str, turned: float
+) -> None:
+    driving(world, goal, SLOW)
+    way = Way(world)
+    since = world.now
+    world.fault(Faults(heading_error=radians(turned)))
+    world.until(lambda: is_over(world), within=0.2)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert "move" not in world.observer.sent_since(since + 0.2)
+    nothing_follows(world)
+    assert way.furthest < 0.3
+
+
+@pytest.mark.parametrize("jump", [(1.9, 0.0), (-0.9, 0.0), (0.0, 1.9)])
+def test_a_jump_below_2_m_is_a_correction_that_is_driven_by(
+    world: World, jump: tuple[float, float]
+) -> None:
+    driving(world, "move", SLOW)
+    top = 0.0
+
+    def look(_now: float) -> None:
+        nonlocal top
+        top = max(top, abs(world.truth.forward_speed))
+
+    world.watch(look)
+    world.fault(Faults(position_jump=jump))
+    world.until_state(1, S.COMPLETED, within=60)
+    world.until_idle(tasks=2)
+    north, east = jump
+    assert near_pose(world.pose(), (20 - north, -east, 90.0), metres=0.05)
+    assert top < SLOW + 0.05
+
+
+def test_a_jump_back_by_more_than_a_metre_is_no_progress_and_ends_the_task(world: World) -> None:
+    driving(world, "move", SLOW)
+    way = Way(world)
+    world.fault(Faults(position_jump=(-1.9, 0.0)))
+    world.until(lambda: is_over(world), within=20)
+    assert world.state(1) == (S.FAILED, R.STUCK)
+    nothing_follows(world)
+    assert way.furthest < BLIND_AT_SPEED[SLOW]
+
+
+STANDING = [("ardupilot", goal, speed) for goal in ("move", "drive") for speed in (SLOW, FAST)]
+
+
+@pytest.mark.parametrize(("make", "goal", "speed"), [*STANDING, ("px4", "drive", FAST)])
+def test_a_position_that_stands_from_the_beginning_ends_the_task_after_a_metre(
+    make_world: MakeWorld, make: str, goal: str, speed: float
+) -> None:
+    world = make_world(persona=MAKES[make])
+    world.fault(Faults(position_frozen=True))
+    world.run(0.5)
+    way = Way(world)
+    GOALS[goal](world, speed)
+    world.until(lambda: is_over(world), within=20)
+    world.client.rotate(90)
+    assert (world.state(1), world.paused()) == ((S.FAILED, R.STUCK), R.STUCK)
+    nothing_follows(world)
+    assert way.furthest < BLIND[speed]
+
+
+@pytest.mark.parametrize("speed", [SLOW, FAST])
+@pytest.mark.parametrize("goal", ["move", "drive"])
+def test_a_rover_that_says_that_it_stands_while_it_drives_is_stopped_after_a_metre(
+    make_world: MakeWorld, speed: float, goal: str
+) -> None:
+    world = driving(make_world(), goal, speed)
+    way = Way(world)
+    world.fault(Faults(position_frozen=True, says_it_stands=True))
+    world.until(lambda: is_over(world), within=20)
+    assert (world.state(1), world.paused()) == ((S.FAILED, R.STUCK), R.STUCK)
+    nothing_follows(world)
+    assert way.furthest < BLIND_AT_SPEED[speed]
+
+
+#: m from where it was when that began, at the most, braking included; by speed
+LOSSES = {
+    "position stands": (Faults(position_frozen=True), {SLOW: 0.4, FAST: 3.1}),
+    "no telemetry": (Faults(withheld=frozenset(range(1, 512))), {SLOW: 0.4, FAST: 3.1}),
+    "not a number": (Faults(not_finite=True), {SLOW: 0.4, FAST: 3.1}),
+    "clock stands": (Faults(clock_frozen=True), {SLOW: 0.4, FAST: 3.1}),
+    "jump": (Faults(position_jump=(50.0, 0.0)), {SLOW: 0.3, FAST: 2.8}),
+    "no heartbeats": (Faults(withheld=frozenset({0})), {SLOW: 2.2, FAST: 10.0}),
+}
+
+
+@pytest.mark.parametrize("speed", [SLOW, FAST])
+@pytest.mark.parametrize("what", LOSSES)
+def test_what_is_lost_stops_it_within_so_many_metres(
+    make_world: MakeWorld, what: str, speed: float
+) -> None:
+    world = driving(make_world(), "move", speed)
+    faults, metres = LOSSES[what]
+    way = Way(world)
+    world.fault(faults)
+    world.until(lambda: world.state(1)[0] in (S.PAUSED, S.HELD), within=4.5)
+    world.until(world.stands, within=STANDS)
+    world.run(3)
+    assert world.stands()
+    assert 0.0 < way.furthest < metres[speed]
+
+
+def test_a_heading_that_stands_while_it_turns_ends_the_turn_after_a_radian(world: World) -> None:
+    world.fault(Faults(heading_frozen=True))
+    world.client.rotate(350)
+    turned, last = 0.0, world.truth.yaw
+
+    def look(_now: float) -> None:
+        nonlocal turned, last
+        turned += abs((world.truth.yaw - last + pi) % (2 * pi) - pi)
+        last = world.truth.yaw
+
+    world.watch(look)
+    world.until(lambda: is_over(world), within=20)
+    assert world.state(1) == (S.FAILED, R.STUCK)
+    nothing_follows(world)
+    assert 0.5 < turned < 1.7
+
+
+def test_a_heading_that_stands_while_it_drives_a_curve_is_found(world: World) -> None:
+    world.fault(Faults(heading_frozen=True))
+    world.client.command(DRIVE, SLOW, 30, 60)  # a circle of 1 m
+    way = Way(world)
+    world.until(lambda: is_over(world), within=20)
+    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    nothing_follows(world)
+    assert way.furthest < 2.1
+
+
+@pytest.mark.parametrize("speed", [SLOW, FAST])
+def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
+    world: World, speed: float
+) -> None:
+    """It looks for room where it believes to be driving to."""
+    assert fenced(world, *box(INCLUSION, -50, -50, 0.2, 50)) == 0
+    world.fault(Faults(heading_error=pi))
+    world.run(0.5)
+    world.client.command(DRIVE, speed, 0, 60)
+    world.until(lambda: is_over(world), within=20)
+    assert world.state(1) in ((S.HELD, R.OFF_LINE), (S.HELD, R.FENCE))
+    nothing_follows(world)
+    assert world.truth.north < WRONG[speed]
+
+
+def test_released_on_a_wrong_heading_it_gets_no_further_each_time(world: World) -> None:
+    world.fault(Faults(heading_error=pi))
+    world.run(0.5)
+    world.client.command(MOVE, 20.0)
+    for answer in (REMAINDER, AGAIN, None):
+        way = Way(world)
+        world.until_state(1, S.EXECUTING)
+        world.until_state(1, S.HELD)
+        nothing_follows(world)
+        assert way.furthest < WRONG[SLOW]
+        if answer is not None:
+            world.client.command(RELEASE, 1, answer)

@@ -1,0 +1,38 @@
+"""Goals in words, as people at a terminal or a ground station read them."""
+
+import pytest
+
+from mav_tasks.tasks.goal import (
+    Face,
+    Goal,
+    GoTo,
+    Jump,
+    LocalPlace,
+    Move,
+    Nothing,
+    Plan,
+    SetSpeed,
+    Wait,
+    describe,
+)
+
+PLACE = GoTo(LocalPlace(1.0, -2.0))
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        (Move(2.0), "move 2 m"),
+        (Face(-1.5707963267948966), "face 270 deg"),
+        (PLACE, "go to 1.00 m N, -2.00 m E"),
+        (Plan((PLACE, Nothing())), "go to 1.00 m N, -2.00 m E"),
+        (Plan((SetSpeed(0.4), PLACE, SetSpeed(None), Nothing())), "go to 1.00 m N, -2.00 m E"),
+        (Plan((PLACE, Wait(1.0), Nothing())), "plan of 3 items"),
+        (Plan((Nothing(),) * 4 + (PLACE,)), "plan of 5 items"),
+        (Plan((Nothing(),)), "plan of 1 items"),
+        (Plan((Nothing(), PLACE)), "plan of 2 items"),
+        (Plan((Wait(1.0), Jump(0, 3))), "plan of 2 items"),
+    ],
+)
+def test_a_goal_in_words(goal: Goal, words: str) -> None:
+    assert describe(goal) == words
