@@ -4,6 +4,8 @@ from collections import OrderedDict
 
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.rights import NOTHING, Rights
+from mav_tasks.engine.signatures import UNSIGNED
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
@@ -11,11 +13,14 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
 from mav_tasks.services.command_receiver import Answer, CommandReceiver, Pending
 from mav_tasks.services.message_interval import Thinner
-from mav_tasks.services.statustext import RateLimit
 from mav_tasks.services.task_status import TaskStatusSender
+from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
 
+AT_ONCE = 5.0  # s, of which the requests may come in a moment: a script queues a day's work
+REFUSALS = 20.0  # a second
+MAX_FOLLOWED = 1000  # tasks of others that one client is told about
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 
 Nonces = dict[Address, OrderedDict[int, Pending]]
@@ -40,22 +45,44 @@ class GcsClient:
         #: on a stream, whose link tells when it is gone: may be silent for as long as it likes
         self.is_connected = is_connected
         self.is_heard = False
+        #: heard once, and perhaps never again
+        self.is_passing = True
+        #: one of many who came at about the same time: gets heartbeats only until it says more
+        self.is_one_of_many = False
+        #: with which the packet in hand was signed, or the last one
+        self.signed_by = UNSIGNED
+        self.last_source = Address(0, 0)
+        #: of who sent that packet
+        self.rights = NOTHING
         self._addresses: dict[Address, None] = {}  # seen here, the latest last
         #: has used our dialect: gets TASK_STATUS
         self.uses_dialect = False
+        self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
         self.thinner = Thinner(default_interval=settings.stream_interval)
         self.statuses = TaskStatusSender(rate=settings.status_rate, now=now)
-        self._texts = RateLimit(rate=settings.text_rate, burst=statustext.BURST, now=now)
+        self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
         self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
         self._introduced: set[int] = set()
         self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
-        self._submitters: dict[Address, Submitter] = {}  # made once: each command asks for it
+        self._submitters: dict[
+            tuple[Address, str], Submitter
+        ] = {}  # made once: each command asks for it
+        #: what of its requests is taken in, and what of its refusals is told
+        self._requests = TokenBucket(rate=0.0, burst=0.0, now=now)
+        self._requests_of: dict[str, TokenBucket] = {}  # by role: who signs otherwise has another
+        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS, now=now)
         self._receivers: dict[Address, CommandReceiver] = {}
 
     def __repr__(self) -> str:
         names = " ".join(map(str, self._addresses)) or "unheard"
         return f"GcsClient({names} at {self.endpoint})"
+
+    def apply(self, settings: Clients) -> None:
+        """Take new settings."""
+        self.thinner.default_interval = settings.stream_interval
+        self.statuses.apply(rate=settings.status_rate)
+        self._texts.apply(rate=settings.text_rate)
 
     @property
     def key(self) -> tuple[str, Peer]:
@@ -70,18 +97,46 @@ class GcsClient:
 
     def submitter(self, source: Address) -> Submitter:
         """Give who submits when a packet of ``source`` comes from here."""
-        submitter = self._submitters.get(source)
+        submitter = self._submitters.get((source, self.signed_by.name))
         if submitter is None:
             if len(self._submitters) >= MAX_ADDRESSES:
                 self._submitters.clear()
-            submitter = Submitter(self.outlet.link, self.endpoint, *source)
-            self._submitters[source] = submitter
+            submitter = Submitter(self.outlet.link, self.endpoint, *source, self.signed_by.name)
+            self._submitters[source, self.signed_by.name] = submitter
         return submitter
+
+    def take_rights(self, rights: Rights, *, now: float) -> None:
+        """From here on it may do this."""
+        self.rights, rate = rights, rights.limits.rate
+        bucket = self._requests_of.get(rights.role)
+        if bucket is None or bucket.rate != rate:
+            bucket = TokenBucket(rate=rate, burst=rate * AT_ONCE, now=now)
+            self._requests_of[rights.role] = bucket
+        self._requests = bucket
+
+    def may_ask(self, *, now: float) -> bool:
+        """Whether one more request of it is taken in now."""
+        return self._requests.take(now=now)
+
+    def may_be_refused(self, *, now: float) -> bool:
+        """Whether one more refusal is told to it, and kept, now: a flood of them is not."""
+        return self._refusals.take(now=now)
 
     def submitted(self, task: Task) -> bool:
         """Whether a task was submitted from this endpoint."""
         submitter = task.submitter
         return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
+
+    def follow(self, task_id: int) -> None:
+        """It has asked about a task: have it told of each change from now on."""
+        self._followed.pop(task_id, None)
+        self._followed[task_id] = None
+        if len(self._followed) > MAX_FOLLOWED:
+            del self._followed[next(iter(self._followed))]
+
+    def follows(self, task_id: int) -> bool:
+        """Whether it has asked about a task."""
+        return task_id in self._followed
 
     def receiver(self, source: Address) -> CommandReceiver:
         """Give the memory of the commands of one address at this endpoint."""
@@ -94,7 +149,10 @@ class GcsClient:
 
     def heard(self, source: Address, *, now: float) -> None:
         """Note that a packet of this address came from here."""
+        self.is_passing = not self.is_heard
+        self.is_one_of_many = self.is_one_of_many and self.is_passing
         self.heard_at = now
+        self.last_source = source
         self.is_heard = True
         if source not in self._addresses:
             if len(self._addresses) >= MAX_ADDRESSES:
@@ -132,7 +190,8 @@ class GcsClient:
             if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
                 return
             self._introduced.add(system_id)
-        if not self.is_heard and packet.message_id != m.Heartbeat.id:
+        is_silent = not self.is_heard or self.is_one_of_many
+        if is_silent and packet.message_id != m.Heartbeat.id:
             self.outlet.withhold(packet.source)
         elif self.thinner.passes(system_id, packet.component_id, packet.message_id, now=now):
             self.outlet.forward(packet)

@@ -2,12 +2,19 @@
 
 from mav_tasks.engine.gcs_side import MAX_LINK_NUMBER, GcsSide
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
+from mav_tasks.engine.signatures import Signatures
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.settings import Settings
 
 
 def side(*links: str) -> GcsSide:
-    made = GcsSide(queue=[], packer=Packer(), settings=Settings(), now=0.0)
+    made = GcsSide(
+        queue=[],
+        packer=Packer(),
+        signatures=Signatures(window=60.0),
+        settings=Settings(),
+        now=0.0,
+    )
     for link in links:
         made.change_link(LinkChanged(link, LinkSide.CLIENTS, up=True), now=0.0)
     return made

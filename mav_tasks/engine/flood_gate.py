@@ -1,0 +1,122 @@
+"""What of a flood of datagrams is looked at: so much of each client, a little of all strangers.
+
+It decides by nothing but who sends, and how much, before anything is read: to read costs more. Of
+what is too much a STOP is let in, alone.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+
+from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets, Peer
+from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.packet import CRC, HEADER_V1, HEADER_V2, MAGIC_V2, SIGNATURE_LENGTH, SIGNED
+from mav_tasks.services.token_bucket import TokenBucket
+from mav_tasks.settings import Clients
+
+_NUMBER = re.escape(int(MavCmd.TASK_STOP).to_bytes(2, "little"))
+#: how a STOP begins, MAVLink 1 or 2: COMMAND_INT or COMMAND_LONG, with the number at its place
+_STOP = re.compile(
+    rb"\xfe.{4}[\x4b\x4c].{28}" + _NUMBER + rb"|\xfd.{6}[\x4b\x4c]\0\0.{28}" + _NUMBER, re.DOTALL
+)
+STRANGERS = 500.0  # datagrams a second, of all together who are no clients
+MOST_BUCKETS = 1024
+WITHIN = 1.0  # s, of which the rate may come at once
+SIZE = 64  # bytes that count as one more datagram: many packets may be in one
+
+Datagrams = Sequence[tuple[Peer, bytes]]
+
+
+class FloodGates:
+    """The gates of all links of datagrams on which clients are."""
+
+    def __init__(self, *, is_client: Callable[[str, Peer], bool], settings: Clients) -> None:
+        self._is_client = is_client
+        self._rate = settings.packet_rate
+        self._gates: dict[str, FloodGate] = {}
+
+    def __repr__(self) -> str:
+        return f"FloodGates({self._gates})"
+
+    @property
+    def left_out(self) -> int:
+        """Datagrams that were not looked at."""
+        return sum(gate.left_out for gate in self._gates.values())
+
+    def apply(self, settings: Clients) -> None:
+        """Take new settings."""
+        self._rate = settings.packet_rate
+        for gate in self._gates.values():
+            gate.apply(rate=self._rate)
+
+    def change_link(self, change: LinkChanged) -> None:
+        """Guard a link, or no more. Who sends too much on a stream waits by itself."""
+        link = change.link
+        self._gates.pop(link, None)
+        if change.up and change.side is LinkSide.CLIENTS and not change.is_stream:
+            self._gates[link] = FloodGate(
+                rate=self._rate, is_known=lambda peer: self._is_client(link, peer)
+            )
+
+    def let_in(self, item: Packets, *, now: float) -> Packets:
+        """Give what is looked at of what came in."""
+        gate = self._gates.get(item.link)
+        return item if gate is None else Packets(item.link, gate.let_in(item.datagrams, now=now))
+
+
+def stop_in(data: bytes) -> bytes:
+    """Give the packet in a datagram that looks like a STOP, the first one; b"" if none does."""
+    found = _STOP.search(data)
+    if found is None:
+        return b""
+    packet = data[found.start() :]
+    if packet[0] == MAGIC_V2:
+        is_signed = packet[2] & SIGNED
+        return packet[: packet[1] + HEADER_V2 + CRC + (SIGNATURE_LENGTH if is_signed else 0)]
+    return packet[: packet[1] + HEADER_V1 + CRC]
+
+
+class FloodGate:
+    """The gate of one link of datagrams."""
+
+    def __init__(self, *, rate: float, is_known: Callable[[Peer], bool]) -> None:
+        self._rate = rate
+        self._is_known = is_known
+        self._buckets: dict[Peer, TokenBucket] = {}
+        self._strangers: TokenBucket | None = None
+        #: datagrams that were not looked at
+        self.left_out = 0
+
+    def __repr__(self) -> str:
+        return f"FloodGate({len(self._buckets)} clients, {self.left_out} left out)"
+
+    def apply(self, *, rate: float) -> None:
+        """Take another rate of each client, in datagrams a second."""
+        self._rate = rate
+        self._buckets.clear()
+
+    def let_in(self, datagrams: Datagrams, *, now: float) -> Datagrams:
+        """Give those that are looked at."""
+        buckets = self._buckets
+        let_in = []
+        for each in datagrams:
+            bucket = buckets.get(each[0])
+            if bucket is None:
+                bucket = self._bucket_of(each[0], now=now)
+            peer, data = each
+            if bucket.take(tokens=1 + len(data) // SIZE, now=now):
+                let_in.append(each)
+            elif stop := stop_in(data):
+                let_in.append((peer, stop))
+        self.left_out += len(datagrams) - len(let_in)
+        return let_in
+
+    def _bucket_of(self, peer: Peer, *, now: float) -> TokenBucket:
+        if not self._is_known(peer):
+            if self._strangers is None:
+                self._strangers = TokenBucket(rate=STRANGERS, burst=STRANGERS, now=now)
+            return self._strangers
+        if len(self._buckets) >= MOST_BUCKETS:
+            del self._buckets[next(iter(self._buckets))]
+        burst = self._rate * WITHIN
+        bucket = self._buckets[peer] = TokenBucket(rate=self._rate, burst=burst, now=now)
+        return bucket

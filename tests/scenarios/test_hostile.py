@@ -1,0 +1,340 @@
+"""What somebody may try who reaches the port, or has a key for less: each was possible once."""
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as ardupilot
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, PeerChanged
+from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.settings import Clients, Limits, Roles, Settings
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Persona
+from tests.kit.client import (
+    ACCEPTED,
+    AUTO,
+    DENIED,
+    GUIDED,
+    STOP,
+    FakeClient,
+    Message,
+    set_mode,
+    setpoint,
+)
+from tests.kit.px4 import MISSION, PROMPT_PX4
+from tests.kit.world import PROMPT, World
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_roles import (
+    FENCE,
+    OBSERVER,
+    OPERATOR,
+    SUBMITTER,
+    WAYPOINT,
+    MakeRoles,
+    answer,
+    begun,
+    join,
+    place,
+    upload,
+)
+from tests.scenarios.test_roles import with_roles as with_roles
+from tests.scenarios.test_signing import ALICE, BOB, put, signing
+
+
+def radio_status() -> object:
+    return common.MAVLink_radio_status_message(10, 10, 0, 0, 0, 0, 0)
+
+
+def test_a_radio_s_status_makes_nobody_a_client_where_all_is_signed(world: World) -> None:
+    """It is signed by nobody, and so says nothing of who sends it."""
+    put(world, ALICE)
+    stranger = world.add_client("stranger", system_id=51, component_id=68)
+    stranger.heartbeats = False
+    towards: list[int] = []
+
+    def listen(source: str, target: str, data: bytes) -> bool:
+        if source == "server:vehicles" and target == "rover1":
+            towards.append(data[7])
+        return False
+
+    world.watched.loses = listen
+    stranger.stream(radio_status(), rate=5)
+    world.run(3.0)
+    assert not stranger.received
+    assert 109 not in towards
+
+
+def connected(world: World, key: Key) -> FakeClient:
+    """Give a client that has dialled, as over TCP, and signs."""
+    client = signing(world, key, name="dialled")
+    change = PeerChanged(CLIENT_LINK, client.name, up=True)
+    world.server.pump.handle(change, now=world.now)
+    world.run(1.5)
+    return client
+
+
+@pytest.mark.parametrize("role", ["observer", ""])
+def test_a_key_that_may_less_now_may_less_at_once(world: World, role: str) -> None:
+    """Also on a connection that stays: "" is of vehicles, and no client's any more."""
+    put(world, ALICE)
+    client = connected(world, ALICE)
+    assert answer(world, client.move(1.0)) is not None
+    less = Key("alice", ALICE.secret, role)
+    world.server.pump.handle(KeysChanged((less, BOB)), now=world.now)
+    sent = client.move(2.0)
+    assert answer(world, sent) == ((DENIED, R.NOT_ALLOWED) if role else None)
+    assert len(world.tasks()) == 1
+
+
+def test_a_link_s_own_key_that_is_of_vehicles_now_is_no_client_s(world: World) -> None:
+    put(world, ALICE)
+    for up in (False, True):
+        change = LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=up, key="alice")
+        world.server.pump.handle(change, now=world.now)
+    client = connected(world, ALICE)
+    vehicles = Key("alice", ALICE.secret, "")
+    world.server.pump.handle(KeysChanged((vehicles, BOB)), now=world.now)
+    world.run(2.0)
+    assert answer(world, client.move(2.0)) is None
+    assert world.tasks() == ()
+
+
+def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: World) -> None:
+    """Or else a packet of another role between would begin each count anew."""
+    few = Roles(unsigned="observer", submitter=Limits(rate=1.0), observer=Limits(rate=0.8))
+    submitter = Key("alice", ALICE.secret, "submitter")
+    put(world, submitter, takes_unsigned=True)
+    world.server.engine._apply(Settings(roles=few))
+    client = signing(world, submitter)
+    client.heartbeats = False
+    unsigned = common.MAVLink(None, 255, 190)
+    beat = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(unsigned)
+    for number in range(30):
+        client.rotate(10.0 + number)
+        client.send_raw(beat)
+    world.run(0.3)
+    assert len(world.tasks()) <= 7
+
+
+def go_to_item(north: float) -> object:
+    where = place(north)
+    return common.MAVLink_mission_item_int_message(
+        1, 1, 0, 6, 16, 2, 1, 0, 0, 0, 0, where["x"], where["y"], 0, 0
+    )
+
+
+def test_a_flood_of_go_to_items_fills_neither_disk_nor_net(with_roles: MakeRoles) -> None:
+    world = with_roles()
+    observer = join(world, OBSERVER)
+    observer.received.clear()
+    for _ in range(600):
+        observer.send(go_to_item(2.0))
+    world.run(1.0)
+    assert 1 <= len(world.events(SubmissionRefused)) <= 45
+    assert len(observer.texts()) <= 30
+
+
+def test_go_to_items_are_requests_as_others_are(with_roles: MakeRoles) -> None:
+    world = with_roles(submitter=Limits(rate=2.0))
+    submitter = join(world, SUBMITTER)
+    world.client.pause()
+    world.run(2.0)
+    for number in range(60):
+        submitter.send(go_to_item(2.0 + 2 * number))
+    world.run(0.3)
+    assert 5 <= len(world.tasks()) <= 12
+
+
+@pytest.mark.parametrize("message", ["ping", "timesync", "mission request", "mission ack"])
+def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
+    with_roles: MakeRoles, message: str
+) -> None:
+    world = with_roles(observer=Limits(rate=2.0))
+    observer = join(world, OBSERVER)
+    sent = {
+        "ping": common.MAVLink_ping_message(1, 1, 1, 154),
+        "timesync": common.MAVLink_timesync_message(0, 1),
+        "mission request": common.MAVLink_mission_request_int_message(1, 154, 0, 0),
+        "mission ack": common.MAVLink_mission_ack_message(1, 154, 0, 0),
+    }[message]
+    towards: list[int] = []
+
+    def listen(source: str, target: str, data: bytes) -> bool:
+        if source == "server:vehicles" and target == "rover1" and data[7] == sent.get_msgId():
+            towards.append(data[7])
+        return False
+
+    world.watched.loses = listen
+    for _ in range(200):
+        observer.send(sent)
+    world.run(0.5)
+    assert 1 <= len(towards) <= 20
+
+
+def test_only_a_command_is_a_stop_that_is_never_too_much(with_roles: MakeRoles) -> None:
+    """Other messages, too, have a field for a command: they are counted."""
+    world = with_roles(observer=Limits(rate=2.0))
+    observer = join(world, OBSERVER)
+    before = world.server.engine._requests.left_out
+    for _ in range(100):
+        observer.send(common.MAVLink_command_ack_message(STOP, 0, 0, 0, 1, 1))
+    world.run(0.2)
+    assert world.server.engine._requests.left_out - before >= 80
+    assert answer(world, observer.stop()) is not None
+
+
+@pytest.mark.parametrize(
+    ("persona", "mode"), [(PROMPT, AUTO), (PROMPT_PX4, MISSION)], ids=["at once", "when armed"]
+)
+def test_a_plan_that_is_started_again_keeps_to_the_limits_of_who_starts_it(
+    make_world: MakeWorld, persona: Persona, mode: int
+) -> None:
+    roles = Roles(
+        unsigned="safety", addresses={"10/190": "submitter"}, submitter=Limits(max_speed=0.3)
+    )
+    world = make_world(settings=Settings(roles=roles), persona=persona)
+    submitter = join(world, SUBMITTER)
+    assert upload(world, submitter, target=(1, 1)) == 0
+    for number in (1, 2):
+        submitter.send(set_mode(mode))
+        world.run(0.3)
+        world.client.arm()
+        world.until_idle(tasks=number)
+        world.client.arm(False)
+        world.run(2.0)
+    assert [task.terms.top_speed for task in world.tasks()] == [0.3, 0.3]
+
+
+def test_only_an_operator_s_stop_clears_the_queue(with_roles: MakeRoles) -> None:
+    """Everybody stops a rover; but the tasks of others are theirs."""
+    world = with_roles()
+    observer, operator = join(world, OBSERVER), join(world, OPERATOR)
+    task = begun(world, 20.0)
+    waiting = world.client.move(1.0)
+    assert answer(world, observer.stop(clear=True)) == (ACCEPTED, task)
+    assert world.paused() is R.STOPPED
+    assert world.state(waiting.task_id)[0] is S.QUEUED
+    assert "stopped; role observer may not clear a queue, operator may" in observer.texts()
+    assert answer(world, operator.stop(clear=True)) == (ACCEPTED, 0)
+    assert world.state(waiting.task_id)[0] is S.CANCELLED
+
+
+BOUNDING = {
+    "fence": common.MAVLink_mission_count_message(1, 1, 1, FENCE),
+    "fence item": common.MAVLink_mission_item_int_message(
+        1, 1, 0, 6, 5003, 0, 1, 9, 0, 0, 0, 0, 0, 0, FENCE
+    ),
+    "no fence": common.MAVLink_mission_clear_all_message(1, 1, FENCE),
+    "nothing at all": common.MAVLink_mission_clear_all_message(1, 1, 255),
+    "old fence": ardupilot.MAVLink_fence_point_message(1, 1, 0, 0, 0, 0),
+    "old rally": ardupilot.MAVLink_rally_point_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0),
+    "shell": common.MAVLink_serial_control_message(10, 0, 0, 0, 1, [10] * 70),
+    "knob": common.MAVLink_param_map_rc_message(1, 1, b"CRUISE_SPEED", -1, 0, 1, 1, 0, 5),
+    "device": ardupilot.MAVLink_device_op_write_message(1, 1, 0, 0, 0, 0, b"x", 0, 1, [0] * 128),
+}
+
+
+@pytest.mark.parametrize("what", BOUNDING)
+@pytest.mark.parametrize("who", [OPERATOR, 255])
+def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
+    make_world: MakeWorld, what: str, who: int
+) -> None:
+    """Also where the server leaves missions to the rover; 255 is in charge of safety."""
+    roles = Roles(unsigned="safety", addresses={"12/190": "operator"})
+    world = make_world(settings=Settings(roles=roles, claim=False))
+    client = join(world, who)
+    message = BOUNDING[what]
+    towards: list[int] = []
+
+    def listen(source: str, target: str, data: bytes) -> bool:
+        if source == "server:vehicles" and target == "rover1":
+            towards.append(int.from_bytes(data[7:10], "little"))
+        return False
+
+    world.watched.loses = listen
+    client.send(message)
+    world.run(0.2)
+    assert (message.get_msgId() in towards) == (who != OPERATOR)
+
+
+def test_switching_the_fence_off_as_a_switch_does_is_of_safety(with_roles: MakeRoles) -> None:
+    world = with_roles()
+    operator = join(world, OPERATOR)
+    fence = operator.command(218, 11, 0, target=(1, 1))  # DO_AUX_FUNCTION
+    assert answer(world, fence) == (DENIED, R.NOT_ALLOWED)
+
+
+def test_what_a_revoked_key_drives_stands(world: World) -> None:
+    """It is not waited for until the rover itself misses the setpoints."""
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    client.mode(GUIDED)
+    world.run(0.5)
+    client.arm()
+    world.run(1.0)
+    client.stream(setpoint(0.5), rate=10)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=5)
+    revoked = Key("alice", b"", "operator", ALICE.fingerprint)
+    world.server.pump.handle(KeysChanged((revoked, BOB)), now=world.now)
+    world.until(world.stands, within=1.5)
+
+
+def test_who_signs_has_a_place_however_many_are_there_who_do_not(world: World) -> None:
+    put(world, ALICE, takes_unsigned=True)
+    crowd = Settings(clients=Clients(max_clients=4), roles=Roles(unsigned="observer"))
+    world.server.engine._apply(crowd)
+    for number in range(6):
+        world.add_client(f"stranger {number}", system_id=20 + number)
+    world.run(3.5)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    sent = client.move(1.0)
+    world.run(0.3)
+    assert sent.result == ACCEPTED
+    assert client.heard("LOCAL_POSITION_NED")
+    assert len(list(world.server.engine._gcs)) == 4
+
+
+def test_what_the_server_has_signed_itself_makes_nobody_a_client(world: World) -> None:
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    attacker = world.add_client("attacker")
+    attacker.heartbeats = False
+    old = world.server.engine.signatures.counts.old
+    overheard = client.received[-20:]
+    for packet in overheard:
+        attacker.send_raw(packet.raw)
+    world.run(0.5)
+    assert not attacker.received
+    assert world.server.engine.signatures.counts.old - old == len(overheard)
+
+
+def test_an_upload_is_of_who_began_it_and_not_of_its_endpoint(world: World) -> None:
+    """Or else who signs otherwise, or not at all, could put his items into another's plan."""
+    put(world, ALICE, takes_unsigned=True)
+    client = signing(world, ALICE)
+    unsigned = common.MAVLink(None, client.system_id, client.component_id)
+    world.run(1.5)
+
+    def items(number: int) -> Message:
+        where = place(2.0 + number)
+        return common.MAVLink_mission_item_int_message(
+            1, 191, number, 6, WAYPOINT, 0, 1, 0, 0, 0, 0, where["x"], where["y"], 0, 0
+        )
+
+    client.send(common.MAVLink_mission_count_message(1, 191, 2, 0))
+    world.run(0.1)
+    client.send_raw(items(0).pack(unsigned))
+    world.run(0.1)
+    client.send(items(1))
+    world.run(0.1)
+    assert world.tasks() == ()
+    client.send(items(0))
+    world.run(0.1)
+    client.send(items(1))
+    world.run(0.3)
+    assert [task.submitter.key for task in world.tasks()] == ["alice"]
