@@ -1,11 +1,12 @@
 """A command on its way through the server: who asked what of which vehicle, and the way back."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mav_tasks.engine import translate
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.goals import CHANGE_MODE, reposition_flags
+from mav_tasks.engine.rights import Rights
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -14,6 +15,7 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command, CommandReceiver, Pending
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Submitter
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,13 @@ class Asked:
     vehicle: Vehicle
     packet: Packet
     pending: Pending
+    #: who asks, and what he may do: later the endpoint may have signed with another key
+    submitter: Submitter = field(init=False)
+    rights: Rights = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "submitter", self.client.submitter(self.packet.source))
+        object.__setattr__(self, "rights", self.client.rights)
 
     @property
     def command(self) -> Command:
@@ -33,7 +42,7 @@ class Asked:
     @property
     def actor(self) -> str:
         """Who asks, in words."""
-        return str(self.client.submitter(self.packet.source))
+        return str(self.submitter)
 
     @property
     def receiver(self) -> CommandReceiver:

@@ -50,10 +50,13 @@ class Authority:
         self.may_arm = self._arming_allowed
 
     def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
-        """A client's mode request goes to the vehicle; our own mode counts as set by us then."""
+        """A client's mode request goes to the vehicle; our own mode counts as set by us then.
+
+        Whoever has asked last may drive: of two at once the vehicle would obey neither.
+        """
         self._asked_mode, self._asked_at = mode, now
         if mode == self._persona.control_mode:
-            self._granted.add(client)
+            self._granted = {client}
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
 
     def client_arms(self, *, now: float) -> None:

@@ -23,8 +23,10 @@ from mav_tasks.engine.goals import (
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.mode_requests import ModeRequests
 from mav_tasks.engine.plans import Plans
+from mav_tasks.engine.rights import OPERATOR, SAFETY
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
+from mav_tasks.engine.translate import result_of
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -73,6 +75,18 @@ ASKING = frozenset(
         525,  # REQUEST_STORAGE_INFORMATION
         527,  # REQUEST_CAMERA_CAPTURE_STATUS
         528,  # REQUEST_FLIGHT_INFORMATION
+    }
+)
+
+
+#: that change what bounds a rover
+BOUNDING = frozenset(
+    {
+        180,  # DO_SET_PARAMETER
+        207,  # DO_FENCE_ENABLE
+        218,  # DO_AUX_FUNCTION: the fence is one of them
+        245,  # PREFLIGHT_STORAGE
+        5300,  # DO_SET_SAFETY_SWITCH_STATE
     }
 )
 
@@ -136,7 +150,10 @@ class Commands:
         try:
             self._dispatch(asked, now=now)
         except Rejection as refusal:
-            self._book.record(asked.refuse(refusal, now=now))
+            if client.may_be_refused(now=now):
+                self._book.record(asked.refuse(refusal, now=now))
+            else:  # a flood of them fills neither disk nor net
+                asked.answer(result_of(refusal.reason), refusal.reason)
 
     def _dispatch(self, asked: Asked, *, now: float) -> None:
         component = asked.command.target.component_id
@@ -166,6 +183,7 @@ class Commands:
                     self._modes.start_plan(asked, first=first, now=now)
                     return
                 case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
+                    self._plans.check_start(asked.rights, asked.vehicle, asked.submitter)
                     seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
                     task = self._plans.go_on_with(asked.vehicle, seq, now=now)
                     asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
@@ -272,7 +290,8 @@ class Commands:
         target = command.target
         targets = self._vehicles.addressed_by(target.system_id)
         actor = str(client.submitter(packet.source))
-        clear = command.params[0] == 1.0
+        is_to_clear = command.params[0] == 1.0
+        clear = is_to_clear and client.rights.reach(OPERATOR)  # of nobody else; STOP is everybody's
         unheard = self._vehicles.stop_unheard(target.system_id, clear=clear, actor=actor, now=now)
         if not targets and not unheard:
             return
@@ -290,6 +309,9 @@ class Commands:
             client.tell(f"STOP kept: vehicle {words} silent", MavSeverity.ERROR, source, now=now)
         else:
             result, param2 = MavResult.ACCEPTED, next((k for k in killed if k), 0)
+        if is_to_clear and not clear and client.may_be_refused(now=now):
+            words = f"stopped; role {client.rights.role} may not clear a queue, {OPERATOR} may"
+            client.tell(words, MavSeverity.WARNING, source, now=now)
         client.answer(Answer(command.command, result, param2, source), packet.source)
 
     def _pause_continue(self, asked: Asked, *, now: float) -> int | None:
@@ -298,6 +320,7 @@ class Commands:
             case 0.0:
                 return self._pause(asked, now=now)
             case 1.0:
+                asked.rights.require(OPERATOR, "let a rover go on")
                 if vehicle.tasks.is_stopped and asked.receiver.older_copy(
                     asked.command, before=vehicle.stopped_at, now=now
                 ):
@@ -308,7 +331,7 @@ class Commands:
 
     def _pause(self, asked: Asked, *, now: float) -> TaskId | None:
         vehicle = asked.vehicle
-        self._submissions.held(vehicle, asked.client.submitter(asked.packet.source))
+        self._submissions.held(vehicle, asked.submitter)
         paused = vehicle.pause(actor=asked.actor, now=now)
         if not vehicle.is_heard(now=now):  # paused all the same
             words = f"paused, but vehicle {vehicle.system_id} is silent"
@@ -327,6 +350,9 @@ def _check_relay(asked: Asked, *, now: float) -> None:
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
     disarms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] == 0.0
+    if not disarms and number not in ASKING:
+        least = SAFETY if number in BOUNDING else OPERATOR
+        asked.rights.require(least, f"send command {number} to a rover")
     if vehicle.tasks.is_stopped and not disarms and number not in ASKING:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
     if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:

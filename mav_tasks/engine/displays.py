@@ -82,6 +82,9 @@ class Displays:
             case m.TaskStatus.id:
                 client.uses_dialect = True
                 self._show_tasks(asked, now=now)
+            case m.TaskTiming.id:
+                client.uses_dialect = True
+                self._show_timing(asked, now=now)
             case m.TaskQueueStatus.id:
                 client.uses_dialect = True
                 counts = self._book.counts(vehicle.system_id)
@@ -140,4 +143,23 @@ class Displays:
         elif self._book.get(task_id) is None:
             raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
         else:
+            asked.client.follow(task_id)
             send(task_id)
+
+    def _show_timing(self, asked: Asked, *, now: float) -> None:
+        task_id = translate.task_id_of(asked.command)
+        task = self._book.get(task_id) if task_id else asked.vehicle.tasks.begun
+        if task is None:
+            words = f"no task {asked.command.params[1]:g}" if task_id else "no task runs"
+            raise Rejection(R.NOT_FOUND, words)
+        vehicle = self._vehicles.look_at(task.vehicle)
+        if vehicle is None:  # of an earlier run, not heard yet: as for TASK_STATUS
+            return
+        message = translate.task_timing(
+            task,
+            vehicle.tasks.timing_of(task),
+            period=vehicle.setpoint_period,
+            reader=asked.packet.source,
+            now=now,
+        )
+        asked.client.outlet.send(message, vehicle.server_address)

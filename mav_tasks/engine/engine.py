@@ -10,11 +10,13 @@ from typing import assert_never
 
 from mav_tasks.engine.commands import Commands
 from mav_tasks.engine.displays import Displays
+from mav_tasks.engine.flood_gate import FloodGates
 from mav_tasks.engine.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import (
     Committed,
     Congestion,
     Input,
+    KeysChanged,
     LinkChanged,
     LinkSide,
     Outgoing,
@@ -35,6 +37,10 @@ from mav_tasks.engine.parameters import ParameterDesk
 from mav_tasks.engine.passing import Passing
 from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
+from mav_tasks.engine.request_limit import RequestLimit
+from mav_tasks.engine.rights import OPERATOR
+from mav_tasks.engine.setup_signing import SetupSigning
+from mav_tasks.engine.signatures import Signatures
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
@@ -57,21 +63,36 @@ class Engine:
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         kept = {} if restored is None else restored.parameters
         configured, (settings, why_not) = settings, with_all(settings, kept)
-        #: why parameters that were set in an earlier run have no effect any more
+        #: why parameters that were set before have no effect, as of the last settings
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
+        self._intake = Intake()
         self._journal: list[Event] = []
         self._book = TaskBook()
         self._fleet = Fleet(self._book, settings)
         if restored is not None:
             self._fleet.restore(restored, now=now)
-        self._intake = Intake()
         packer = Packer()
-        self._gcs = GcsSide(queue=self._packets, packer=packer, settings=settings, now=now)
+        seen = Restored() if restored is None else restored
+        #: who has signed what comes in, and the signatures of what goes out
+        self.signatures = Signatures(
+            window=settings.signing.window,
+            times=seen.signatures,
+            signed_until=seen.signed_until,
+        )
+        self._gcs = GcsSide(
+            queue=self._packets,
+            packer=packer,
+            signatures=self.signatures,
+            settings=settings,
+            now=now,
+        )
+        self._gates = FloodGates(is_client=self._gcs.has, settings=settings.clients)
         self._vehicles = VehicleSide(
             queue=self._packets,
             packer=packer,
+            signatures=self.signatures,
             book=self._book,
             fleet=self._fleet,
             settings=settings,
@@ -107,9 +128,13 @@ class Engine:
             self._displays,
             settings,
         )
-        self._publisher = Publisher(self._gcs, self._vehicles, self._book, self._displays)
+        self._publisher = Publisher(
+            self._gcs, self._vehicles, self._book, self._displays, self._submissions
+        )
         self._passing = Passing(self._vehicles)
+        self._requests = RequestLimit(self._vehicles)
         self._operator = OperatorWatch()
+        self._setup = SetupSigning(self.signatures, self._vehicles, settings)
         self._stop_by: float | None = None
         self._stopped = False
         #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``:
@@ -119,16 +144,28 @@ class Engine:
     def __repr__(self) -> str:
         return f"Engine({list(self._vehicles)}, {list(self._gcs)}, {self._book!r})"
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """What clients have set by parameter, by its name: it comes before what is configured."""
+        return self._parameters.in_force
+
     def handle(self, item: Input, *, now: float) -> None:
         """Take one input in."""
+        self.signatures.now = now
         self._vehicles.check_late(now=now)
         match item:
             case Packets():
                 self._receive(item, now=now)
             case LinkChanged(side=side):
                 self._intake.change_link(item)
+                self._gates.change_link(item)
+                self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
                 (self._gcs if clients else self._vehicles).change_link(item, now=now)
+            case KeysChanged():
+                self.signatures.change_keys(item)
+                for link, peer in self._gcs.forget_unknown():
+                    self._passing.end(link, peer, now=now)
             case PeerChanged():
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
@@ -144,7 +181,9 @@ class Engine:
                 self._submissions.store_failed()
             case SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
+                self.not_in_force = self._parameters.not_in_force
             case WallClock(offset=offset):
+                self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
             case Shutdown():
                 self._shut_down(now=now)
@@ -162,6 +201,7 @@ class Engine:
             self._reports.next_deadline(),
             self._fleet.room.next_deadline(),
             self._operator.next_deadline(limit=self._settings.watch.operator_lost),
+            self.signatures.next_deadline(),
             None if self._stopped else self._stop_by,
         ]
         due = min((d for d in deadlines if d is not None), default=inf)
@@ -169,6 +209,7 @@ class Engine:
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due by now; may come late, or for nothing."""
+        self.signatures.now = now
         self._vehicles.check_late(now=now)
         self._vehicles.handle_deadline(now=now)
         self._submissions.handle_deadline(now=now)
@@ -212,7 +253,11 @@ class Engine:
             ),
             clients=tuple(repr(client) for client in self._gcs),
             tasks=self._book.all(),
-            decoded=f"vehicles {self._vehicles.counts}, clients {self._gcs.counts}",
+            decoded=(
+                f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
+                f" {self.signatures.counts}, left out {self._gates.left_out} datagrams,"
+                f" {self._requests.left_out} requests"
+            ),
         )
 
     def _receive(self, item: Packets, *, now: float) -> None:
@@ -220,7 +265,8 @@ class Engine:
         if not from_vehicles and not self._gcs.owns(item.link):
             return
         counts = self._vehicles.counts if from_vehicles else self._gcs.counts
-        for peer, packet in self._intake.packets(item, counts, now=now):
+        let_in = self._gates.let_in(item, now=now)
+        for peer, packet in self._intake.packets(let_in, counts, now=now):
             if not from_vehicles:
                 received = self._gcs.receive(item.link, peer, packet, now=now)
                 if received is not None:
@@ -235,6 +281,8 @@ class Engine:
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
+        if not self._requests.may_pass(client, packet, message, now=now):
+            return
         self._publisher.welcome(client, now=now)
         if isinstance(message, m.CommandLong | m.CommandInt):
             self._commands.receive(client, packet, command_of(message), now=now)
@@ -246,12 +294,14 @@ class Engine:
                 self._modes.heard(client, vehicle, packet, int(message.custom_mode), now=now)
         elif isinstance(message, m.RequestDataStream):
             self._displays.set_streams(client, message)
+        elif isinstance(message, m.SetupSigning):
+            self._setup.receive(client, message, now=now)
         elif isinstance(message, MESSAGES) and self._desks.receive(
             client, packet, message, now=now
         ):
             return
         else:
-            if isinstance(message, m.Heartbeat):
+            if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
                 self._operator.receive(message, now=now)
             elif isinstance(message, PARAMETER_MESSAGES):
                 self._parameters.receive(client, packet, message, now=now)
@@ -279,6 +329,9 @@ class Engine:
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
+        times = self.signatures.take_times()
+        if times is not None:
+            self._book.record(times)
         events = self._book.take_events()
         if events:
             self._publisher.publish(events, now=now)
@@ -288,6 +341,9 @@ class Engine:
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
+        self.signatures.apply(settings.signing.window)
+        self._setup.apply(settings)
+        self._gates.apply(settings.clients)
         self._fleet.apply(settings)
         self._gcs.apply(settings)
         self._vehicles.apply(settings)

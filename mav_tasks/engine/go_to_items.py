@@ -84,7 +84,8 @@ class GoToItems:
                 raise Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
             self._submissions.submit(asked, now=now)
         except Rejection as refusal:
-            self._book.record(asked.refuse(refusal, now=now))
+            if client.may_be_refused(now=now):
+                self._book.record(asked.refuse(refusal, now=now))
 
 
 def _command_of(message: m.MissionItem | m.MissionItemInt) -> Command:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import NamedTuple
 
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings
 
 Peer = Hashable  # an endpoint on a link; what it is only the link knows
@@ -31,7 +32,9 @@ class LinkChanged:
 
     ``peers`` are endpoints known beforehand: spoken to before they have been heard.
     ``is_local``: nobody beyond this machine can be on it. ``is_stream``: what it gives may be cut
-    anywhere, and it tells by PeerChanged who is there.
+    anywhere, and it tells by PeerChanged who is there. ``takes_unsigned``: so is what nobody has
+    signed; ``key`` is the name of the key that signs what goes to whoever has not signed yet, and
+    on a vehicle link the only one that counts.
     """
 
     link: str
@@ -40,6 +43,15 @@ class LinkChanged:
     peers: tuple[Peer, ...] = ()
     is_local: bool = True
     is_stream: bool = False
+    takes_unsigned: bool = True
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class KeysChanged:
+    """The keys with which packets may be signed are these now; revoked ones have no secret."""
+
+    keys: tuple[Key, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +108,7 @@ class Shutdown:
 Input = (
     Packets
     | LinkChanged
+    | KeysChanged
     | PeerChanged
     | Congestion
     | Committed

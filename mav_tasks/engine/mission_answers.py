@@ -17,7 +17,8 @@ class MissionAnswers:
     def client(self, sender: Sender) -> GcsClient | None:
         """Give the client that a sender is at, if it is still there."""
         assert isinstance(sender.key, tuple), "only MissionDesks.receive makes senders"
-        return self._gcs.client(sender.key)
+        key, _signed_by = sender.key
+        return self._gcs.client(key)
 
     def send(self, told: ToClient) -> None:
         """Send a message in the name of the address that was spoken to."""

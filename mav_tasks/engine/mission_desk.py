@@ -12,6 +12,7 @@ from mav_tasks.engine.mission_clearing import MissionClearing
 from mav_tasks.engine.mission_uploads import MissionUploads, UploadDesk
 from mav_tasks.engine.motion_gate import GO_TO
 from mav_tasks.engine.plans import MISSION, STORED, Plans, Stored
+from mav_tasks.engine.rights import OPERATOR, SAFETY, SUBMITTER
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
@@ -41,6 +42,14 @@ MESSAGES = (
     m.MissionSetCurrent,
     m.MissionRequestPartialList,
     m.MissionWritePartialList,
+)
+#: of them, what only reads
+READING = (
+    m.MissionRequestList,
+    m.MissionRequest,
+    m.MissionRequestInt,
+    m.MissionRequestPartialList,
+    m.MissionAck,
 )
 MissionMessage = (
     m.MissionCount
@@ -110,7 +119,10 @@ class MissionDesks:
         if not at_server and (component != AUTOPILOT or not self._settings.claim):
             return False
         desk = self._desk(vehicle, component)
-        sender = Sender(client.key, packet.source, Address(vehicle.system_id, component))
+        who = (client.key, client.signed_by.name)  # one endpoint may have several keys
+        sender = Sender(who, packet.source, Address(vehicle.system_id, component))
+        if self._is_refused(client, vehicle, sender, message, now=now):
+            return True
         match message:
             case m.MissionCount() if message.mission_type not in STORED:
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
@@ -147,6 +159,33 @@ class MissionDesks:
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
         self._uploads.flush(desk.uploads, vehicle, now=now)
         return True
+
+    def _is_refused(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        sender: Sender,
+        message: MissionMessage,
+        *,
+        now: float,
+    ) -> bool:
+        """Whether a client may not write what it writes; it has been told so then."""
+        if isinstance(message, READING) or getattr(message, "current", 0) in GO_TO:
+            return False  # a "go to" is answered as every other task is
+        kind = getattr(message, "mission_type", MISSION)
+        try:
+            if isinstance(message, m.MissionClearAll):
+                client.rights.require(OPERATOR, "clear plans")
+            if kind != MISSION:
+                client.rights.require(SAFETY, "change fence or rally points")
+            if not isinstance(message, m.MissionSetCurrent):  # that is answered in its own way
+                client.rights.require(SUBMITTER, "send plans")
+        except Rejection as refusal:
+            if isinstance(message, m.MissionCount | m.MissionClearAll):
+                self._answers.ack(sender, kind, MavMissionResult.DENIED)
+                self._answers.tell(sender, vehicle, refusal.text, now=now)
+            return True
+        return False
 
     def next_deadline(self) -> float | None:
         """Give when an item is to be asked for again, or an upload given up."""
@@ -191,6 +230,7 @@ class MissionDesks:
     ) -> None:
         """The message MISSION_SET_CURRENT; MAVSDK waits for this very number, for ever."""
         try:
+            self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
             self._plans.go_on_with(vehicle, seq, now=now)
         except Rejection as refusal:
             self._answers.tell(sender, vehicle, refusal.text, now=now)

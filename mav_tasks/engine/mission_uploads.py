@@ -11,6 +11,7 @@ from hashlib import blake2b
 from zlib import crc32
 
 from mav_tasks.engine.fence_items import fence_of
+from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.item_check import ItemCheck
 from mav_tasks.engine.mission_answers import MissionAnswers
@@ -29,8 +30,8 @@ from mav_tasks.services.mission_receiver import MissionReceiver, Sender, Upload
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason
-from mav_tasks.tasks.task import Draft, Marks, Task, TaskId, Terms
+from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
 
 R = TaskReason
 
@@ -83,6 +84,8 @@ class MissionUploads:
                 self._replace(desk, vehicle, upload, now=now)
             elif self._is_nothing(vehicle, upload):
                 self._check_not_begun(vehicle)
+                client = self._client(upload.sender)
+                self._check_replaced(client, vehicle, client.submitter(upload.sender.address))
                 self._replace(desk, vehicle, upload._replace(items=()), now=now)
             else:
                 self._take_in(desk, vehicle, upload, now=now)
@@ -105,7 +108,8 @@ class MissionUploads:
         is_staged = sender.addressed.component_id == AUTOPILOT
         wanted = desk.check.plan_of(upload.items, now=now)
         terms = replace(wanted.terms, is_staged=is_staged)
-        draft = self._draft(vehicle, wanted.plan, terms, sender)
+        nonce = 0 if is_staged else wanted.nonce
+        draft = self._draft(vehicle, wanted.plan, terms, sender, nonce=nonce)
         # a long plan may take longer to come again than it is remembered
         known = None
         if not is_staged:
@@ -117,7 +121,10 @@ class MissionUploads:
             self._answers.tell(sender, vehicle, words, now=now)
             return
         before = self._plans.stored(vehicle.system_id, MISSION)
-        task = self._submissions.submit_plan(vehicle, draft, now=now)
+        client = self._client(sender)
+        if is_staged:
+            self._check_replaced(client, vehicle, draft.submitter)
+        task = self._submissions.submit_plan(client, vehicle, draft, now=now)
         if is_staged:
             self._plans.keep(
                 vehicle, MISSION, Stored(task.id, upload.items), actor=str(sender.address), now=now
@@ -205,6 +212,9 @@ class MissionUploads:
     ) -> None:
         desk.receiver.finish(result_of(refusal), opaque_id=0, now=now)
         self.flush(desk, vehicle, now=now)
+        client = self._answers.client(sender)
+        if client is not None and not client.may_be_refused(now=now):
+            return  # a flood of them fills neither disk nor net
         self._answers.tell(sender, vehicle, refusal.text, now=now)
         self._book.record(
             SubmissionRefused(
@@ -217,11 +227,22 @@ class MissionUploads:
             )
         )
 
-    def _draft(self, vehicle: Vehicle, plan: Plan, terms: Terms, sender: Sender) -> Draft:
+    def _check_replaced(self, client: GcsClient, vehicle: Vehicle, submitter: Submitter) -> None:
+        task = self._plans.task(vehicle)
+        if task is not None and task.state not in TERMINAL:
+            client.rights.require_own(task, submitter, "replace that plan")
+
+    def _client(self, sender: Sender) -> GcsClient:
         client = self._answers.client(sender)
         assert client is not None, "it has just spoken"
+        return client
+
+    def _draft(
+        self, vehicle: Vehicle, plan: Plan, terms: Terms, sender: Sender, *, nonce: int = 0
+    ) -> Draft:
+        client = self._client(sender)
         what = f"{sender.addressed} {plan.source}".encode()
-        marks = Marks(0, blake2b(what, digest_size=9).hexdigest(), "")
+        marks = Marks(nonce, blake2b(what, digest_size=9).hexdigest(), "")
         submitter = client.submitter(sender.address)
         return Draft(
             vehicle.system_id, MavCmd.MISSION_START, plan, submitter, terms=terms, marks=marks

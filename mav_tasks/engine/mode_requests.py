@@ -9,6 +9,7 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import marks_of
 from mav_tasks.engine.plans import MISSION, Plans
+from mav_tasks.engine.rights import OPERATOR, Rights
 from mav_tasks.engine.start_mark import WAITS as START_WAITS
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
@@ -72,8 +73,10 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
             return True
         if not self._is_mission(vehicle, mode):
+            client.rights.require(OPERATOR, "change the mode")
             vehicle.client_asks_mode(mode, client.key, now=now)
             return False
+        self._plans.check_start(client.rights, vehicle, submitter)
         if self._is_to_be_armed_first(vehicle):
             self._mark(vehicle, client, submitter, now=now)
             shown = self._plans.shown(vehicle)
@@ -111,22 +114,26 @@ class ModeRequests:
             raise STOPPED
         elif self._is_return(vehicle, mode):
             draft = _return_home(vehicle, submitter, Marks())
-            self._submissions.run_unasked(vehicle, draft, actor=actor, now=now)
+            self._submissions.run_unasked(client, vehicle, draft, actor=actor, now=now)
             self._show(vehicle, mode, now=now)
         elif not self._is_mission(vehicle, mode):
+            client.rights.require(OPERATOR, "change the mode")
             vehicle.client_asks_mode(mode, client.key, now=now)
             vehicle.requests.forward(packet)
             vehicle.requests.ask_to_show(now=now)
         elif self._is_to_be_armed_first(vehicle):
+            self._plans.check_start(client.rights, vehicle, submitter)
             self._mark(vehicle, client, submitter, now=now)
         else:
-            self._start_unasked(vehicle, submitter, now=now)
+            self._plans.check_start(client.rights, vehicle, submitter)
+            self._start_unasked(vehicle, submitter, client.rights, now=now)
 
     # missions
 
     def start_plan(self, asked: Asked, *, first: int, now: float) -> None:
         """Start or continue the uploaded mission; one that is over is another task."""
-        vehicle, submitter = asked.vehicle, asked.client.submitter(asked.packet.source)
+        vehicle, submitter = asked.vehicle, asked.submitter
+        self._plans.check_start(asked.rights, vehicle, submitter)
         self._submissions.check_new(vehicle)
         started = self._plans.start(vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
@@ -159,15 +166,18 @@ class ModeRequests:
         if vehicle.is_by_hand and not vehicle.is_armed_by_client(now=now):
             return  # by a person who means to drive
         try:
-            self._start_unasked(vehicle, marker.submitter, now=now)
+            self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)
         except Rejection as refusal:
             self._gcs.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
 
-    def _start_unasked(self, vehicle: Vehicle, submitter: Submitter, *, now: float) -> None:
+    def _start_unasked(
+        self, vehicle: Vehicle, submitter: Submitter, rights: Rights, *, now: float
+    ) -> None:
         self._submissions.check_new(vehicle)
         started = self._plans.start(vehicle, submitter, first=0, now=now)
         if isinstance(started, Draft):
-            task = vehicle.tasks.submit(started, now=now)
+            allowed = rights.checked(started, waiting=vehicle.tasks.count_of(submitter))
+            task = vehicle.tasks.submit(allowed, now=now)
             self._plans.restarted(vehicle, task, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
@@ -175,7 +185,7 @@ class ModeRequests:
         self, vehicle: Vehicle, client: GcsClient, submitter: Submitter, *, now: float
     ) -> None:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
-        vehicle.start_mark.put(client.key, submitter, plan_id=plan_id, now=now)
+        vehicle.start_mark.put(client.key, submitter, client.rights, plan_id=plan_id, now=now)
         words = "The mission starts when the rover is armed"
         client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)

@@ -24,6 +24,10 @@ class MotionMonitor:
         self._last_boot_ms: dict[int, int] = {}
         self.rebooted = False
 
+    def apply(self, watch: Watch) -> None:
+        """Take new settings."""
+        self._watch = watch
+
     def receive(self, message: Attitude | LocalPositionNed, *, now: float) -> None:
         """Take a message in; one that is not finite, or older than the last, is dropped."""
         if not is_finite(message) or not self._is_newer(message):
@@ -36,7 +40,7 @@ class MotionMonitor:
         else:
             self._attitude, self._attitude_at = message, now
         if self._moved_at is None or not self._is_slow():
-            self._moved_at = now
+            self._moved_at = max(now, self._moved_at or now)
 
     def latest(self) -> Motion | None:
         """Give the last measured motion, or None before both messages have come."""
@@ -58,14 +62,22 @@ class MotionMonitor:
         )
 
     def is_still(self, *, now: float) -> bool:
-        """Whether fresh data say that the vehicle has stood for a while."""
+        """Whether fresh data say that the vehicle has stood for a while.
+
+        That nothing was heard since it moved is no standstill, however long data count as fresh.
+        """
         motion = self.latest()
         return (
             motion is not None
+            and self._is_slow()
             and now - motion.at <= self._watch.motion_fresh
             and self._moved_at is not None
             and now - self._moved_at >= self._watch.still_time
         )
+
+    def doubt(self, *, until: float) -> None:
+        """Do not believe before then that it stands, whatever it says."""
+        self._moved_at = until
 
     def forget(self) -> None:
         """Start afresh, as after a restart of the vehicle."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.rights import SAFETY
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
@@ -49,13 +50,27 @@ class ParameterDesk:
         self._kept = dict(kept)
         #: the latest wish for each that is not durable yet, and the number of its event
         self._pending: dict[str, tuple[float, int]] = {}
-        self._settings, _ = with_all(settings, self._kept)
+        self._settings, self._why_not = with_all(settings, self._kept)
         self._is_changed = False
+
+    @property
+    def in_force(self) -> dict[str, float]:
+        """What clients have set, by name, and is not left out for what is configured since."""
+        return {name: value for name, value in self._kept.items() if name not in self._why_not}
+
+    @property
+    def not_in_force(self) -> tuple[str, ...]:
+        """Why the others are left out."""
+        return tuple(why for _, why in sorted(self._why_not.items()))
 
     def configured(self, settings: Settings) -> Settings:
         """Take settings as configured anew; gives them with what was set by parameter."""
+        before = self._values()
         self._configured = settings
-        self._settings, _ = with_all(settings, self._kept)
+        self._settings, self._why_not = with_all(settings, self._kept)
+        for name, value in self._values().items():
+            if value != before[name]:
+                self._tell(name)
         return self._settings
 
     def take_change(self) -> Settings | None:
@@ -137,6 +152,7 @@ class ParameterDesk:
             pending = {each: wish for each, (wish, _) in self._pending.items()}
             expected, _ = with_all(self._configured, self._kept | pending)
             changed(expected, name, value)
+            client.rights.require(SAFETY, "set parameters")
             self._submissions.check_open()
         except SettingError as error:
             refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
@@ -175,8 +191,12 @@ class ParameterDesk:
 
     def _take(self, name: str, value: float) -> None:
         self._kept[name] = value
-        self._settings, _ = with_all(self._configured, self._kept)
+        self._settings, self._why_not = with_all(self._configured, self._kept)
         self._is_changed = True
+        self._tell(name)
+
+    def _tell(self, name: str) -> None:
+        """Tell every client that is there of a value."""
         told = param_receiver.value_of(self._values(), name)
         for vehicle in self._vehicles:
             for client in self._gcs:

@@ -6,6 +6,8 @@ What the server does not claim goes to the link on which the target was seen, if
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.motion_gate import may_pass, passed, withheld
+from mav_tasks.engine.plans import MISSION
+from mav_tasks.engine.rights import OPERATOR, SAFETY, Rights
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
@@ -15,9 +17,27 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
 
 EVERYBODY = Address(0, 0)
-SETUP_SIGNING = 256
-#: never passed on: no client may change a vehicle's keys
-CLAIMED = frozenset({SETUP_SIGNING})
+#: what everybody may send to a vehicle: it asks. SYSTEM_TIME sets the clock of some
+ASKING = frozenset(
+    {
+        *(m.Ping.id, m.Timesync.id, m.ParamRequestRead.id, m.ParamRequestList.id),
+        *(m.MissionRequestList.id, m.MissionRequest.id, m.MissionRequestInt.id, m.MissionAck.id),
+    }
+)
+#: what changes the bounds in which a vehicle drives, or anything in it; files are read and written
+#: by one message
+BOUNDING = frozenset(
+    {
+        m.ParamSet.id,
+        m.FileTransferProtocol.id,
+        50,  # PARAM_MAP_RC
+        126,  # SERIAL_CONTROL, a PX4's shell
+        160,  # FENCE_POINT
+        175,  # RALLY_POINT
+        323,  # PARAM_EXT_SET
+        11002,  # DEVICE_OP_WRITE
+    }
+)
 
 
 class Passing:
@@ -30,7 +50,7 @@ class Passing:
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
         """Pass a packet to the vehicles that it is for; what is for us ends here."""
-        if packet.message_id in CLAIMED:
+        if not _may_send(client.rights, packet, message):
             return
         target = EVERYBODY if message is None else _target(message)
         behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
@@ -56,6 +76,17 @@ class Passing:
             if vehicle.has_granted((link, peer)):
                 self._vehicles.touch(vehicle)
                 vehicle.client_is_gone((link, peer), now=now)
+
+
+def _may_send(rights: Rights, packet: Packet, message: m.Message | None) -> bool:
+    """Whether a client may have a packet passed on; what has no answer is refused without one."""
+    if packet.message_id in ASKING:
+        return True
+    if isinstance(message, m.FileTransferProtocol) and file_transfer.reads(message):
+        return True
+    is_of_plan = getattr(message, "mission_type", MISSION) == MISSION  # or else of a fence
+    is_bounding = packet.message_id in BOUNDING or not is_of_plan
+    return rights.reach(SAFETY if is_bounding else OPERATOR)
 
 
 def _target(message: m.Message) -> Address:

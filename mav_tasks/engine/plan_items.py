@@ -94,10 +94,11 @@ class Manner(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """What a plan asks for: its steps, and the terms that it names for itself."""
+    """What a plan asks for: its steps, the terms that it names for itself, and its nonce, or 0."""
 
     plan: Plan
     terms: Terms
+    nonce: int = 0
 
 
 def result_of(refusal: Rejection) -> MavMissionResult:
@@ -148,7 +149,7 @@ def plan_of(items: Sequence[Item], steps: tuple[Step, ...], *, now: float) -> Wa
     loop = loops_in_vain(plan)
     if loop is not None:
         raise Rejection(R.BAD_PARAMETER, f"item {loop}: a loop in which nothing is driven")
-    return Wanted(plan, _terms_of(items, now=now))
+    return Wanted(plan, _terms_of(items, now=now), _nonce_of(items))
 
 
 def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
@@ -179,6 +180,12 @@ def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
         if item.command == MavCmd.TASK_OPTIONS:
             terms = _options(_command_of(item), now=now)
     return terms
+
+
+def _nonce_of(items: Sequence[Item]) -> int:
+    """Give the client's mark in the options; what can be none is not looked at."""
+    marks = [item.x for item in items if item.command == MavCmd.TASK_OPTIONS]
+    return marks[-1] if marks and 0 < marks[-1] <= MAX_TASK_ID else 0
 
 
 def _options(command: Command, *, now: float) -> Terms:

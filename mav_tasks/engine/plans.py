@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from mav_tasks.engine.fence_items import fence_of, rally_of
 from mav_tasks.engine.plan_items import Manner, plan_of, steps_of
+from mav_tasks.engine.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -127,6 +128,15 @@ class Plans:
         self._first[vehicle.system_id] = first
 
     # starting and jumping
+
+    def check_start(self, rights: Rights, vehicle: Vehicle, submitter: Submitter) -> None:
+        """Raise Rejection unless a client may start, or move on, the plans that are there."""
+        rights.require(SUBMITTER, "start a plan")
+        if vehicle.tasks.paused:
+            rights.require(OPERATOR, "start a plan while tasks are paused")
+        for task in (vehicle.tasks.begun, self.task(vehicle)):
+            if task is not None and isinstance(task.goal, Plan):
+                rights.require_own(task, submitter, "start that plan")
 
     def start(
         self, vehicle: Vehicle, submitter: Submitter, *, first: int, now: float

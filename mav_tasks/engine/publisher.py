@@ -1,15 +1,23 @@
-"""Tells clients what happened, and keeps them supplied: heartbeats, statuses, introductions."""
+"""Tells clients what happened, and keeps them supplied: heartbeats, statuses, introductions.
+
+A TASK_STATUS that a task is over waits until that is durable: it is never taken back. Where the
+store is too slow it is told all the same; a state that is shown on request waits for nothing.
+"""
+
+from functools import partial
 
 from mav_tasks.engine import translate
 from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
+from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink.enums import MavState
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import component_heartbeat
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskWaits
+from mav_tasks.tasks.lifecycle import TERMINAL
 from mav_tasks.tasks.task import TaskId
 
 
@@ -17,12 +25,19 @@ class Publisher:
     """What goes to clients without their asking each time."""
 
     def __init__(
-        self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook, displays: Displays
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        displays: Displays,
+        submissions: Submissions,
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
         self._displays = displays
+        self._submissions = submissions
+        self._ended: set[TaskId] = set()  # not durably yet
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
         """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
@@ -42,6 +57,11 @@ class Publisher:
 
     def publish(self, events: list[Event], *, now: float) -> None:
         """Tell of events: in words to all who listen, as TASK_STATUS to who submitted."""
+        ended = {e.task_id for e in events if isinstance(e, TaskChanged) and e.new in TERMINAL}
+        if ended:
+            self._ended |= ended
+            tell = partial(self._tell_ends, ended)
+            self._submissions.when_durable(tell, tell, now=now)
         for event in events:
             spoken = translate.text_of(event)
             if spoken is not None:
@@ -52,15 +72,25 @@ class Publisher:
             if isinstance(event, TaskChanged | TaskModified | TaskAdvanced | TaskWaits):
                 self.note_change(event.task_id)
 
+    def _tell_ends(self, ended: set[TaskId], *, now: float) -> None:
+        self._ended -= ended
+        for task_id in sorted(ended):
+            self.note_change(task_id)
+        self.send_statuses(now=now)
+
+    def _is_told_later(self, task_id: int) -> bool:
+        """Whether a task is over, and that is not durable yet."""
+        return task_id in self._ended
+
     def note_change(self, task_id: TaskId) -> None:
-        """Have the submitter of a task told of its state."""
+        """Have the submitter of a task told of its state, and who has asked about it."""
         task = self._book.get(task_id)
-        if task is None:
+        if task is None or self._is_told_later(task_id):
             return
         for client in self._gcs:
             # a nonce says it for good: after a restart, or a long silence, the client is another
             reads = client.uses_dialect or task.marks.nonce
-            if reads and client.submitted(task):
+            if (reads and client.submitted(task)) or client.follows(task.id):
                 client.statuses.changed(task.id)
 
     def _awaits(self, client: GcsClient) -> bool:
@@ -96,7 +126,8 @@ class Publisher:
                 if vehicle.tasks.begun is not None
             }
             for task_id in client.statuses.due(active, now=now):
-                self._displays.push_status(client, task_id, now=now)
+                if not self._is_told_later(task_id):
+                    self._displays.push_status(client, task_id, now=now)
 
     def _send_heartbeats(self, *, now: float) -> None:
         """One from inside each vehicle that is heard, to each client that is.

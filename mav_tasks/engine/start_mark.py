@@ -8,6 +8,7 @@ from collections.abc import Hashable
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.engine.rights import Rights
 from mav_tasks.tasks.task import Submitter
 
 WAITS = 10.0  # s for the arming
@@ -18,6 +19,7 @@ class Marker(NamedTuple):
 
     client: Hashable
     submitter: Submitter
+    rights: Rights
     plan_id: int  # as clients knew it then
 
 
@@ -31,9 +33,17 @@ class StartMark:
     def __repr__(self) -> str:
         return f"StartMark({self._marker}, until={self._until:.2f})"
 
-    def put(self, client: Hashable, submitter: Submitter, *, plan_id: int, now: float) -> None:
+    def put(
+        self,
+        client: Hashable,
+        submitter: Submitter,
+        rights: Rights,
+        *,
+        plan_id: int,
+        now: float,
+    ) -> None:
         """A client wants it, and has not armed yet."""
-        self._marker = Marker(client, submitter, plan_id)
+        self._marker = Marker(client, submitter, rights, plan_id)
         self._until = now + WAITS
 
     def is_put(self, *, now: float) -> bool:

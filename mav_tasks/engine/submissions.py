@@ -5,8 +5,10 @@ from functools import partial
 from mav_tasks.engine.ability import as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
+from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import OURS, wish_of
+from mav_tasks.engine.rights import OPERATOR
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -88,7 +90,9 @@ class Submissions:
             self._answer_repeat(asked, known, now=now)
             return
         self.check_new(vehicle)
+        draft = _allowed(asked.client, vehicle, draft)
         if self._settings.guided == "now" and asked.is_go_to:
+            asked.rights.require(OPERATOR, "interrupt what a rover does")
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
         else:
             task = vehicle.tasks.submit(draft, now=now)
@@ -103,22 +107,29 @@ class Submissions:
             self._answer_repeat(asked, known, now=now)
             return
         self.check_new(asked.vehicle)
+        asked.rights.require(OPERATOR, "interrupt what a rover does")
+        draft = _allowed(asked.client, asked.vehicle, draft)
         task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
         self._await_commit(asked, task, now=now)
 
-    def run_unasked(self, vehicle: Vehicle, draft: Draft, *, actor: str, now: float) -> None:
+    def run_unasked(
+        self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, actor: str, now: float
+    ) -> None:
         """The same for what no acknowledgement is expected of."""
         known = self._recollection.known(
             draft, confirmation=0, origin=vehicle.where.origin, now=now
         )
         if known is None:
             self.check_new(vehicle)
+            client.rights.require(OPERATOR, "interrupt what a rover does")
+            draft = _allowed(client, vehicle, draft)
             task = vehicle.run_now(draft, actor=actor, now=now)
             self._recollection.remember(task, at=now, now=now)
 
     def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
         """Take in a task that a command means without naming it; Rejection says why not."""
         self.check_new(asked.vehicle)
+        draft = _allowed(asked.client, asked.vehicle, draft)
         task = asked.vehicle.tasks.submit(draft, now=now)
         self._await_commit(asked, task, now=now)
         return task
@@ -135,9 +146,10 @@ class Submissions:
         self._recollection.remember(task, at=now, now=now)
         return task.id
 
-    def submit_plan(self, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
+    def submit_plan(self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
         """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
         self.check_new(vehicle)
+        draft = _allowed(client, vehicle, draft)
         task = vehicle.tasks.submit(draft, now=now)
         self._recollection.remember(task, at=now, now=now)
         return task
@@ -169,7 +181,7 @@ class Submissions:
         if not priorities:
             return DEFAULT_PRIORITY
         by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
-        return priorities.get(str(submitter), by_address)
+        return priorities.get(submitter.place, by_address)
 
     def _check_reach(self, vehicle: Vehicle, goal: Goal) -> None:
         """A slip of a digit in a place is a drive that nobody meant."""
@@ -186,7 +198,7 @@ class Submissions:
     def check_new(self, vehicle: Vehicle) -> None:
         """Raise Rejection while no new task is taken in for a vehicle."""
         self.check_open()
-        why = vehicle.requests.loss_failsafe.why_off
+        why = vehicle.why_drives_on
         if why:
             raise Rejection(R.NOT_ALLOWED, f"the rover would drive on without setpoints: {why}")
 
@@ -240,6 +252,11 @@ class Submissions:
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"same {what} again: still task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def _allowed(client: GcsClient, vehicle: Vehicle, draft: Draft) -> Draft:
+    """Give a task as its client may submit it; Rejection."""
+    return client.rights.checked(draft, waiting=vehicle.tasks.count_of(draft.submitter))
 
 
 def _note(asked: Asked, task_id: TaskId) -> None:

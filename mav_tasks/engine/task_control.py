@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.goals import MAX_DELAY, flag, number, whole
+from mav_tasks.engine.rights import OPERATOR
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavSeverity, TaskProperty
@@ -73,10 +74,12 @@ class TaskControl:
         if task_id == 0 and begun is None:
             raise Rejection(R.NOT_FOUND, "no task is running")
         task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
+        asked.rights.require_own(task, asked.submitter, "cancel")
         asked.vehicle.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
 
     def _clear(self, asked: Asked, *, now: float) -> int:
+        asked.rights.require(OPERATOR, "clear a queue")
         begun_too = flag(asked.command, 1, "scope")
         asked.vehicle.clear(begun_too=begun_too, actor=asked.actor, now=now)
         return 0
@@ -94,6 +97,7 @@ class TaskControl:
         if task_id == 0 and (begun is None or begun.state is not TaskState.HELD):
             raise Rejection(R.NOT_FOUND, "no task is held")
         task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
+        asked.rights.require_own(task, asked.submitter, "release")
         if task.state is not TaskState.HELD:
             raise Rejection(R.WRONG_STATE, f"task {task.id} is not held, it is {_words(task)}")
         if how == SKIP:
@@ -104,16 +108,20 @@ class TaskControl:
 
     def _modify(self, asked: Asked, *, now: float) -> int:
         task = self._find(asked, _task_id(asked.command))
+        asked.rights.require_own(task, asked.submitter, "modify")
         terms = _modified(task, asked.command, now=now)
+        if terms.priority > task.terms.priority:
+            asked.rights.check_priority(terms.priority)
         asked.vehicle.modify(task, terms, actor=asked.actor, now=now)
         return task.id
 
     def _change_speed(self, asked: Asked, *, now: float) -> int:
+        asked.rights.require(OPERATOR, "set the speed")
         whole(asked.command, 1, "speed type", high=GROUND_OR_AIR)
         wish = asked.command.params[1]
         if wish == NO_CHANGE:
             return 0
-        top = self._settings.driving.max_speed
+        top = min(self._settings.driving.max_speed, asked.rights.limits.max_speed)
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 

@@ -26,6 +26,7 @@ from mav_tasks.tasks.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
 from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
@@ -115,6 +116,24 @@ def task_status(
     )
 
 
+def task_timing(
+    task: Task, timing: Timing | None, *, period: float, reader: Address, now: float
+) -> m.TaskTiming:
+    """Give the TASK_TIMING of a task; ``period`` is that of its vehicle's setpoints, in seconds."""
+    return m.TaskTiming(
+        time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
+        task_id=task.id,
+        count=0 if timing is None else timing.count,
+        late=0 if timing is None else timing.late,
+        rate=1 / (period if timing is None else timing.period),
+        p50=nan if timing is None else timing.p50,
+        p99=nan if timing is None else timing.p99,
+        longest=nan if timing is None else timing.longest,
+        target_system=reader.system_id,
+        target_component=reader.component_id,
+    )
+
+
 def queue_status(
     tasks: VehicleTasks, counts: list[int], *, version: int, now: float
 ) -> m.TaskQueueStatus:
@@ -168,7 +187,7 @@ def message_id_of(command: Command) -> int:
 
 
 def task_id_of(command: Command) -> int:
-    """Give the task id in param2 of REQUEST_MESSAGE(TASK_STATUS); -1 for nonsense."""
+    """Give the task id in param2 of REQUEST_MESSAGE for what is about tasks; -1 for nonsense."""
     return _whole(command.params[1])
 
 

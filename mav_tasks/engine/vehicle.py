@@ -12,6 +12,7 @@ from mav_tasks.engine.authority import Authority
 from mav_tasks.engine.components import Components
 from mav_tasks.engine.frame_monitor import Seen
 from mav_tasks.engine.hold_before import HoldBefore
+from mav_tasks.engine.known_profile import KnownProfile
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.setpoint_clock import SetpointClock
@@ -25,6 +26,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
+from mav_tasks.services.identity import identity_of
 from mav_tasks.services.offboard import Phase, Refused
 from mav_tasks.services.orders import Speeds
 from mav_tasks.services.persona import Persona
@@ -41,6 +43,8 @@ RUNNING = frozenset({TaskState.STARTING, TaskState.EXECUTING, TaskState.CANCELLI
 LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
+#: s in which a vehicle that was told to move and says that it stands may be stopping all the same
+UNSEEN_STOP = 3.0
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -97,12 +101,20 @@ class Vehicle:
         #: whether its mission begins when it is armed
         self.start_mark = StartMark()
         self._own_items = 0  # of a mission on board
+        #: what was measured of it beforehand
+        self.known = KnownProfile(persona)
+        self.known.apply(settings.profiles, system_id)
         #: what its heartbeats say towards clients
         self.shown = ShownHeartbeat()
         self.components = Components(system_id, first=settings.identity.component_id)
 
     def __repr__(self) -> str:
         return f"Vehicle({self.system_id}, {self.control!r}, {self.tasks!r})"
+
+    @property
+    def setpoint_period(self) -> float:
+        """Seconds from one setpoint to the next, as they should be."""
+        return self._settings.watch.setpoint_period
 
     @property
     def server_component(self) -> int:
@@ -128,6 +140,11 @@ class Vehicle:
     def is_by_hand(self) -> bool:
         """Whether it is in a mode in which a person drives."""
         return self._monitor.custom_mode in self.persona.manual_modes
+
+    @property
+    def why_drives_on(self) -> str:
+        """Why it would go on without setpoints, in words; "": it stops, or that is not known."""
+        return self.requests.loss_failsafe.why_off or self.known.why_drives_on
 
     @property
     def heard_at(self) -> float:
@@ -211,8 +228,11 @@ class Vehicle:
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.AutopilotVersion):
-            self.tasks.identified(_uid_of(message), now=now)
+            identity = identity_of(message)
+            self.tasks.identified(identity.uid, now=now)
             self.requests.is_identified = True
+            self.known.identify(identity)
+            self._use_profile(now=now)
 
     def _receive_own_mission(self, total: int, *, now: float) -> None:
         """What is on board is none of ours: its mission mode would drive it, and nobody sees it."""
@@ -257,6 +277,18 @@ class Vehicle:
         self._ask_for_rates(now=now)
         self.requests.ask_for_failsafe()
         self._note_failsafe(now=now)
+        self._use_profile(now=now)
+
+    def _use_profile(self, *, now: float) -> None:
+        """Go by what was measured of it; setpoints do not change their kind while it is driven."""
+        news = self.known.take_news()
+        if news:
+            self._note(news, now=now)
+        self.tasks.brakes(self.known.stop)
+        persona = self.known.persona
+        if persona != self.persona and not self.control.is_engaged:
+            self.persona = persona
+            self.requests.adopt(persona)
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
@@ -583,11 +615,13 @@ class Vehicle:
     def pause(self, *, actor: str, now: float) -> TaskId | None:
         """Let task and queue stand; zeros leave in this very step.
 
-        A vehicle that moves without a task is stopped as by HOLD.
+        A vehicle that moves without a task is stopped as by HOLD; so is one that was taken over.
         """
         self.hold_before.forget()
         self.forget_start()
-        if self.tasks.begun is None and self.armed and not self.control.is_engaged:
+        begun = self.tasks.begun
+        is_driven = begun is not None and begun.reason is not TaskReason.TAKEOVER
+        if not is_driven and self.armed and not self.control.is_engaged:
             return self.hold(client=None, actor=actor, now=now)
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.step(now=now)
@@ -652,8 +686,12 @@ class Vehicle:
         demand = STOP if self._is_closing else self.tasks.step(seen, now=now)
         if begun_before is not None and self.tasks.begun is None:
             self._authority.revoke()
+            if self._book[begun_before.id].reason is TaskReason.STUCK:
+                self.where.motion.doubt(until=now + UNSEEN_STOP)
+                seen = replace(seen, still=False)
         self._follow(demand, seen, now=now)
-        self.requests.flush(now=now)
+        if self.requests.flush(now=now):
+            self.tasks.setpoint_left(now=now)
         self._plan_tick(now=now)
 
     def check_late(self, *, now: float) -> None:
@@ -669,6 +707,7 @@ class Vehicle:
                 self.requests.flush(now=now)
             else:
                 self.requests.send_zero()
+            self.tasks.setpoint_left(now=now)  # that it came late shows in what holds the task
             self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
@@ -695,12 +734,16 @@ class Vehicle:
             is_fence_unknown=self.where.is_fence_unknown,
             turns_on_spot=self.persona.turns_on_spot,
             is_unknown=self.tasks.has_uid and not self.requests.is_identified,
-            drives_on=bool(self.requests.loss_failsafe.why_off),
+            drives_on=bool(self.why_drives_on),
         )
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings; what is under way keeps the old ones where it must."""
+        """Take new settings, but for those that need a restart: see the table of keys."""
         self._settings = settings
+        self._monitor.lost_after = settings.watch.heartbeat_lost
+        self.where.motion.apply(settings.watch)
+        self.requests.apply(settings.watch)
+        self.known.apply(settings.profiles, self.system_id)  # used from the next heartbeat on
 
     def _follow(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         match demand.kind:
@@ -728,10 +771,3 @@ class Vehicle:
 
     def _note(self, text: str, *, now: float) -> None:
         self._book.record(VehicleNoted(self.system_id, text, now))
-
-
-def _uid_of(version: m.AutopilotVersion) -> str:
-    """Give what tells this vehicle from all others, "" if it does not say."""
-    if any(version.uid2):
-        return bytes(version.uid2).hex()
-    return f"{version.uid:x}" if version.uid else ""

@@ -69,6 +69,17 @@ class VehicleRequests:
         """Link and endpoint at which the vehicle is reached."""
         return self._outlet.link, self._outlet.peer
 
+    def apply(self, watch: Watch) -> None:
+        """Take new settings; what is being asked for keeps its time."""
+        self._watch = watch
+        self.control.apply(watch)
+
+    def adopt(self, persona: Persona) -> None:
+        """Speak otherwise from now on, to the same make of vehicle; it is not being driven."""
+        self._persona = persona
+        self.control.adopt(persona)
+        self.last_words = self._prepare_last_words()
+
     def move_to(self, outlet: Outlet) -> None:
         """The vehicle is heard at another endpoint now."""
         self._outlet = outlet
@@ -191,8 +202,11 @@ class VehicleRequests:
         self._sender.handle_deadline(now=now)
         self._uploader.handle_deadline(now=now)
 
-    def flush(self, *, now: float) -> None:
-        """Move what the services want sent to the way out, and their answers to who asked."""
+    def flush(self, *, now: float) -> bool:
+        """Move what the services want sent to the way out, and their answers to who asked.
+
+        Whether a setpoint leaves.
+        """
         setpoints = self.control.take_messages()
         outgoing, answers = self._sender.take()
         is_handed_back = self.control.phase is Phase.RELEASING and self._persona.has_loss_failsafe
@@ -212,6 +226,7 @@ class VehicleRequests:
                 self._outlet.send(item, self._source, first=is_first)
         for answer in answers:
             self._dispatch(answer, now=now)
+        return bool(setpoints)
 
     def take_unperformed(self) -> list[Answered]:
         """Give the orders of plans that the vehicle has refused or not answered since."""

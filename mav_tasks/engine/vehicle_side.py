@@ -11,6 +11,7 @@ from math import inf
 from mav_tasks.engine.agenda import Agenda
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.signatures import Signatures
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -70,12 +71,14 @@ class VehicleSide:
         *,
         queue: list[Outgoing],
         packer: Packer,
+        signatures: Signatures,
         book: TaskBook,
         fleet: Fleet,
         settings: Settings,
     ) -> None:
         self._queue = queue
         self._packer = packer
+        self._signatures = signatures
         self._book = book
         self._fleet = fleet
         self._settings = settings
@@ -191,6 +194,7 @@ class VehicleSide:
         self._settings = settings
         for vehicle in self:
             vehicle.apply(settings)
+            self._agenda.touch(vehicle)  # its deadlines may be others
 
     def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
         """Take a packet in; gives the vehicle in whose name it is to be forwarded, if any.
@@ -204,6 +208,8 @@ class VehicleSide:
                 return None
         elif packet.message_id not in m.ALL:
             self.counts.unknown += 1
+        if self._signatures.admit(link, peer, packet) is None:
+            return None
         if self._is_intruder(packet):
             self._note_intruder(link, packet, message, now=now)
             return None
@@ -264,7 +270,9 @@ class VehicleSide:
     def _outlet(self, link: str, peer: Peer) -> Outlet:
         outlet = self._outlets.get((link, peer))
         if outlet is None:
-            outlet = self._outlets[link, peer] = Outlet(link, peer, self._queue, self._packer)
+            outlet = self._outlets[link, peer] = Outlet(
+                link, peer, self._queue, self._packer, self._signatures
+            )
         return outlet
 
     def _meet(
@@ -328,6 +336,10 @@ class VehicleSide:
             del self._rivals[next(iter(self._rivals))]
         is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
         old = self._router.place_of(vehicle.system_id)
+        if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
+            words = f"one of this id at {peer} has no key, this one had: ignored"
+            self._note_once(vehicle.system_id, words, now=now)
+            return False
         if is_another or (old not in self._left and vehicle.is_heard(now=now)):
             self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
             return False

@@ -40,8 +40,7 @@ class WriteThrough:
         What it refuses, or does not answer, changes nothing here.
         """
 
-        def done(result: MavMissionResult | None, *, now: float) -> None:
-            self._vehicles.get(vehicle.system_id)
+        def done(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001  # the vehicle's
             if result in (MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED):
                 go_on(now=now)
             elif result is None:

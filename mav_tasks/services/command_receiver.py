@@ -8,8 +8,8 @@ from collections import OrderedDict
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavResult
-from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Message
 
 SAME_PACKET = 5.0  # s, the very same packet again: the same answer
 REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
@@ -40,6 +40,11 @@ def command_of(message: CommandLong | CommandInt) -> Command:
         return Command(target, message.command, first + last, 0, message.frame, message)
     last = (message.param5, message.param6, message.param7)
     return Command(target, message.command, first + last, message.confirmation, None, message)
+
+
+def is_stop(message: Message | None) -> bool:
+    """Whether a message stops a vehicle; that others have a field for a command means nothing."""
+    return isinstance(message, CommandLong | CommandInt) and message.command == MavCmd.TASK_STOP
 
 
 class Answer(NamedTuple):

@@ -10,7 +10,8 @@ class HeartbeatMonitor:
     """What a vehicle's heartbeats say, and whether they still come."""
 
     def __init__(self, first: Heartbeat, *, lost_after: float, now: float) -> None:
-        self._lost_after = lost_after
+        #: s of silence after which it is not heard any more
+        self.lost_after = lost_after
         self.heard_at = now
         self.latest = first
 
@@ -34,7 +35,7 @@ class HeartbeatMonitor:
 
     def is_heard(self, *, now: float) -> bool:
         """Whether heartbeats are coming."""
-        return now - self.heard_at <= self._lost_after
+        return now - self.heard_at <= self.lost_after
 
 
 class HeartbeatSender:

@@ -69,7 +69,8 @@ class Thinner:
     """Which of a vehicle's streamed messages one client gets."""
 
     def __init__(self, *, default_interval: float) -> None:
-        self._default = default_interval
+        #: s between messages that the client has no wish for
+        self.default_interval = default_interval
         self._intervals: dict[int, dict[int, float | None]] = {}  # by system and message
         self._last: dict[tuple[int, int, int], float] = {}
         self.stretch = Stretch()
@@ -126,7 +127,8 @@ class Thinner:
 
     def _interval(self, system_id: int, message_id: int) -> float | None:
         wishes = self._intervals.get(system_id)
-        return self._default if wishes is None else wishes.get(message_id, self._default)
+        default = self.default_interval
+        return default if wishes is None else wishes.get(message_id, default)
 
     def _stretched(self, interval: float, message_id: int, *, now: float) -> float:
         """Give the interval that the way out to the client allows.

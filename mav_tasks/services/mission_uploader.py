@@ -5,6 +5,7 @@ vehicle asks for decides what is sent, whichever of the two requests it asks wit
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -13,15 +14,29 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.services.mission_item import Item, message_of
 
-COUNT_AGAIN = 0.25  # s, until the vehicle asks for something
-GIVE_UP = 1.2  # s without a request; ArduPilot asks again after 1.0
-AT_MOST = 2.0  # s in all: MAVSDK waits 2.5 for our own answer
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long an upload goes on; seconds."""
+
+    count_again: float  # until the other end asks for something
+    give_up: float  # without a request
+    at_most: float  # in all
+    #: without an answer to the last item, after which it is sent once more; None: never
+    last_again: float | None = None
+
+
+#: ArduPilot asks again after 1.0 s; MAVSDK waits 2.5 s for our own answer
+TO_VEHICLE = Patience(count_again=0.25, give_up=1.2, at_most=2.0)
 
 
 class Done(Protocol):
-    """What is done when it is known what became of an upload; None: the vehicle was silent."""
+    """What is done when it is known what became of an upload.
 
-    def __call__(self, result: MavMissionResult | None, *, now: float) -> None: ...
+    ``result`` None: the other end was silent. ``opaque_id`` is its id of the plan, 0 for none.
+    """
+
+    def __call__(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None: ...
 
 
 @dataclass(slots=True)
@@ -33,13 +48,24 @@ class _Upload:
     give_up_at: float = 0.0
     at_most_until: float = 0.0
     is_asked: bool = False
+    is_sent: bool = False  # whole: its last item has been asked for and sent
+    last_at: float | None = None  # when the last item is sent once more
 
 
 class MissionUploader:
     """The plans on their way to one vehicle."""
 
-    def __init__(self, target: Address) -> None:
+    def __init__(
+        self,
+        target: Address,
+        *,
+        patience: Patience = TO_VEHICLE,
+        fits: Callable[[int], bool] = lambda _opaque_id: True,
+    ) -> None:
+        """``fits`` says of an id in an accepting ack whether it can be this plan's."""
         self._target = target
+        self._patience = patience
+        self._fits = fits
         self._waiting: deque[_Upload] = deque()
         self._outgoing: list[m.Message] = []
 
@@ -62,21 +88,26 @@ class MissionUploader:
         match message:
             case m.MissionRequest() | m.MissionRequestInt() if message.seq < len(upload.items):
                 upload.is_asked = True
-                upload.give_up_at = min(now + GIVE_UP, upload.at_most_until)
-                item = upload.items[message.seq]
-                self._outgoing.append(
-                    message_of(item, message.seq, upload.mission_type, to=self._target)
-                )
-            case m.MissionAck():
+                upload.give_up_at = min(now + self._patience.give_up, upload.at_most_until)
+                self._send(upload, message.seq, now=now)
+            case m.MissionAck() if self._is_answer(upload, message):
                 known = [result for result in MavMissionResult if result == message.type]
-                self._end(known[0] if known else MavMissionResult.ERROR, now=now)
+                result = known[0] if known else MavMissionResult.ERROR
+                self._end(result, opaque_id=message.opaque_id, now=now)
+
+    def _is_answer(self, upload: _Upload, ack: m.MissionAck) -> bool:
+        """Whether an ack can be of this upload: not one of an earlier one that comes late."""
+        if ack.type != MavMissionResult.ACCEPTED:
+            return True
+        return (upload.is_sent or not upload.items) and self._fits(ack.opaque_id)
 
     def next_deadline(self) -> float | None:
         """Give when ``handle_deadline`` has something to do."""
         if not self._waiting:
             return None
         upload = self._waiting[0]
-        return upload.give_up_at if upload.is_asked else min(upload.count_at, upload.give_up_at)
+        again = upload.last_at if upload.is_asked else upload.count_at
+        return upload.give_up_at if again is None else min(again, upload.give_up_at)
 
     def handle_deadline(self, *, now: float) -> None:
         """Offer it again, and give up in the end."""
@@ -84,7 +115,9 @@ class MissionUploader:
             return
         upload = self._waiting[0]
         if now >= upload.give_up_at:
-            self._end(None, now=now)
+            self._end(None, opaque_id=0, now=now)
+        elif upload.last_at is not None and now >= upload.last_at:
+            self._send(upload, len(upload.items) - 1, now=now)
         elif not upload.is_asked and now >= upload.count_at:
             self._offer(upload, now=now)
 
@@ -95,16 +128,24 @@ class MissionUploader:
 
     def _start(self, *, now: float) -> None:
         upload = self._waiting[0]
-        upload.give_up_at = now + GIVE_UP
-        upload.at_most_until = now + AT_MOST
+        upload.give_up_at = now + self._patience.give_up
+        upload.at_most_until = now + self._patience.at_most
         self._offer(upload, now=now)
 
     def _offer(self, upload: _Upload, *, now: float) -> None:
-        upload.count_at = now + COUNT_AGAIN
+        upload.count_at = now + self._patience.count_again
         self._outgoing.append(m.MissionCount(*self._target, len(upload.items), upload.mission_type))
 
-    def _end(self, result: MavMissionResult | None, *, now: float) -> None:
+    def _send(self, upload: _Upload, seq: int, *, now: float) -> None:
+        again = self._patience.last_again
+        is_last = seq == len(upload.items) - 1
+        upload.is_sent = upload.is_sent or is_last
+        upload.last_at = now + again if again is not None and is_last else None
+        item = upload.items[seq]
+        self._outgoing.append(message_of(item, seq, upload.mission_type, to=self._target))
+
+    def _end(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:
         upload = self._waiting.popleft()
         if self._waiting:
             self._start(now=now)
-        upload.done(result, now=now)
+        upload.done(result, opaque_id=opaque_id, now=now)

@@ -153,6 +153,15 @@ class OffboardControl:
     def _in_hold(self) -> bool:
         return self._is_settled and self._mode == self._persona.hold_mode
 
+    def apply(self, watch: Watch) -> None:
+        """Take new settings."""
+        self._watch = watch
+
+    def adopt(self, persona: Persona) -> None:
+        """Speak otherwise from now on: other setpoints, to the same make of vehicle."""
+        self._persona = persona
+        self._orders = Orders(self._target, persona)
+
     def may_have_set(self, mode: int, *, now: float) -> bool:
         """Whether a change to this mode can be our own doing."""
         self._note_requests(now)
@@ -245,8 +254,7 @@ class OffboardControl:
             self.phase = Phase.IDLE
         match self.phase:
             case Phase.DISARMING:  # seen through first: it could come true while we arm
-                if not self._armed:
-                    self.phase = Phase.IDLE
+                self._end_disarming()
             case Phase.ASKING_HOLD if not self._in_hold:
                 self._insist(Refused.MODE, now=now)
             case Phase.ASKING_MODE if not self._in_our_mode:
@@ -337,8 +345,14 @@ class OffboardControl:
                 self._send_setpoint(STANDING)
                 if now >= self._next_hold_at:
                     self._request_hold(now=now, again_after=RELEASE_REPEAT)
-            case Phase.DISARMING if not self._armed:
-                self.phase = Phase.IDLE
+            case Phase.DISARMING:
+                self._end_disarming()
+
+    def _end_disarming(self) -> None:
+        """Believe it when it is shown, by a heartbeat that is no older than the request."""
+        if self._is_settled and not self._armed:
+            self.phase = Phase.IDLE
+            self.we_armed = False
 
     def begin_release(self, *, now: float) -> None:
         """Zero and HOLD at once, on a vehicle in whatever mode; ``release`` sees it through."""
@@ -446,7 +460,7 @@ class OffboardControl:
         self._request(self._orders.arming(arm=True), until=self._ask_until, now=now)
 
     def _end_release(self, *, disarm: bool, now: float) -> None:
-        if disarm and self.we_armed and self._armed:
+        if disarm and self.we_armed:  # also where that was asked for and is not seen yet
             self.phase = Phase.DISARMING
             self._unsettle(now)
             self._request_disarming(now=now)

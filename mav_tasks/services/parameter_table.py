@@ -1,88 +1,96 @@
-"""Which settings of the server are MAVLink parameters, under what names, in what units and ranges.
+"""Which settings of the server are MAVLink parameters, and under what names.
 
-Every one is a REAL32, which is the same in both encodings that clients use. What decides who may
-drive (links, arming, what is claimed) is not among them: a client must not widen its own rights.
+Their units and ranges are those of the configuration's keys. Every one is a REAL32, which is the
+same in both encodings that clients use. What decides who may drive (links, arming, what is claimed)
+is not among them: a client must not widen its own rights.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from math import pi
+from dataclasses import dataclass
 from struct import pack, unpack
-from typing import Any
 
 from mav_tasks.errors import SettingError
+from mav_tasks.setting_keys.key import Key, value_at, with_value_at
+from mav_tasks.setting_keys.shapes import Choice, Number
+from mav_tasks.setting_keys.table import KEYS
 from mav_tasks.settings import Settings
 
-DEGREE = pi / 180
-PAUSE_OR_CONTINUE = ("pause", "continue")
+ENGINE = "engine."  # where the server's settings have those of the engine
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One setting as a parameter: ``low`` to ``high``, each of which is ``unit`` in the setting.
+    """One setting as a parameter, in the unit of its key.
 
-    ``part`` is the group of settings, "" for one of the server's own. With ``choices`` the setting
-    is a word, and the parameter its place among them; ``at_most`` names another that bounds it.
+    Of a setting that is a word, the parameter is its place among the ``choices``.
     """
 
     name: str
-    part: str
-    field: str
-    low: float = 0.0
-    high: float = 0.0
-    unit: float = 1.0
-    is_whole: bool = False
-    choices: tuple[str, ...] = ()
-    at_most: str = ""
+    key: Key
+    low: float
+    high: float
+    is_whole: bool
+    choices: tuple[str, ...]
+
+    @property
+    def path(self) -> str:
+        """Where the engine's settings have it."""
+        return self.key.path.removeprefix(ENGINE)
 
     def value(self, settings: Settings) -> float:
         """Give the value that settings have."""
-        kept: Any = getattr(getattr(settings, self.part) if self.part else settings, self.field)
-        return float(self.choices.index(kept)) if self.choices else as_sent(kept / self.unit)
+        plain = self.key.shape.plain(value_at(settings, self.path))
+        return as_sent(float(self.choices.index(str(plain)) if self.choices else str(plain)))
 
     def with_value(self, settings: Settings, value: float) -> Settings:
         """Give settings with another value; SettingError names its range."""
-        kept = self._kept(value)
-        if not self.part:
-            return replace(settings, **{self.field: kept})
-        changed: Any = replace(getattr(settings, self.part), **{self.field: kept})
-        return replace(settings, **{self.part: changed})
-
-    def _kept(self, value: float) -> Any:
-        high = len(self.choices) - 1.0 if self.choices else self.high
-        if not self.low <= value <= high:  # NaN is neither
-            raise SettingError(f"{self.name} {value:g}: not in {self.low:g}..{high:g}")
-        if not self.choices and not self.is_whole:
-            return value * self.unit
-        if value != int(value):
+        if not self.low <= value <= self.high:  # NaN is neither
+            raise SettingError(f"{self.name} {value:g}: not in {self.low:g}..{self.high:g}")
+        if self.is_whole and value != int(value):
             raise SettingError(f"{self.name} {value:g}: not a whole number")
-        return self.choices[int(value)] if self.choices else int(value)
+        plain = self.choices[int(value)] if self.choices else value
+        return with_value_at(settings, self.path, self.key.shape.kept(plain))
+
+
+def _parameter(name: str, key: Key) -> Parameter:
+    match key.shape:
+        case Number(low=low, high=high, is_whole=is_whole):
+            return Parameter(name, key, low, high, is_whole, choices=())
+        case Choice(words=words):
+            return Parameter(name, key, 0.0, len(words) - 1.0, is_whole=True, choices=words)
+        case shape:
+            raise TypeError(f"{name}: {shape} is no parameter")
 
 
 PARAMETERS: Mapping[str, Parameter] = {
-    each.name: each
-    for each in (
-        Parameter("TSK_SPEED", "driving", "speed", 0.05, 10.0, at_most="TSK_SPEED_MAX"),
-        Parameter("TSK_SPEED_MAX", "driving", "max_speed", 0.05, 10.0),
-        Parameter("TSK_TURN", "driving", "turn_rate", 1.0, 360.0, DEGREE, at_most="TSK_TURN_MAX"),
-        Parameter("TSK_TURN_MAX", "driving", "max_turn_rate", 1.0, 360.0, DEGREE),
-        Parameter("TSK_ACCEL", "driving", "acceleration", 0.05, 5.0),
-        Parameter("TSK_ACC_RAD", "driving", "acceptance_radius", 0.05, 100.0),
-        Parameter("TSK_DIST_MAX", "driving", "max_distance", 1.0, 1e6),
-        Parameter("TSK_QUEUE_MAX", "queueing", "capacity", 1.0, 1e5, is_whole=True),
-        Parameter("TSK_QUOTA", "queueing", "quota", 1.0, 1e5, is_whole=True),
-        Parameter("TSK_PREEMPT", "queueing", "preemption_gap", 0.0, 10.0, is_whole=True),
-        Parameter("TSK_PREEMPT_S", "queueing", "preemption_rest", 0.0, 3600.0),
-        Parameter("TSK_START_TMO", "watch", "start_timeout", 3.0, 120.0),
-        Parameter("TSK_STUCK_TMO", "watch", "stuck", 2.0, 600.0),
-        Parameter("TSK_LOST_TMO", "watch", "lost_timeout", 3.0, 3600.0),
-        Parameter("TSK_OPER_TMO", "watch", "operator_lost", 2.0, 600.0),
-        Parameter("TSK_ON_OPLOST", "", "operator_lost", choices=("continue", "pause")),
-        Parameter("TSK_ON_FAIL", "", "on_failure", choices=PAUSE_OR_CONTINUE),
-        Parameter("TSK_ON_RESTART", "", "on_restart", choices=PAUSE_OR_CONTINUE),
-        Parameter("TSK_GUIDED", "", "guided", choices=("queue", "now")),
+    name: _parameter(name, KEYS[key])
+    for name, key in (
+        ("TSK_SPEED", "driving.speed"),
+        ("TSK_SPEED_MAX", "driving.max_speed"),
+        ("TSK_TURN", "driving.turn_rate_deg"),
+        ("TSK_TURN_MAX", "driving.max_turn_rate_deg"),
+        ("TSK_ACCEL", "driving.acceleration"),
+        ("TSK_ACC_RAD", "driving.acceptance_radius"),
+        ("TSK_DIST_MAX", "driving.max_distance"),
+        ("TSK_QUEUE_MAX", "queueing.capacity"),
+        ("TSK_QUOTA", "queueing.quota"),
+        ("TSK_PREEMPT", "queueing.preemption_gap"),
+        ("TSK_PREEMPT_S", "queueing.preemption_rest"),
+        ("TSK_START_TMO", "watch.start_timeout"),
+        ("TSK_STUCK_TMO", "watch.stuck"),
+        ("TSK_LOST_TMO", "watch.lost_timeout"),
+        ("TSK_OPER_TMO", "watch.operator_lost"),
+        ("TSK_ON_OPLOST", "rules.operator_lost"),
+        ("TSK_ON_FAIL", "rules.on_failure"),
+        ("TSK_ON_RESTART", "rules.on_restart"),
+        ("TSK_GUIDED", "rules.guided"),
     )
 }
+NAMES: Mapping[str, str] = {each.key.name: name for name, each in PARAMETERS.items()}
+#: each parameter that another one bounds, with that other
+BOUNDED = tuple(
+    (each, PARAMETERS[NAMES[each.key.at_most]]) for each in PARAMETERS.values() if each.key.at_most
+)
 
 
 def changed(settings: Settings, name: str, value: float) -> Settings:
@@ -91,12 +99,10 @@ def changed(settings: Settings, name: str, value: float) -> Settings:
     ``name`` is one of PARAMETERS.
     """
     new = PARAMETERS[name].with_value(settings, value)
-    for each in PARAMETERS.values():
-        if each.at_most and name in (each.name, each.at_most):
-            bound = PARAMETERS[each.at_most]
-            if each.value(new) > bound.value(new):
-                words = f"{each.name} {each.value(new):g} is more than {bound.name}"
-                raise SettingError(f"{words} {bound.value(new):g}")
+    for each, bound in BOUNDED:
+        if name in (each.name, bound.name) and each.value(new) > bound.value(new):
+            words = f"{each.name} {each.value(new):g} is more than {bound.name}"
+            raise SettingError(f"{words} {bound.value(new):g}")
     return new
 
 

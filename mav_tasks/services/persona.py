@@ -176,9 +176,15 @@ def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Perso
     persona = PERSONAS.get(heartbeat.autopilot)
     if persona is None or persona.turns_on_spot or not honours_yaw_rate:
         return persona
+    return with_yaw_rate(persona, is_honoured=True)
+
+
+def with_yaw_rate(persona: Persona, *, is_honoured: bool) -> Persona:
+    """Give the persona of one that turns at a yaw rate and reverses; else is steered by course."""
+    like = ARDUPILOT if is_honoured else PX4
     return replace(
         persona,
-        turns_on_spot=True,
-        setpoint_mask=ARDUPILOT.setpoint_mask,
-        setpoint_frame=ARDUPILOT.setpoint_frame,
+        turns_on_spot=is_honoured,
+        setpoint_mask=like.setpoint_mask,
+        setpoint_frame=like.setpoint_frame,
     )

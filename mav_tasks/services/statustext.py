@@ -23,22 +23,3 @@ def chunks(severity: MavSeverity, text: str, *, text_id: int) -> Iterator[Status
         yield Statustext(severity, data[start : start + CHUNK], text_id, number)
     if len(data) % CHUNK == 0:  # a text ends with a chunk that is not full
         yield Statustext(severity, b"", text_id, len(data) // CHUNK)
-
-
-class RateLimit:
-    """A token bucket: ``rate`` a second in the long run, ``burst`` at once."""
-
-    def __init__(self, *, rate: float, burst: float, now: float) -> None:
-        self._rate = rate
-        self._burst = burst
-        self._tokens = burst
-        self._at = now
-
-    def take(self, *, now: float) -> bool:
-        """Whether one more may pass now."""
-        self._tokens = min(self._burst, self._tokens + self._rate * (now - self._at))
-        self._at = now
-        if self._tokens < 1.0:
-            return False
-        self._tokens -= 1.0
-        return True

@@ -7,7 +7,7 @@ for. It keeps ids only; what is sent is the state at the time of sending.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mav_tasks.services.statustext import RateLimit
+from mav_tasks.services.token_bucket import TokenBucket
 
 BURST = 20
 MOST = 1000  # tasks whose news waits to be told to one client
@@ -24,11 +24,16 @@ class TaskStatusSender:
     """Which tasks' states one client is still to be told."""
 
     def __init__(self, *, rate: float, now: float) -> None:
-        self._limit = RateLimit(rate=rate, burst=BURST, now=now)
-        self._wait = 1.0 / rate
+        self._limit = TokenBucket(rate=rate, burst=BURST, now=now)
+        self._rate = rate
         self._changed: dict[int, None] = {}  # an ordered set
         self._streams: dict[int, _Stream] = {}  # by vehicle
         self._retry_at = 0.0
+
+    def apply(self, *, rate: float) -> None:
+        """Take another rate."""
+        self._rate = rate
+        self._limit.apply(rate=rate)
 
     def changed(self, task_id: int) -> None:
         """Note that a task's state changed; telling it twice before it is sent counts once."""
@@ -60,7 +65,7 @@ class TaskStatusSender:
         due: dict[int, None] = {}
         while self._changed and now >= self._retry_at:
             if not self._limit.take(now=now):
-                self._retry_at = now + self._wait
+                self._retry_at = now + 1.0 / self._rate
                 break
             task_id = next(iter(self._changed))
             del self._changed[task_id]

@@ -129,3 +129,13 @@ def test_without_fresh_data_nobody_knows_whether_it_stands() -> None:
     made = MotionMonitor(WATCH)
     stands(made, since=1.0, seconds=2.0)
     assert not made.is_still(now=3.0 + WATCH.motion_fresh + 0.01)
+
+
+def test_nothing_heard_since_it_moved_is_no_standstill() -> None:
+    """Settings may let data count as fresh for longer than a standstill takes to be seen."""
+    made = MotionMonitor(Watch(motion_fresh=2.0, still_time=0.05))
+    made.receive(position(ms=1000, vx=1.0), now=1.0)
+    made.receive(attitude(ms=1000), now=1.0)
+    assert not any(made.is_still(now=1.0 + age) for age in (0.05, 0.3, 1.9))
+    made.receive(position(ms=1100, x=1.1), now=1.1)
+    assert made.is_still(now=1.1)

@@ -5,9 +5,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult as Result
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import (
-    AT_MOST,
-    COUNT_AGAIN,
-    GIVE_UP,
+    TO_VEHICLE,
     MissionUploader,
 )
 
@@ -27,7 +25,7 @@ class Rig:
         self.uploader.begin(kind, items, self.done, now=now)
         self.take(now)
 
-    def done(self, result: Result | None, *, now: float) -> None:
+    def done(self, result: Result | None, *, opaque_id: int, now: float) -> None:
         self.results.append((now, result))
 
     def take(self, now: float) -> None:
@@ -79,8 +77,8 @@ def test_it_is_offered_again_and_given_up() -> None:
     rig = Rig()
     rig.begin()
     rig.run(5.0)
-    assert rig.said == [(round(COUNT_AGAIN * n, 6), "count", 3) for n in range(5)]
-    assert rig.results == [(GIVE_UP, None)]
+    assert rig.said == [(round(TO_VEHICLE.count_again * n, 6), "count", 3) for n in range(5)]
+    assert rig.results == [(TO_VEHICLE.give_up, None)]
 
 
 def test_a_vehicle_that_stops_asking_is_given_up() -> None:
@@ -88,7 +86,7 @@ def test_a_vehicle_that_stops_asking_is_given_up() -> None:
     rig.begin()
     rig.receive(ask(0), 0.5)
     rig.run(5.0)
-    assert rig.results == [(0.5 + GIVE_UP, None)]
+    assert rig.results == [(0.5 + TO_VEHICLE.give_up, None)]
 
 
 def test_it_takes_a_limited_time_in_all() -> None:
@@ -97,7 +95,7 @@ def test_it_takes_a_limited_time_in_all() -> None:
     for at in (0.5, 1.0, 1.5, 1.9):
         rig.receive(ask(0), at)
     rig.run(5.0)
-    assert rig.results == [(AT_MOST, None)]
+    assert rig.results == [(TO_VEHICLE.at_most, None)]
 
 
 def test_one_after_the_other() -> None:
@@ -107,8 +105,28 @@ def test_one_after_the_other() -> None:
     assert rig.said == [(0.0, "count", 3)]
     rig.receive(ack(Result.DENIED), 0.2)
     assert rig.said[1:] == [(0.2, "count", 1)]
-    rig.receive(ack(Result.ACCEPTED, RALLY), 0.3)
+    rig.receive(ask(0, RALLY), 0.3)
+    rig.receive(ack(Result.ACCEPTED, RALLY), 0.4)
     assert [result for _, result in rig.results] == [Result.DENIED, Result.ACCEPTED]
+
+
+def test_accepted_before_its_last_item_was_sent_is_an_earlier_ones_answer() -> None:
+    rig = Rig()
+    rig.begin()
+    rig.receive(ask(0), 0.1)
+    rig.receive(ask(1), 0.2)
+    rig.receive(ack(Result.ACCEPTED), 0.3)
+    assert rig.results == []
+    rig.receive(ask(2), 0.4)
+    rig.receive(ack(Result.ACCEPTED), 0.5)
+    assert rig.results == [(0.5, Result.ACCEPTED)]
+
+
+def test_a_plan_of_nothing_is_accepted_at_once() -> None:
+    rig = Rig()
+    rig.begin(items=())
+    rig.receive(ack(Result.ACCEPTED), 0.1)
+    assert rig.results == [(0.1, Result.ACCEPTED)]
 
 
 def test_answers_about_another_plan_and_numbers_beyond_change_nothing() -> None:

@@ -17,10 +17,6 @@ def single(value: float) -> float:
     return float(unpack("<f", pack("<f", value))[0])
 
 
-def highest(parameter: Parameter) -> float:
-    return len(parameter.choices) - 1.0 if parameter.choices else parameter.high
-
-
 @EACH
 def test_its_name_fits_into_a_message(parameter: Parameter) -> None:
     assert parameter.name.startswith("TSK_")
@@ -31,13 +27,13 @@ def test_its_name_fits_into_a_message(parameter: Parameter) -> None:
 @EACH
 def test_the_configured_value_lies_within_its_range(parameter: Parameter) -> None:
     value = parameter.value(Settings())
-    assert parameter.low <= value <= highest(parameter)
+    assert parameter.low <= value <= parameter.high
     assert changed(Settings(), parameter.name, as_sent(single(value))) == pytest.approx(Settings())
 
 
 @EACH
 def test_what_was_set_is_what_is_told(parameter: Parameter) -> None:
-    for value in (parameter.low, highest(parameter)):
+    for value in (parameter.low, parameter.high):
         new = parameter.with_value(Settings(), as_sent(single(value)))
         assert single(parameter.value(new)) == single(value)
 
@@ -102,4 +98,4 @@ def test_the_contract_lists_all_of_them_with_their_ranges() -> None:
     contract = Path(__file__).resolve().parents[3] / "dialects" / "README.md"
     rows = re.findall(r"^\| (TSK_\w+) \| (\S+)\.\.(\S+) \|", contract.read_text(), re.MULTILINE)
     listed = [(name, float(low), float(high)) for name, low, high in rows]
-    assert listed == [(each.name, each.low, highest(each)) for each in PARAMETERS.values()]
+    assert listed == [(each.name, each.low, each.high) for each in PARAMETERS.values()]

@@ -1,7 +1,7 @@
 import pytest
 
 from mav_tasks.mavlink.enums import MavSeverity
-from mav_tasks.services.statustext import CHUNK, RateLimit, chunks
+from mav_tasks.services.statustext import CHUNK, chunks
 
 WARNING = MavSeverity.WARNING
 
@@ -35,15 +35,3 @@ def test_what_is_not_ascii_becomes_question_marks() -> None:
 
 def test_every_chunk_has_the_severity() -> None:
     assert {c.severity for c in chunks(WARNING, "x" * 120, text_id=1)} == {WARNING}
-
-
-def test_a_rate_limit_lets_a_burst_through_and_then_its_rate() -> None:
-    limit = RateLimit(rate=10.0, burst=3, now=0.0)
-    passed = [n for n in range(101) if limit.take(now=n * 0.01)]
-    assert passed[:3] == [0, 1, 2]
-    assert len(passed) == 3 + 10  # the burst, and a second at the rate
-
-
-def test_a_rate_limit_saves_up_no_more_than_its_burst() -> None:
-    limit = RateLimit(rate=10.0, burst=3, now=0.0)
-    assert [limit.take(now=1000.0) for _ in range(5)] == [True, True, True, False, False]

@@ -1,0 +1,88 @@
+"""What was measured of a vehicle beforehand, as far as it is this very vehicle.
+
+A profile is of one unique id and one firmware: any other is told, and not used.
+"""
+
+from mav_tasks.services.identity import VehicleIdentity
+from mav_tasks.services.persona import Persona, with_yaw_rate
+from mav_tasks.settings import VehicleProfile
+
+
+class KnownProfile:
+    """Chooses among the profiles that there are for one system id."""
+
+    def __init__(self, persona: Persona) -> None:
+        self._by_default = persona
+        self._profiles: tuple[VehicleProfile, ...] = ()
+        self._identity: VehicleIdentity | None = None
+        #: what is known of this vehicle; None: nothing
+        self.chosen: VehicleProfile | None = None
+        self._told = ""
+
+    def __repr__(self) -> str:
+        return f"KnownProfile({self.chosen})"
+
+    @property
+    def persona(self) -> Persona:
+        """How it wants to be spoken to, as far as that is known."""
+        known = "" if self.chosen is None else self.chosen.yaw_rate
+        if not known or (known == "honoured") == self._by_default.turns_on_spot:
+            return self._by_default
+        return with_yaw_rate(self._by_default, is_honoured=known == "honoured")
+
+    @property
+    def stop(self) -> tuple[float, float] | None:
+        """A stop that was measured: m/s, and the metres that it took."""
+        if self.chosen is None or self.chosen.speed is None:
+            return None
+        if self.chosen.stopping_distance is None:
+            return None
+        return self.chosen.speed, self.chosen.stopping_distance
+
+    @property
+    def why_drives_on(self) -> str:
+        """Give in words why it would go on without setpoints; "": it stops, or is not known."""
+        is_off = self.chosen is not None and self.chosen.loss_stop == "no"
+        return "its profile says that it does not stop by itself" if is_off else ""
+
+    def identify(self, identity: VehicleIdentity) -> None:
+        """The vehicle has said which one it is."""
+        self._identity = identity
+        self._choose()
+
+    def apply(self, profiles: tuple[VehicleProfile, ...], system_id: int) -> None:
+        """Take the profiles that there are now."""
+        self._profiles = tuple(each for each in profiles if each.system_id == system_id)
+        self._choose()
+
+    def take_news(self) -> str:
+        """Give in words what is used, or why nothing is; "" if that is no news."""
+        words = self._words()
+        if words == self._told:
+            return ""
+        self._told = words
+        return words or "no profile is used any more"
+
+    def _choose(self) -> None:
+        fitting = [each for each in self._profiles if not self._why_not(each)]
+        self.chosen = max(fitting, key=lambda each: each.probed, default=None)
+
+    def _words(self) -> str:
+        if self.chosen is not None:
+            return f"profile of {self.chosen.probed[:10]} is used"
+        if self._identity is None or not self._profiles:
+            return ""
+        latest = max(self._profiles, key=lambda each: each.probed)
+        return f"profile not used: {self._why_not(latest)}"
+
+    def _why_not(self, profile: VehicleProfile) -> str:
+        identity = self._identity
+        if identity is None:
+            return "the rover has not said which one it is"
+        if profile.autopilot != self._by_default.name:
+            return f"of {profile.autopilot or 'no autopilot'}"
+        if profile.uid != identity.uid:
+            return "of another rover"
+        if profile.firmware != identity.firmware:
+            return f"of firmware {profile.firmware}"
+        return ""

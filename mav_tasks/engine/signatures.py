@@ -1,0 +1,302 @@
+"""Whose a packet is by its signature, and the signatures of what the server sends.
+
+On a client link every key of the ring counts, on a vehicle link the one that it was given. What was
+accepted once is not accepted again, over restarts as well: the times go to the store.
+"""
+
+from dataclasses import dataclass
+from math import inf
+from typing import NamedTuple
+
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Outgoing, Peer
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.packet import MAGIC_V2, Packet
+from mav_tasks.mavlink.signing import (
+    FROM_RADIOS,
+    UNITS,
+    Key,
+    Signer,
+    Stream,
+    StreamTimes,
+    is_signed_with,
+    stream_of,
+    timestamp_at,
+    timestamp_of,
+)
+from mav_tasks.tasks.events import SignaturesSeen, SignatureTime
+
+#: who signs nothing, where that is allowed
+UNSIGNED = Key("", b"", fingerprint="-")
+
+#: what would do no harm a second time, or comes so often that its time is kept each second only
+FREQUENT = frozenset(
+    {
+        *(m.Heartbeat.id, m.Timesync.id, m.SystemTime.id, m.Ping.id, m.ManualControl.id),
+        *(m.RcChannelsOverride.id, m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id),
+        *(m.SetAttitudeTarget.id, m.SetActuatorControlTarget.id),
+    }
+)
+KEPT_WITHIN = 1.0  # s, in which the time of one of those is on its way to the store
+RESERVE = int(60 * UNITS)  # of own times, so that each is new, even if the clock is set back
+MOST_SIGNERS = 1024
+MOST_OWN = 4096  # streams of our own
+HIGHEST_LINK_ID = 255
+
+
+@dataclass(slots=True)
+class SignatureCounts:
+    """What was refused, in packets."""
+
+    unsigned: int = 0  # where that is not allowed
+    unverified: int = 0  # no key of ours, or changed on the way
+    old: int = 0  # signed well, and not later than one before: replayed, or overtaken
+
+
+class _Link(NamedTuple):
+    number: int
+    is_of_vehicles: bool
+    takes_unsigned: bool
+    key: str
+
+
+class Signatures:
+    """The keys, and the times of signatures on all links."""
+
+    def __init__(
+        self,
+        *,
+        window: float,
+        times: tuple[SignatureTime, ...] = (),
+        signed_until: int = 0,
+    ) -> None:
+        """``window`` in seconds; the rest is what the store gave back."""
+        self._window = int(window * UNITS)
+        self._keys: dict[str, Key] = {}  # with a secret, by name
+        self._has_ring = False
+        self._links: dict[str, _Link] = {}
+        self._numbers: dict[str, int] = {}
+        self._times: dict[str, StreamTimes] = {}  # by fingerprint
+        self._signers: dict[tuple[str, Peer], Signer] = {}
+        self._offset: float | None = None  # UTC less ``now``
+        #: times of what we have signed, by side, key, link id and source
+        self._own: dict[tuple[bool, str, int, int, int], int] = {}
+        self._heard: dict[tuple[str, Stream], int] = {}  # and not given to the store yet
+        self._gone: set[tuple[str, Stream]] = set()
+        self._keep_at = inf
+        self._signed_until = signed_until  # as the store has it
+        self._highest = 0
+        self._from = signed_until  # where own times begin, until the clock is known
+        #: seconds: set before anything is signed or looked at
+        self.now = 0.0
+        self.counts = SignatureCounts()
+        for time in sorted(times, key=lambda time: time.timestamp):
+            stream = Stream(time.link_id, Address(time.system_id, time.component_id))
+            self._times_of(time.key).note(stream, time.timestamp)
+
+    def __repr__(self) -> str:
+        return f"Signatures({sorted(self._keys)}, {self.counts})"
+
+    def apply(self, window: float) -> None:
+        """Take another window, in seconds."""
+        self._window = int(window * UNITS)
+
+    def set_wall(self, offset: float) -> None:
+        """Take note of the time of the wall, UTC less ``now``."""
+        self._offset = offset
+        clock = self._clock()
+        self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
+
+    def change_keys(self, change: KeysChanged) -> None:
+        """Take other keys; who has signed with one that is no more is unknown from here on."""
+        self._has_ring = True
+        self._keys = {key.name: key for key in change.keys if key.secret}
+        for way, signer in list(self._signers.items()):
+            if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
+                del self._signers[way]  # its role may be another one, too
+
+    def _is_last_of_vehicles(self, link: str) -> bool:
+        """Whether vehicles have lost their key, and no other is there: they hear nothing else.
+
+        They are not believed, and so not driven; that they are to stand is still said to them.
+        """
+        there = self._links[link]
+        return there.is_of_vehicles and there.key not in self._keys
+
+    def change_link(self, change: LinkChanged) -> None:
+        """Take note of what a link asks for."""
+        if not change.up:
+            self._links.pop(change.link, None)
+            for way in [way for way in self._signers if way[0] == change.link]:
+                del self._signers[way]
+            return
+        number = self._numbers.setdefault(change.link, len(self._numbers) + 1)
+        self._links[change.link] = _Link(
+            min(number, HIGHEST_LINK_ID),
+            change.side is LinkSide.VEHICLES,
+            change.takes_unsigned,
+            change.key,
+        )
+
+    def forget(self, link: str, peer: Peer) -> None:
+        """Somebody is gone, or another one: who comes there has signed nothing yet."""
+        self._signers.pop((link, peer), None)
+
+    def knows(self, key: Key) -> bool:
+        """Whether a key still counts; UNSIGNED does."""
+        return key is UNSIGNED or self._keys.get(key.name) == key
+
+    def key_of_secret(self, secret: bytes) -> Key | None:
+        """Give the key that has this secret, if one has."""
+        return next((key for key in self._keys.values() if key.secret == secret), None)
+
+    def sign_to(self, link: str, peer: Peer, key: Key | None) -> None:
+        """Sign with a key from here on what goes to an endpoint; None: no more."""
+        if key is None:
+            self._signers.pop((link, peer), None)
+        elif key is not UNSIGNED:
+            self._signer(link, peer, key)
+
+    def has_key(self, link: str) -> bool:
+        """Whether a link has a key of its own."""
+        there = self._links.get(link)
+        return there is not None and bool(there.key)
+
+    def takes_unsigned(self, link: str) -> bool:
+        """Whether what nobody has signed is taken from a link."""
+        there = self._links.get(link)
+        return there is not None and there.takes_unsigned
+
+    # in
+
+    def admit(self, link: str, peer: Peer, packet: Packet) -> Key | None:
+        """Give whose a packet is; None: it is not to be looked at. Its CRC was found right."""
+        there = self._links.get(link)
+        if there is None:
+            return UNSIGNED
+        if not packet.is_signed or not self._matters(there):
+            # a client's radio tells of a way that is none of a rover's, and signs for nobody
+            is_of_radio = packet.message_id in FROM_RADIOS and there.is_of_vehicles
+            if there.takes_unsigned or is_of_radio:
+                return UNSIGNED
+            self.counts.unsigned += 1
+            return None
+        key = self._signed_with(there, link, peer, packet)
+        if key is None:
+            self.counts.unverified += 1
+            return None
+        stream, timestamp = stream_of(packet), timestamp_of(packet)
+        times = self._times_of(key.fingerprint)
+        own = there.is_of_vehicles, key.fingerprint, stream.link_id, *stream.source
+        if timestamp <= self._own.get(own, -1):
+            self.counts.old += 1  # our own, sent back by who has overheard it
+            return None
+        if not times.is_news(stream, timestamp, clock=self._clock(), window=self._window):
+            self.counts.old += 1
+            return None
+        gone = times.note(stream, timestamp)
+        if gone is not None:
+            self._heard.pop((key.fingerprint, gone), None)
+            self._gone.add((key.fingerprint, gone))
+        self._heard[key.fingerprint, stream] = timestamp
+        late = KEPT_WITHIN if packet.message_id in FREQUENT or there.is_of_vehicles else 0.0
+        self._keep_at = min(self._keep_at, self.now + late)
+        self._signer(link, peer, key).heard(timestamp)
+        return key
+
+    def _matters(self, link: _Link) -> bool:
+        """Whether there is a key that a signature could be of."""
+        return bool(link.key) if link.is_of_vehicles else self._has_ring
+
+    def _signed_with(self, there: _Link, link: str, peer: Peer, packet: Packet) -> Key | None:
+        if there.is_of_vehicles:
+            key = self._keys.get(there.key)
+            return key if key is not None and is_signed_with(packet, key.secret) else None
+        signer = self._signers.get((link, peer))
+        is_client_s = signer is not None and bool(signer.key.role)
+        if signer is not None and is_client_s and is_signed_with(packet, signer.key.secret):
+            return signer.key
+        for key in self._keys.values():
+            if key.role and is_signed_with(packet, key.secret):
+                return key
+        return None
+
+    def _times_of(self, fingerprint: str) -> StreamTimes:
+        times = self._times.get(fingerprint)
+        if times is None:
+            times = self._times[fingerprint] = StreamTimes()
+        return times
+
+    # out
+
+    def sealed(self, link: str, peer: Peer, raw: bytes) -> bytes:
+        """Give a packet as it is to leave."""
+        signer = self._signers.get((link, peer))
+        if signer is None:
+            there = self._links.get(link)
+            key = self._keys.get(there.key) if there is not None and there.key else None
+            if key is None:
+                return raw
+            signer = self._signer(link, peer, key)
+        clock = max(self._clock(), self._from)
+        sealed = signer.sign(raw, clock=clock)
+        self._note_own(link, signer, sealed)
+        if signer.last <= clock + RESERVE:  # else it is a time of the other end's, for it alone
+            self._highest = max(self._highest, signer.last)
+        return sealed
+
+    def _note_own(self, link: str, signer: Signer, raw: bytes) -> None:
+        if raw[0] != MAGIC_V2:
+            return
+        is_of_vehicles = self._links[link].is_of_vehicles
+        own = is_of_vehicles, signer.key.fingerprint, signer.link_id, raw[5], raw[6]
+        if own not in self._own and len(self._own) >= MOST_OWN:
+            del self._own[next(iter(self._own))]
+        self._own[own] = max(signer.last, self._own.get(own, 0))
+
+    def sealed_late(self, outgoing: Outgoing) -> Outgoing:
+        """Give a packet that was made long before as it is to leave now."""
+        data = self.sealed(outgoing.link, outgoing.peer, outgoing.data)
+        return outgoing._replace(data=data)
+
+    def _signer(self, link: str, peer: Peer, key: Key) -> Signer:
+        signer = self._signers.get((link, peer))
+        if signer is None or signer.key != key:
+            if len(self._signers) >= MOST_SIGNERS:
+                del self._signers[next(iter(self._signers))]
+            signer = Signer(key, link_id=self._links[link].number)
+            # one that was forgotten may have been ahead of the clock by as many packets as it sent
+            signer.last = min(self._highest, self._clock() + int(UNITS))
+            self._signers[link, peer] = signer
+        return signer
+
+    def _clock(self) -> int:
+        return 0 if self._offset is None else timestamp_at(self.now + self._offset)
+
+    # kept
+
+    def next_deadline(self) -> float | None:
+        """Give when times are to be given to the store."""
+        return None if self._keep_at == inf else self._keep_at
+
+    def take_times(self) -> SignaturesSeen | None:
+        """Give what the store has to keep by now, if it is time for that."""
+        is_used_up = self._highest > 0 and self._signed_until < self._highest + RESERVE // 2
+        if self.now < self._keep_at and not is_used_up:
+            return None
+        if is_used_up:
+            self._signed_until = self._highest + RESERVE
+        seen = SignaturesSeen(
+            tuple(_time(*each, timestamp) for each, timestamp in self._heard.items()),
+            tuple(_time(*each, 0) for each in sorted(self._gone)),
+            self._signed_until,
+            self.now,
+        )
+        self._heard.clear()
+        self._gone.clear()
+        self._keep_at = inf
+        return seen
+
+
+def _time(fingerprint: str, stream: Stream, timestamp: int) -> SignatureTime:
+    return SignatureTime(fingerprint, stream.link_id, *stream.source, timestamp)

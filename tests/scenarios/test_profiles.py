@@ -1,0 +1,192 @@
+"""What was measured of a rover beforehand: used for that very rover, and for no other."""
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+from mav_tasks.probe.profile import profile_of
+from mav_tasks.settings import Driving, Settings, VehicleProfile
+from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import ARDUPILOT, PX4
+from tests.kit.bodies import WeakBrakes
+from tests.kit.client import ACCEPTED, DENIED, DRIVE
+from tests.kit.probing import ProbeWorld
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.world import World, near_pose
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_fence import YARD, fenced
+from tests.scenarios.test_live_settings import change
+
+ROTATE = 54001
+TURNING = replace(PROMPT_PX4, honours_yaw_rate=True)
+PX4_PROFILE = VehicleProfile(
+    system_id=1,
+    uid="1",
+    autopilot="px4",
+    firmware="1.15.4 99c40407",
+    probed="2026-11-20T10:00:00Z",
+    yaw_rate="honoured",
+)
+ARDUPILOT_PROFILE = VehicleProfile(
+    system_id=1,
+    uid="1",
+    autopilot="ardupilot",
+    firmware="4.6.3 3fc7011a",
+    probed="2026-11-20T10:00:00Z",
+)
+
+
+def known(*profiles: VehicleProfile) -> Settings:
+    return Settings(profiles=profiles)
+
+
+def noted(world: World) -> list[str]:
+    return [event.text for event in world.events(VehicleNoted) if "profile" in event.text]
+
+
+def rotate(world: World, angle: float = 90.0) -> tuple[int, int] | None:
+    sent = world.client.rotate(angle)
+    world.run(0.3)
+    return sent.answer
+
+
+def test_a_px4_that_was_measured_to_turn_is_turned(make_world: MakeWorld) -> None:
+    world = make_world(persona=TURNING, settings=known(PX4_PROFILE))
+    assert rotate(world) == (ACCEPTED, 1)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert near_pose(world.pose(), (0, 0, 90))
+    assert world.client.move(-0.5)
+    world.until_idle(tasks=2)
+    assert near_pose(world.pose(), (0, -0.5, 90), metres=0.05)
+    assert noted(world) == ["profile of 2026-11-20 is used"]
+    assert any("profile of 2026-11-20 is used" in text for text in world.client.texts())
+
+
+@pytest.mark.parametrize(
+    ("change_of", "words"),
+    [
+        ({"uid": "2"}, "profile not used: of another rover"),
+        ({"firmware": "1.14.0 99c40407"}, "profile not used: of firmware 1.14.0 99c40407"),
+        ({"autopilot": "generic"}, "profile not used: of generic"),
+    ],
+)
+def test_a_profile_of_something_else_is_told_and_not_used(
+    make_world: MakeWorld, change_of: dict[str, str], words: str
+) -> None:
+    profile = replace(PX4_PROFILE, **change_of)  # type: ignore[arg-type]
+    world = make_world(persona=TURNING, settings=known(profile))
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert noted(world) == [words]
+
+
+def test_the_profile_of_another_system_is_no_matter(make_world: MakeWorld) -> None:
+    world = make_world(persona=TURNING, settings=known(replace(PX4_PROFILE, system_id=2)))
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert noted(world) == []
+
+
+def test_of_two_of_one_rover_the_later_counts(make_world: MakeWorld) -> None:
+    later = replace(PX4_PROFILE, yaw_rate="ignored", probed="2026-11-21T10:00:00Z")
+    world = make_world(persona=TURNING, settings=known(later, PX4_PROFILE))
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert noted(world) == ["profile of 2026-11-21 is used"]
+
+
+def test_what_a_profile_does_not_say_stays_as_the_settings_have_it(make_world: MakeWorld) -> None:
+    settings = replace(known(replace(PX4_PROFILE, yaw_rate="")), yaw_rate="honoured")
+    world = make_world(persona=TURNING, settings=settings)
+    assert rotate(world) == (ACCEPTED, 1)
+    world.until_idle(tasks=1)
+
+
+def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
+    make_world: MakeWorld,
+) -> None:
+    profile = replace(ARDUPILOT_PROFILE, yaw_rate="ignored")
+    world = make_world(settings=known(profile))
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    world.client.move(1.0)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert near_pose(world.pose(), (1, 0, 0), metres=0.05)
+
+
+def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(persona=TURNING)
+    world.client.move(2.0)
+    world.until(lambda: world.truth.north > 0.5, within=20)
+    change(world, known(PX4_PROFILE))
+    world.run(1.1)
+    assert noted(world) == ["profile of 2026-11-20 is used"]
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    world.until_idle(tasks=1)
+    world.run(1.1)
+    assert rotate(world) == (ACCEPTED, 2)
+    world.until_idle(tasks=2)
+    assert near_pose(world.pose(), (2, 0, 90), metres=0.05)
+    change(world, known())
+    world.run(1.1)
+    assert noted(world)[-1] == "no profile is used any more"
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+
+
+def test_another_rover_in_its_place_does_not_inherit_it(make_world: MakeWorld) -> None:
+    world = make_world(settings=known(replace(ARDUPILOT_PROFILE, yaw_rate="ignored")))
+    world.run(10)
+    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    world.replace_rover(switched_on=world.now - 5.0)  # its clock begins anew: it is asked again
+    world.until(lambda: "profile not used: of another rover" in noted(world), within=15)
+    assert rotate(world) == (ACCEPTED, 1)
+    world.until_idle(tasks=1)
+
+
+def test_a_rover_that_was_seen_not_to_stop_by_itself_is_not_driven(make_world: MakeWorld) -> None:
+    world = make_world(settings=known(replace(ARDUPILOT_PROFILE, loss_stop="no")))
+    sent = world.client.move(1.0)
+    world.run(3.0)
+    assert sent.answer == (DENIED, R.NOT_ALLOWED)
+    assert any("does not stop by itself" in text for text in world.client.texts())
+    assert (world.rover.autopilot.armed, world.truth.north) == (False, 0.0)
+
+
+class TestBrakes:
+    """A rover that brakes at 0.2 m/s², where 0.5 is planned for."""
+
+    body = staticmethod(partial(WeakBrakes, braking=0.2))
+
+    def measured(self) -> VehicleProfile:
+        world = ProbeWorld(drive=True, body=self.body)
+        found = world.finish().findings
+        assert world.driven.ended == ""
+        return profile_of(found, probed="2026-11-21T10:00:00Z")
+
+    def farthest(self, make_world: MakeWorld, settings: Settings) -> float:
+        world = make_world(body=self.body, settings=settings)
+        assert fenced(world, *YARD) == 0
+        world.client.command(DRIVE, 2.0, 0, 30, 0, 0, 0, 5)
+        world.until_state(1, S.HELD)
+        world.until(world.stands, within=20)
+        return world.truth.north
+
+    def test_the_probe_measures_it_and_then_it_stays_inside_its_fence(
+        self, make_world: MakeWorld
+    ) -> None:
+        assert self.farthest(make_world, Settings()) > 3.0, "without, it would be no test"
+        assert 1.0 < self.farthest(make_world, known(self.measured())) < 3.0
+
+    @pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
+    def test_good_brakes_change_nothing(self, make_world: MakeWorld, persona: object) -> None:
+        assert persona in (ARDUPILOT, PX4)
+        chosen = ARDUPILOT if persona is ARDUPILOT else PX4
+        probed = ProbeWorld(drive=True, persona=chosen)
+        profile = profile_of(probed.finish().findings, probed="2026-11-21T10:00:00Z")
+        world = make_world(persona=chosen, settings=known(profile))
+        tasks = world.server.engine._fleet.of(1)
+        assert tasks._stop == (profile.speed, profile.stopping_distance)
+        assert tasks.driving == Driving()
