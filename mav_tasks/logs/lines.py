@@ -1,0 +1,109 @@
+"""Log records as lines: words for people, or JSON for machines; what repeats itself is counted."""
+
+import json
+import logging
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass
+from typing import Any
+
+from mav_tasks.logs.rendering import clean, utc_text, values_of
+from mav_tasks.logs.repeats import Repeats, Said
+from mav_tasks.tasks.events import Event, SubmissionRefused
+
+#: record, its words, how often more it was said, in so many seconds -> the line
+LineOf = Callable[[logging.LogRecord, str, tuple[int, float] | None], str]
+
+_traceback = logging.Formatter().formatException
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
+
+
+class TextLines:
+    """Local time, level, words. A traceback follows on lines of its own."""
+
+    def __init__(self) -> None:
+        self._second = -1
+        self._clock = ""  # that second in words: thousands of lines a second have the same
+
+    def __call__(
+        self, record: logging.LogRecord, words: str, repeated: tuple[int, float] | None
+    ) -> str:
+        """Give the line."""
+        second = int(record.created)
+        if second != self._second:
+            self._second = second
+            self._clock = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(second))
+        line = f"{self._clock},{int(record.msecs):03} {record.levelname} {words}"
+        if repeated:
+            line += _count(repeated)
+        if record.exc_info:
+            line = "\n".join([line, *map(clean, _traceback(record.exc_info).splitlines())])
+        return line
+
+
+def json_line(record: logging.LogRecord, words: str, repeated: tuple[int, float] | None) -> str:
+    """Give one object: time, level, message; of an event its kind and fields."""
+    values: dict[str, Any] = {
+        "time": utc_text(record.created),
+        "level": record.levelname.lower(),
+        "message": words,
+    }
+    if is_dataclass(record.msg):
+        values |= values_of(record.msg, offset=record.created - time.monotonic())
+    if repeated:
+        more, seconds = repeated
+        values |= {
+            "message": words + _count(repeated),
+            "repeated": more,
+            "within": round(seconds, 3),
+        }
+    if record.exc_info:
+        values["traceback"] = _traceback(record.exc_info)
+    return _encode(values)
+
+
+class Lines:
+    """Makes lines of records. ``now`` in monotonic seconds."""
+
+    def __init__(self, line_of: LineOf) -> None:
+        self._line_of = line_of
+        self._repeats: Repeats[tuple[logging.LogRecord, str]] = Repeats()
+
+    def __repr__(self) -> str:
+        return f"Lines({self._repeats})"
+
+    def of(self, record: logging.LogRecord, *, now: float) -> str | None:
+        """Give the line of a record; None: it was said lately, and is counted."""
+        words = clean(record.getMessage())
+        if not _is_change(record.msg) and not self._repeats.is_new(
+            (record.levelno, words), (record, words), now=now
+        ):
+            return None
+        return self._line_of(record, words, None)
+
+    def line(self, record: logging.LogRecord) -> str:
+        """Give the line of a record, whatever was said before."""
+        return self._line_of(record, clean(record.getMessage()), None)
+
+    def due(self, *, now: float) -> Iterator[str]:
+        """Give a line for all that was repeated and counted for long enough."""
+        return map(self._counted, self._repeats.due(now=now))
+
+    def rest(self, *, now: float) -> Iterator[str]:
+        """Give a line for all that was counted and not said yet."""
+        return map(self._counted, self._repeats.rest(now=now))
+
+    def _counted(self, of: tuple[Said[tuple[logging.LogRecord, str]], float]) -> str:
+        said, seconds = of
+        record, words = said.what
+        return self._line_of(record, words, (said.more, seconds))
+
+
+def _is_change(message: object) -> bool:
+    """Something is otherwise now, and it is in the journal: in the same words it is still news."""
+    return isinstance(message, Event) and not isinstance(message, SubmissionRefused)
+
+
+def _count(repeated: tuple[int, float]) -> str:
+    more, seconds = repeated
+    return f" ({more} more in {seconds:.0f} s)"

@@ -1,0 +1,131 @@
+"""An event as words and as plain values, alike in the log and in the export of the journal.
+
+Values come from the event's fields, never out of its words. An enum is its name, a time is UTC, a
+number that is none (NaN, infinity) is null. What was made for machines only is left out.
+"""
+
+import logging
+from collections.abc import Hashable
+from dataclasses import fields, is_dataclass
+from datetime import UTC, datetime
+from enum import Enum
+from functools import cache, lru_cache
+from math import isfinite
+from types import NoneType
+from typing import Any, cast
+
+from mav_tasks.store.codec import MONOTONIC
+from mav_tasks.tasks.events import (
+    Event,
+    QueuePaused,
+    SignaturesSeen,
+    SubmissionRefused,
+    TaskSubmitted,
+    VehicleNoted,
+)
+from mav_tasks.tasks.goal import Goal, Place
+from mav_tasks.tasks.task import Submitter, Task
+
+#: digests, the items of a plan as they came, how many intervals had which length, and times that
+#: the line itself has
+_LEFT_OUT = frozenset({"at", "submitted_at", "marks", "source", "spread"})
+_NAMES = {"task_id": "task", "submitter": "actor"}
+#: of these there may be several in one place: they say which
+_CHOICES = frozenset((*Goal.__args__, *Place.__args__))
+
+_PLAIN = frozenset({int, str, bool, NoneType})
+
+
+def values_of(event: Any, *, offset: float) -> dict[str, Any]:
+    """Give the values of an event, or of another dataclass that was logged, its kind first.
+
+    ``offset`` is UTC minus the seconds that the event's times are in.
+    """
+    values = {"event": type(event).__name__}
+    if isinstance(event, TaskSubmitted):
+        return values | _of_task(event.task, offset)
+    return values | _values(event, offset)
+
+
+def event_values(event: Event, *, offset: float) -> dict[str, Any]:
+    """Give what a JSON line says of an event: as in the log, but for what only a log has."""
+    line = {
+        "time": utc_text(event.at + offset),
+        "level": logging.getLevelName(level_of(event)).lower(),
+        "message": clean(str(event)),
+    }
+    return line | values_of(event, offset=offset)
+
+
+def level_of(event: Event) -> int:
+    """Give the log level of an event: what its operator should look at is a warning."""
+    if isinstance(event, SignaturesSeen):
+        return logging.DEBUG  # no part of the journal either
+    noteworthy = isinstance(event, SubmissionRefused | VehicleNoted | QueuePaused)
+    return logging.WARNING if noteworthy else logging.INFO
+
+
+def utc_text(utc: float) -> str | None:
+    """Give UTC seconds as ISO 8601 with milliseconds; None: it is no time."""
+    if not isfinite(utc):
+        return None
+    second, rest = divmod(round(utc * 1e6), 1_000_000)
+    text = _utc_second(second)
+    return text and f"{text}.{rest // 1000:03}Z"
+
+
+def clean(words: str) -> str:
+    """Give words without what a terminal would take for an order, on one line.
+
+    A client or a vehicle may have sent some of them.
+    """
+    if words.isprintable():
+        return words
+    return "".join(c if c.isprintable() else " " if c.isspace() else "" for c in words)
+
+
+@lru_cache(16)  # thousands of events a second have the same
+def _utc_second(second: int) -> str | None:
+    try:
+        return datetime.fromtimestamp(second, UTC).isoformat()[:19]
+    except (ValueError, OverflowError, OSError):  # in another aeon
+        return None
+
+
+def _of_task(task: Task, offset: float) -> dict[str, Any]:
+    values = {"task": task.id} | _values(task, offset)
+    del values["id"], values["progress"], values["timing"]  # there is none yet
+    return values
+
+
+def _values(record: Any, offset: float) -> dict[str, Any]:
+    return {
+        shown: _value(getattr(record, name), name, offset)
+        for name, shown in _shown(cast(Hashable, type(record)))
+    }
+
+
+@cache
+def _shown(kind: Hashable) -> tuple[tuple[str, str], ...]:
+    names = [field.name for field in fields(cast(Any, kind)) if field.name not in _LEFT_OUT]
+    return tuple((name, _NAMES.get(name, name)) for name in names)
+
+
+def _value(value: Any, name: str, offset: float) -> Any:
+    if type(value) in _PLAIN:
+        return value
+    if isinstance(value, float):
+        if name in MONOTONIC:
+            return utc_text(value + offset)
+        return value if isfinite(value) else None
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, Submitter):
+        return str(value)
+    if is_dataclass(value):
+        kind = {"kind": type(value).__name__} if type(value) in _CHOICES else {}
+        return kind | _values(value, offset)
+    if isinstance(value, tuple):
+        # the steps of a plan may be thousands: how many there are says enough
+        return len(value) if any(map(is_dataclass, value)) else list(value)
+    return value

@@ -1,0 +1,154 @@
+"""What vehicles say (STATUSTEXT) goes to the log. A witness: it reads, and nobody waits for it."""
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf
+
+from mav_tasks.engine.inputs import (
+    Input,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    PeerChanged,
+)
+from mav_tasks.engine.intake import Intake
+from mav_tasks.logs.rendering import clean
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.codec import DecodeCounts, Decoder
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.messages import Statustext
+from mav_tasks.mavlink.packet import MAGIC_V1, Packet
+from mav_tasks.services.text_receiver import Text, TextReceiver
+from mav_tasks.services.token_bucket import TokenBucket
+from mav_tasks.tasks.events import Event
+
+RATE = 10.0  # texts a second of one vehicle; beyond they are only counted
+BURST = 50  # at once: an autopilot that starts has much to say
+TELL = 30.0  # s, between two lines about what was left out
+
+TEXT = Statustext.id
+_V2_ID = TEXT.to_bytes(3, "little")  # how it stands in a MAVLink 2 header
+
+log = logging.getLogger("mav_tasks")
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleText:
+    """A text of a vehicle's component, for the log."""
+
+    vehicle: int
+    component: int
+    severity: MavSeverity
+    text: str
+
+    def __str__(self) -> str:
+        part = "" if self.component == AUTOPILOT else f", component {self.component},"
+        return f"vehicle {self.vehicle}{part} says: {self.text}"
+
+
+@dataclass(slots=True)
+class _Talk:
+    limit: TokenBucket
+    left_out: int = 0
+    tell_at: float = inf
+
+
+class VehicleTexts:
+    """Implements ``Witness``."""
+
+    def __init__(self) -> None:
+        self._links: dict[str, bool] = {}  # of vehicles; whether it is a stream
+        self._intake = Intake()
+        self._counts = DecodeCounts()
+        self._decoder = Decoder()
+        self._receiver = TextReceiver()
+        self._talks: dict[int, _Talk] = {}
+        self._due = inf
+
+    def __repr__(self) -> str:
+        return f"VehicleTexts({self._receiver}, {len(self._talks)} vehicles)"
+
+    def took_in(self, item: Input | None, *, now: float) -> None:
+        """Look for texts in what came."""
+        if now >= self._due:
+            self._handle_deadline(now)
+        match item:
+            case Packets() if item.link in self._links:
+                for packet in self._texts_in(item, now):
+                    self._receive(packet, now)
+            case LinkChanged(side=LinkSide.VEHICLES, up=True):
+                self._links[item.link] = item.is_stream
+                self._intake.change_link(item)
+            case LinkChanged():
+                self._links.pop(item.link, None)
+                self._intake.change_link(item)
+            case PeerChanged():
+                self._intake.change_peer(item)
+
+    def gave_out(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> None:
+        """Take no note: nobody says anything here."""
+
+    def close(self) -> None:
+        """Say what was not whole yet."""
+        self._handle_deadline(inf)
+
+    def _texts_in(self, item: Packets, now: float) -> Iterator[Packet]:
+        if not self._links[item.link]:
+            datagrams = [each for each in item.datagrams if _may_hold_text(each[1])]
+            if not datagrams:
+                return
+            item = Packets(item.link, datagrams)
+        for _, packet in self._intake.packets(item, self._counts, now=now):
+            if packet.message_id == TEXT:
+                yield packet
+
+    def _receive(self, packet: Packet, now: float) -> None:
+        message = self._decoder.decode(packet)
+        if not isinstance(message, Statustext):
+            return
+        talk = self._talks.get(packet.system_id)
+        if talk is None:
+            limit = TokenBucket(rate=RATE, burst=BURST, now=now)
+            talk = self._talks[packet.system_id] = _Talk(limit)
+        if not talk.limit.take(now=now):
+            talk.left_out += 1
+            talk.tell_at = min(talk.tell_at, now + TELL)
+        else:
+            for text in self._receiver.receive(packet.source, message, now=now):
+                _say(text)
+        self._plan()
+
+    def _handle_deadline(self, now: float) -> None:
+        for text in self._receiver.handle_deadline(now=now):
+            _say(text)
+        for vehicle, talk in self._talks.items():
+            if talk.left_out and now >= talk.tell_at:
+                log.warning("vehicle %d says too much: %d texts left out", vehicle, talk.left_out)
+                talk.left_out, talk.tell_at = 0, inf
+        self._plan()
+
+    def _plan(self) -> None:
+        tells = [talk.tell_at for talk in self._talks.values()]
+        self._due = min(self._receiver.next_deadline(), *tells, inf)
+
+
+def _may_hold_text(data: bytes) -> bool:
+    """Whether to look closer: most datagrams hold none, and splitting each one takes its time."""
+    return _V2_ID in data or (TEXT in data and MAGIC_V1 in data)
+
+
+def _say(text: Text) -> None:
+    words = clean(text.words).strip()
+    if words:
+        vehicle, component = text.sender
+        log.log(_level(text.severity), VehicleText(vehicle, component, text.severity, words))
+
+
+def _level(severity: MavSeverity) -> int:
+    if severity <= MavSeverity.ERROR:
+        return logging.ERROR
+    if severity == MavSeverity.WARNING:
+        return logging.WARNING
+    return logging.INFO if severity <= MavSeverity.INFO else logging.DEBUG
