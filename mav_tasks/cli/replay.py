@@ -1,0 +1,40 @@
+"""``mav-tasks replay``: does a recorded run decide the same once more?"""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mav_tasks.cli import exit_codes
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A record of decisions.")],
+    json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="The verdict only.")] = False,
+    keys: Annotated[
+        str, typer.Option(metavar="FILE", help="The key ring of a run with signatures.")
+    ] = "",
+) -> None:
+    """Run a record through the server's code again.
+
+    Shows what happened in it.
+
+    Exit code 0: all came as it is recorded, bit for bit; 1: something came otherwise; 2: the file
+    cannot be read.
+    """
+    from mav_tasks.key_ring.ring_file import load, path_of_ring  # noqa: PLC0415
+    from mav_tasks.recording.reading import read  # noqa: PLC0415
+    from mav_tasks.recording.replay import Replay  # noqa: PLC0415
+    from mav_tasks.recording.report import Report  # noqa: PLC0415
+
+    usable = load(path_of_ring(keys)).ring.usable if keys else ()
+    record = read(file)
+    report = Report(sys.stdout, as_json=json, quiet=quiet)
+    report.begin(record)
+    running = Replay(record, secrets={key.fingerprint: key.secret for key in usable})
+    for happened in running.events():
+        report.tell(happened)
+    report.conclude(record, running)
+    raise typer.Exit(exit_codes.DONE if running.difference is None else exit_codes.FAILED)

@@ -1,0 +1,168 @@
+"""A record of all that the engine was told, with what it made of it: see ``record_lines``."""
+
+import logging
+import platform
+import time
+from collections.abc import Iterator, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from mav_tasks.engine.inputs import Input, Outgoing
+from mav_tasks.errors import RecordError
+from mav_tasks.recording.backlog import MOST, PAUSE, ROOM_OF_PACKET, Backlog, room_of
+from mav_tasks.recording.new_files import new_file, stamp
+from mav_tasks.recording.record_file import RecordFile
+from mav_tasks.recording.record_lines import FORMAT, MAGIC, ROWS, LineWriter, Unwritable, dumps
+from mav_tasks.recording.surroundings import restored_to_json, settings_to_json
+from mav_tasks.recording.writing import WritingThread
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.restored import Restored
+
+log = logging.getLogger("mav_tasks")
+
+SUFFIX = ".decisions.gz"
+BLOCK = 1 << 15  # bytes of text, written at once
+
+CLOSED = "the run is over"
+TOO_LONG = "the record is as long as it may be"
+TOO_MUCH = "too much waited to be written"
+
+Entry = tuple[float, Input | None] | tuple[float, Sequence[Outgoing], Sequence[Event]]
+
+
+class Decisions:
+    """A witness that writes one record of the run; it ends early rather than have gaps."""
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: Settings,
+        restored: Restored | None,
+        *,
+        now: float,
+        size: int,
+        most_waiting: int = MOST,
+    ) -> None:
+        """Of an engine that gets these settings, ``restored`` and ``now``; ``size`` in bytes.
+
+        RecordError: there can be no file.
+        """
+        try:
+            fd, self.path, _ = new_file(folder, stamp(time.time()), 0, SUFFIX)
+        except OSError as error:
+            raise RecordError(f"no records can be kept in {folder}: {error.strerror}") from error
+        self._file = RecordFile(fd, size=size)
+        self._lines = LineWriter()
+        self._beginning = self._beginning_of(settings, restored, now)
+        self._backlog: Backlog[Entry] = Backlog(most_waiting)
+        self._why = ""  # nothing more is noted
+        self._has_ended = False
+        self._thread = WritingThread(str(self), write=self._write, end=self._finish)
+        self._thread.start()
+
+    def __repr__(self) -> str:
+        return f"Decisions({self._file}, {self._backlog})"
+
+    def __str__(self) -> str:
+        return f"record of decisions {self.path}"
+
+    def took_in(self, item: Input | None, *, now: float) -> None:
+        """Note what the engine is told."""
+        if not self._why and not self._backlog.put((now, item), room_of(item)):
+            self._why = TOO_MUCH
+
+    def gave_out(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> None:
+        """Note what it made of it."""
+        room = ROOM_OF_PACKET * (1 + len(packets) + len(events))
+        if not self._why and not self._backlog.put((now, packets, events), room):
+            self._why = TOO_MUCH
+
+    def close(self) -> None:
+        """Write what waits and the end mark, for a bounded time."""
+        self._thread.close()
+
+    def _write(self) -> None:
+        why = self._why  # before: all that was noted until then is in the backlog
+        self._write_lines(self._beginning)
+        self._beginning = iter(())
+        self._write_lines(self._noted())
+        if why:
+            self._end(why)
+
+    def _finish(self) -> None:
+        self._end(CLOSED)
+
+    def _noted(self) -> Iterator[str]:
+        for entry in self._backlog.taken():
+            if len(entry) == 2:
+                now, item = entry
+                yield self._lines.taken(item, now=now)
+            else:
+                now, packets, events = entry
+                yield self._lines.given(packets, events, now=now)
+
+    def _write_lines(self, lines: Iterator[str]) -> None:
+        block: list[str] = []
+        length = 0
+        why = ""
+        try:
+            for line in lines:
+                block.append(line)
+                length += len(line)
+                if length > BLOCK:
+                    self._write_block(block)
+                    block, length = [], 0
+                    time.sleep(PAUSE)  # of an earlier run there may be very many tasks
+        except Unwritable as mistake:
+            why = str(mistake)
+        if block:
+            self._write_block(block)
+        if why:
+            self._end(why)
+
+    def _write_block(self, block: Sequence[str]) -> None:
+        if self._has_ended:
+            return
+        text = "".join(f"{line}\n" for line in block).encode("ascii")
+        if not self._file.has_room_for(text):
+            self._end(TOO_LONG)
+            return
+        try:
+            self._file.write(text)
+        except OSError as error:
+            self._end(f"the disk failed: {error.strerror}")
+
+    def _end(self, why: str) -> None:
+        if self._has_ended:
+            return
+        self._has_ended = True
+        self._why = why
+        is_marked = self._file.end(why)
+        if why != CLOSED or not is_marked:
+            log.warning("%s ends%s: %s", self, "" if is_marked else " without a mark", why)
+
+    def _beginning_of(
+        self, settings: Settings, restored: Restored | None, now: float
+    ) -> Iterator[str]:
+        first = {
+            MAGIC: FORMAT,
+            "version": project_version(),
+            "python": platform.python_version(),
+            "machine": f"{platform.system()} {platform.machine()}",
+            "now": now,
+            "settings": settings_to_json(settings),
+            "restored": None if restored is None else restored_to_json(restored),
+            "rows": ROWS,
+        }
+        yield dumps(first)
+        for task in () if restored is None else restored.tasks:
+            yield self._lines.task(task)
+
+
+def project_version() -> str:
+    """Give the version of this package as it is installed."""
+    try:
+        return version("mav-tasks")
+    except PackageNotFoundError:
+        return "unknown"

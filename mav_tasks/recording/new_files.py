@@ -1,0 +1,59 @@
+"""Folders and files of records: names by the time of the start, and nobody else reads them."""
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+
+from mav_tasks.errors import RecordError
+
+FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC  # O_EXCL follows no symbolic link
+MOST_OF_A_NAME = 100_000
+
+
+def prepared(folder: str) -> Path:
+    """Make a folder if it is not there. RecordError: it cannot be written to."""
+    try:
+        path = Path(folder).expanduser().absolute()
+    except RuntimeError as error:  # of somebody who is not there
+        raise RecordError(f"no records can be kept in {folder}: {error}") from error
+    try:
+        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise RecordError(f"no records can be kept in {path}: it is no folder") from error
+    except OSError as error:
+        raise RecordError(f"no records can be kept in {path}: {error.strerror}") from error
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise RecordError(f"no records can be kept in {path}: it cannot be written to")
+    return path
+
+
+def stamp(utc: float) -> str:
+    """Give a time, seconds since 1970, as file names have it."""
+    return f"{datetime.fromtimestamp(max(utc, 0.0), UTC):%Y-%m-%dT%H-%M-%SZ}"
+
+
+def name_of(start: str, number: int, suffix: str) -> str:
+    """Give the name of one file of a run."""
+    return f"{start}.{number}{suffix}" if number else f"{start}{suffix}"
+
+
+def new_file(folder: Path, start: str, number: int, suffix: str) -> tuple[int, Path, int]:
+    """Make a file of the first free number from ``number`` on; gives descriptor, path and number.
+
+    OSError says why not.
+    """
+    while True:
+        path = folder / name_of(start, number, suffix)
+        try:
+            return os.open(path, FLAGS, 0o600), path, number
+        except FileExistsError:
+            number += 1
+            if number > MOST_OF_A_NAME:
+                raise
+
+
+def write_all(fd: int, data: bytes) -> None:
+    """Write all or raise OSError; what is written of it stays."""
+    left = memoryview(data)
+    while left:
+        left = left[os.write(fd, left) :]

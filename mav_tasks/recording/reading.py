@@ -1,0 +1,216 @@
+"""Reads a record of decisions back, as far as it goes. Anything may stand in such a file.
+
+Whatever is not a record of this version raises RecordError with one clear line; that the end is
+missing is no error: whoever wrote it crashed, or writes on.
+"""
+
+import stat
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+from itertools import islice
+from json import loads
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from mav_tasks.errors import RecordError
+from mav_tasks.recording.record_file import GZIP
+from mav_tasks.recording.record_lines import FORMAT, MAGIC, ROWS
+from mav_tasks.recording.surroundings import restored_of, settings_of
+from mav_tasks.settings import Settings
+from mav_tasks.store.codec import Decoder, Unreadable
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Task
+
+PIECE = 1 << 16  # bytes read at once
+TASKS_AT_ONCE = 5_000
+MOST_OF_A_LINE = 1 << 25  # bytes; a longer one is none of ours
+NOT_OURS = (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One line: ``number`` counts from 1, ``raw`` is its text without its end."""
+
+    number: int
+    raw: bytes
+    values: Sequence[Any]
+
+    @property
+    def kind(self) -> Any:
+        """What it says first: an input's kind, "deadline" or "out"."""
+        return self.values[0]
+
+    @property
+    def now(self) -> float:
+        """Monotonic seconds of the run."""
+        return self.values[1]  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One run, as far as it was recorded. ``why_it_ends`` is None if it ends without saying."""
+
+    path: Path
+    version: str
+    python: str
+    machine: str
+    now: float
+    settings: Settings
+    restored: Restored | None
+    lines: int
+    why_it_ends: str | None
+
+    def entries(self) -> Iterator[Entry]:
+        """Give what the engine took and gave, in order."""
+        begin = 1 + (0 if self.restored is None else len(self.restored.tasks))
+        for number, raw in islice(_numbered(self.path), begin, self.lines):
+            yield Entry(number, raw, _entry_values(self.path, number, raw))
+
+
+def read(path: Path) -> Record:
+    """Look through a whole record. RecordError: it is none, or damaged, or another version's."""
+    first = _first_line(path)
+    lines, why_it_ends = _measure(path)
+    count = 0
+    try:
+        if first["rows"] != {name: list(places) for name, places in ROWS.items()}:
+            raise RecordError(
+                f"{path}: recorded by version {first['version']}, whose events have another form"
+            )
+        for name in ("version", "python", "machine"):
+            _check_words(first[name])
+        if type(first["now"]) not in (int, float) or not isfinite(first["now"]):
+            raise ValueError("no time")
+        given = first["restored"]
+        count = 0 if given is None else given["tasks"]
+        return Record(
+            path=path,
+            version=first["version"],
+            python=first["python"],
+            machine=first["machine"],
+            now=first["now"],
+            settings=settings_of(first["settings"]),
+            restored=None if given is None else restored_of(given, _tasks(path, count)),
+            lines=lines,
+            why_it_ends=why_it_ends,
+        )
+    except NOT_OURS as error:
+        raise RecordError(f"{path}: its beginning cannot be understood: {_words(error)}") from error
+
+
+def _measure(path: Path) -> tuple[int, str | None]:
+    """Give the number of lines before the end mark, and what it says.
+
+    RecordError: the mark does not fit to what stands before it.
+    """
+    digest = blake2b(digest_size=16)
+    lines = 0
+    for number, raw in _numbered(path):
+        if raw.startswith(b'["end",'):
+            try:
+                _, why, count, given = loads(raw)
+                _check_words(why)
+            except NOT_OURS as error:
+                raise RecordError(f"{path}: line {number} is no end mark") from error
+            if (count, given) != (lines, digest.hexdigest()):
+                raise RecordError(f"{path}: it was changed after it had been written")
+            return lines, why
+        digest.update(raw + b"\n")
+        lines = number
+    return lines, None
+
+
+def _first_line(path: Path) -> dict[str, Any]:
+    for _, raw in _numbered(path):
+        try:
+            first = loads(raw)
+            if isinstance(first, dict) and MAGIC in first:
+                if first[MAGIC] == FORMAT:
+                    return first
+                raise RecordError(
+                    f"{path}: a record of format {first[MAGIC]}; this version reads {FORMAT}"
+                )
+        except NOT_OURS:
+            pass
+        break
+    raise RecordError(f"{path}: no record of decisions")
+
+
+def _tasks(path: Path, count: int) -> tuple[Task, ...]:
+    decoder = Decoder(ROWS, is_exact=True)
+    tasks: list[Task] = []
+    lines = islice(_numbered(path), 1, 1 + count)
+    while rows := [_row(path, number, raw) for number, raw in islice(lines, TASKS_AT_ONCE)]:
+        try:
+            tasks += decoder.values(Task, rows, offset=0.0)
+        except (*NOT_OURS, Unreadable) as error:
+            raise RecordError(f"{path}: tasks that cannot be understood: {error}") from error
+    if len(tasks) < count:
+        raise RecordError(f"{path}: it ends before the run began")
+    return tuple(tasks)
+
+
+def _row(path: Path, number: int, raw: bytes) -> list[Any]:
+    try:
+        kind, row = loads(raw)
+        if kind != "task":
+            raise ValueError(f"{kind!r}")
+    except NOT_OURS as error:
+        raise RecordError(f"{path}: line {number} is no task: {_words(error)}") from error
+    return row  # type: ignore[no-any-return]
+
+
+def _entry_values(path: Path, number: int, raw: bytes) -> Sequence[Any]:
+    try:
+        kind, now, *rest = loads(raw)
+        if type(now) not in (int, float) or not isinstance(kind, str):
+            raise ValueError("no time")
+    except NOT_OURS as error:
+        raise RecordError(f"{path}: line {number} cannot be understood: {_words(error)}") from error
+    return [kind, now, *rest]
+
+
+def _numbered(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Give the whole lines of a file; what follows the last of them is left out."""
+    begun = bytearray()
+    number = 0
+    for data in _inflated(path):
+        end, *lines = data.split(b"\n")
+        begun += end
+        if len(begun) > MOST_OF_A_LINE:
+            raise RecordError(f"{path}: line {number + 1} is too long for a record")
+        for following in lines:
+            number += 1
+            yield number, bytes(begun)
+            begun = bytearray(following)
+
+
+def _inflated(path: Path) -> Iterator[bytes]:
+    stream = zlib.decompressobj(GZIP)
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):  # it is read more than once
+            raise RecordError(f"{path}: not a file")
+        with path.open("rb") as file:
+            while piece := file.read(PIECE):
+                while piece and not stream.eof:
+                    yield stream.decompress(piece, PIECE)
+                    piece = stream.unconsumed_tail
+                if stream.unused_data:
+                    raise RecordError(f"{path}: there is more after its end")
+    except OSError as error:
+        raise RecordError(f"{path}: {error.strerror}") from error
+    except zlib.error as error:
+        raise RecordError(f"{path}: no record of decisions, or damaged: {error}") from error
+
+
+def _check_words(value: Any) -> None:
+    """Raise ValueError for what is no text, or would give orders to a terminal."""
+    if not isinstance(value, str) or not value.isprintable():
+        raise ValueError("no words")
+
+
+def _words(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}" if isinstance(error, KeyError) else str(error)

@@ -1,0 +1,209 @@
+"""The lines of a record of decisions: all that goes into an engine, and what it made of it.
+
+A record is a gzip file of lines of JSON; ``zcat`` shows it. The first line is an object: the number
+of this format, who wrote it where, ``now`` at the start in monotonic seconds, the settings, what
+the store gave back, and what the places of rows mean (``store/codec``). Then come, each an array::
+
+    ["task", row]                           of an earlier run, as many as the first line says
+    ["packets", now, link, [[peer, data in base64], ...]]
+    ["deadline", now]                       the engine is told that a deadline has come
+    ["link", now, ...], ["peer", ...]       the other inputs, with their fields in order
+    ["keys", now, [[name, role, ...], ...]] the key ring by its fingerprints: no secret is in a
+                                            record, a replay asks for the key ring
+    ["out", now, packets, digest, [row, ...]]   what the engine gave in one turn: how many packets
+                                            with BLAKE2b of all, and the events
+    ["end", why, lines, digest]             whoever wrote it came to its end; none after a crash
+
+Floats stand there exactly (their shortest form that reads back as the same bits; NaN, Infinity and
+-0.0 as Python's JSON writes them), and an integer is no float. Peers are text, numbers, or arrays
+of them, which are tuples. No clock but the run's own, no path and no hash of a process is in it.
+"""
+
+from binascii import a2b_base64, b2a_base64
+from collections.abc import Hashable, Mapping, Sequence
+from hashlib import blake2b
+from json import JSONEncoder
+from typing import Any, assert_never, get_args
+
+from mav_tasks.engine.inputs import (
+    Committed,
+    Congestion,
+    Input,
+    KeysChanged,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    PeerChanged,
+    SettingsChanged,
+    Shutdown,
+    StoreFailed,
+    WallClock,
+)
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.recording.surroundings import settings_of, settings_to_json
+from mav_tasks.store.codec import Encoder, format_of
+from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.task import Task
+
+FORMAT = 2
+MAGIC = "mav-tasks record"  # the key of the first line that has the number of the format
+MISSING = b"?"  # in place of a secret
+DIGEST = 8  # bytes of the digest of one turn's packets
+MOST_WAYS = 10_000  # links and peers of which the text is kept
+
+EVENTS: dict[str, type] = {kind.__name__: kind for kind in get_args(Event)}
+ROWS = format_of(*EVENTS.values(), Task)
+
+# Circles are looked for by an entry in a dict for each list: values have none.
+dumps = JSONEncoder(separators=(",", ":"), check_circular=False).encode
+
+
+class Unwritable(ValueError):
+    """A value that has no place in a record; the text says which."""
+
+
+class LineWriter:
+    """Makes lines, without their ends."""
+
+    def __init__(self) -> None:
+        self._encoder = Encoder(is_exact=True)
+        self._ways: dict[tuple[str, Hashable], bytes] = {}
+
+    def task(self, task: Task) -> str:
+        """Give the line of a task of an earlier run."""
+        return dumps(["task", self._encoder.row(task, offset=0.0)])
+
+    def taken(self, item: Input | None, *, now: float) -> str:
+        """Give the line of an input, or (None) of a deadline. Unwritable: a peer of no link."""
+        return dumps(_input_to_json(item, now))
+
+    def given(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> str:
+        """Give the line of what the engine gave in one turn."""
+        rows = [[type(event).__name__, *self._encoder.row(event, offset=0.0)] for event in events]
+        return dumps(["out", now, len(packets), self._digest(packets), rows])
+
+    def _digest(self, packets: Sequence[Outgoing]) -> str:
+        parts: list[bytes] = []
+        for link, peer, data, is_first in packets:
+            parts += (self._way(link, peer), b"!" if is_first else b".", data)
+        return blake2b(b"".join(parts), digest_size=DIGEST).hexdigest()
+
+    def _way(self, link: str, peer: Hashable) -> bytes:
+        way = self._ways.get((link, peer))
+        if way is None:
+            if len(self._ways) >= MOST_WAYS:
+                self._ways.clear()
+            way = self._ways[link, peer] = dumps([link, _peer_to_json(peer)]).encode()
+        return way
+
+
+def input_of(line: Sequence[Any]) -> Input | None:
+    """Give the input of a line, None for a deadline.
+
+    KeyError, TypeError, ValueError: it is none.
+    """
+    kind, _, *values = line
+    match kind:
+        case "deadline":
+            return None
+        case "packets":
+            link, datagrams = values
+            return Packets(
+                link,
+                [(peer_of(peer), a2b_base64(data, strict_mode=True)) for peer, data in datagrams],
+            )
+        case "link":
+            link, side, up, peers, *rest = values
+            return LinkChanged(link, LinkSide[side], up, tuple(map(peer_of, peers)), *rest)
+        case "keys":
+            (keys,) = values
+            return KeysChanged(tuple(_key_of(*each) for each in keys))
+        case "peer":
+            link, peer, up = values
+            return PeerChanged(link, peer_of(peer), up)
+        case "congestion":
+            link, peer, is_congested = values
+            return Congestion(link, peer_of(peer), is_congested)
+        case "settings":
+            (settings,) = values
+            return SettingsChanged(settings_of(settings))
+        case "committed" | "store failed" | "wall clock" | "shutdown":
+            return _SIMPLE[kind](*values)
+        case _:
+            raise ValueError(f"{kind!r} is unknown to this version")
+
+
+def described(row: Sequence[Any]) -> str:
+    """Give an event's row in words, with the names of its places."""
+    name, *values = row
+    return f"{name}({', '.join(f'{p}={v!r}' for p, v in zip(ROWS[name], values, strict=True))})"
+
+
+_SIMPLE: Mapping[str, type[Committed | StoreFailed | WallClock | Shutdown]] = {
+    "committed": Committed,
+    "store failed": StoreFailed,
+    "wall clock": WallClock,
+    "shutdown": Shutdown,
+}
+
+
+def _input_to_json(item: Input | None, now: float) -> list[Any]:
+    match item:
+        case None:
+            return ["deadline", now]
+        case Packets(link=link, datagrams=datagrams):
+            pairs = [[_peer_to_json(peer), _base64(data)] for peer, data in datagrams]
+            return ["packets", now, link, pairs]
+        case LinkChanged():
+            peers = [_peer_to_json(peer) for peer in item.peers]
+            end = [peers, item.is_local, item.is_stream, item.takes_unsigned, item.key]
+            return ["link", now, item.link, item.side.name, item.up, *end]
+        case KeysChanged(keys=keys):
+            told = [[key.name, key.role, key.fingerprint, bool(key.secret)] for key in keys]
+            return ["keys", now, told]
+        case PeerChanged(link=link, peer=peer, up=up):
+            return ["peer", now, link, _peer_to_json(peer), up]
+        case Congestion(link=link, peer=peer, is_congested=is_congested):
+            return ["congestion", now, link, _peer_to_json(peer), is_congested]
+        case SettingsChanged(settings=settings):
+            return ["settings", now, settings_to_json(settings)]
+        case Committed(through=through):
+            return ["committed", now, through]
+        case StoreFailed(text=text):
+            return ["store failed", now, text]
+        case WallClock(offset=offset):
+            return ["wall clock", now, offset]
+        case Shutdown():
+            return ["shutdown", now]
+        case _:
+            assert_never(item)
+
+
+def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool) -> Key:
+    """Give a key without its secret, which is in no record; MISSING stands for one that it had."""
+    return Key(name, MISSING if is_in_use else b"", role, fingerprint)
+
+
+def _base64(data: bytes) -> str:
+    return b2a_base64(data, newline=False).decode("ascii")
+
+
+def _peer_to_json(peer: Hashable) -> Hashable:
+    parts = peer if isinstance(peer, tuple) else (peer,)
+    if not all(type(part) in (str, int) for part in parts):
+        raise Unwritable(f"a peer of another kind than links have: {peer!r}")
+    return peer  # JSON makes an array of a tuple
+
+
+def peer_of(value: Any) -> Hashable:
+    """Give the peer that a line names."""
+    if isinstance(value, list):
+        return tuple(map(_plain, value))
+    return _plain(value)
+
+
+def _plain(value: Any) -> str | int:
+    if type(value) not in (str, int):
+        raise TypeError(f"no peer: {value!r}")
+    return value  # type: ignore[no-any-return]

@@ -1,0 +1,172 @@
+"""Feeds a record through a fresh engine, and says whether it decides the same, bit for bit."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from json import loads
+from typing import Any
+
+from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import KeysChanged, Outgoing, WallClock
+from mav_tasks.errors import RecordError
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.recording.decisions import CLOSED
+from mav_tasks.recording.reading import NOT_OURS, Entry, Record
+from mav_tasks.recording.record_lines import MISSING, LineWriter, described, dumps, input_of
+from mav_tasks.tasks.events import Event
+
+MOST_NAMES = 12  # of packets, in words
+
+
+@dataclass(frozen=True, slots=True)
+class Happened:
+    """An event at its time; ``utc`` is seconds since 1970, None while nobody had told the time."""
+
+    now: float
+    utc: float | None
+    event: Event
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The first thing that came otherwise, in words; ``line`` is that of the input it followed."""
+
+    line: int
+    kind: str
+    now: float
+    expected: str
+    came: str
+
+
+class Replay:
+    """One run of an engine on a record. What it counts and finds is complete after ``events``."""
+
+    def __init__(self, record: Record, *, secrets: Mapping[str, bytes] | None = None) -> None:
+        """``secrets`` of keys by fingerprint: a record has none."""
+        self._record = record
+        self._secrets = secrets or {}
+        self._lines = LineWriter()
+        self._utc_offset: float | None = None
+        self._last: Entry | None = None  # the input before
+        self.inputs = 0
+        self.packets = 0
+        self.event_count = 0
+        self.difference: Difference | None = None
+        #: the engine failed at the very last input, as it seems to have done in the run
+        self.failure = ""
+
+    def __repr__(self) -> str:
+        return f"Replay({self._record.path}, {self.inputs} inputs, {self.difference})"
+
+    def events(self) -> Iterator[Happened]:
+        """Replay, and give each event that comes as it is recorded, up to the first difference.
+
+        RecordError: a line cannot be understood.
+        """
+        record = self._record
+        engine = Engine(record.settings, now=record.now, restored=record.restored)
+        for entry in record.entries():
+            if self.failure:
+                self._differs("the run went on", f"the engine failed: {self.failure}")
+                self.failure = ""
+                return
+            if entry.kind == "out":
+                yield from self._compare(engine, entry)
+                if self.difference is not None:
+                    return
+            else:
+                self._feed(engine, entry)
+        if record.why_it_ends == CLOSED and not self.failure:
+            self._look_for_more(engine)
+
+    def _feed(self, engine: Engine, entry: Entry) -> None:
+        try:
+            item = input_of(entry.values)
+        except NOT_OURS as error:
+            words = f"{self._record.path}: line {entry.number} cannot be understood: {error}"
+            raise RecordError(words) from error
+        self._last = entry
+        self.inputs += 1
+        if isinstance(item, WallClock):
+            self._utc_offset = item.offset
+        elif isinstance(item, KeysChanged):
+            item = KeysChanged(tuple(map(self._whole, item.keys)))
+        try:
+            if item is None:
+                engine.handle_deadline(now=entry.now)
+            else:
+                engine.handle(item, now=entry.now)
+        except Exception as mistake:  # noqa: BLE001 - the engine's own, which a record may be about
+            self.failure = f"{type(mistake).__name__}: {mistake}"
+
+    def _whole(self, key: Key) -> Key:
+        if key.secret != MISSING:
+            return key
+        secret = self._secrets.get(key.fingerprint)
+        if secret is None:
+            words = f"signed with key {key.name} ({key.fingerprint}): its key ring is needed"
+            raise RecordError(f"{self._record.path}: {words}")
+        return replace(key, secret=secret)
+
+    def _compare(self, engine: Engine, entry: Entry) -> Iterator[Happened]:
+        packets, events = engine.take_packets(), engine.take_events()
+        came = self._lines.given(packets, events, now=entry.now)
+        if came.encode("ascii") != entry.raw:
+            self._explain(entry, came, packets)
+            return
+        self.packets += len(packets)
+        self.event_count += len(events)
+        for event in events:
+            utc = None if self._utc_offset is None else entry.now + self._utc_offset
+            yield Happened(entry.now, utc, event)
+
+    def _look_for_more(self, engine: Engine) -> None:
+        """At the end of a whole run nothing is left."""
+        packets, events = engine.take_packets(), engine.take_events()
+        if packets or events:
+            self._differs("nothing more", _in_words(packets, [str(event) for event in events]))
+
+    def _explain(self, entry: Entry, came: str, packets: Sequence[Outgoing]) -> None:
+        try:
+            _, _, count, digest, rows = entry.values
+            *_, given_digest, given_rows = loads(came)
+            for index in range(max(len(rows), len(given_rows))):
+                one, other = rows[index : index + 1], given_rows[index : index + 1]
+                if dumps(one) != dumps(other):
+                    self._differs(_event_in_words(one), _event_in_words(other))
+                    return
+            if (count, digest) != (len(packets), given_digest):
+                expected = f"{count} packets (digest {digest})"
+                self._differs(expected, f"{_in_words(packets, [])} (digest {given_digest})")
+                return
+        except NOT_OURS as error:
+            words = f"{self._record.path}: line {entry.number} cannot be understood: {error}"
+            raise RecordError(words) from error
+        self._differs(entry.raw.decode("ascii", "replace"), came)
+
+    def _differs(self, expected: str, came: str) -> None:
+        last = self._last
+        self.difference = Difference(
+            line=0 if last is None else last.number,
+            kind="start" if last is None else last.kind,
+            now=self._record.now if last is None else last.now,
+            expected=expected,
+            came=came,
+        )
+
+
+def _event_in_words(rows: Sequence[Sequence[Any]]) -> str:
+    return described(rows[0]) if rows else "no event"
+
+
+def _in_words(packets: Sequence[Outgoing], events: Sequence[str]) -> str:
+    names = [_name(outgoing.data) for outgoing in packets[:MOST_NAMES]]
+    more = ["…"] if len(packets) > MOST_NAMES else []
+    said = f"{len(packets)} packets: {', '.join([*names, *more])}" if packets else "0 packets"
+    return "; ".join([said, *events])
+
+
+def _name(data: bytes) -> str:
+    number = split_datagram(data)[0].message_id
+    return str(m.ALL[number].msgname) if number in m.ALL else str(number)

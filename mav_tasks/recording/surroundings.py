@@ -1,0 +1,85 @@
+"""Settings and what a store gave back, as values for JSON and back, exactly.
+
+Tasks are rows of their own (``record_lines``): there may be a hundred thousand.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, get_args, get_origin, get_type_hints
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import SignatureTime
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Task
+
+
+def settings_to_json(settings: Any) -> Any:
+    """Give settings, or a part of them, by name."""
+    if is_dataclass(settings):
+        return {
+            field.name: settings_to_json(getattr(settings, field.name))
+            for field in fields(settings)
+        }
+    if isinstance(settings, tuple):
+        return [settings_to_json(each) for each in settings]
+    return dict(settings) if isinstance(settings, Mapping) else settings
+
+
+def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
+    """Give settings back; one that is missing has its default. ValueError: one is unknown."""
+    hints = get_type_hints(kind)
+    unknown = sorted(set(values) - set(hints))
+    if unknown:
+        raise ValueError(f"{kind.__name__}.{unknown[0]} is unknown to this version")
+    return kind(**{name: _setting_of(value, hints[name]) for name, value in values.items()})
+
+
+def _setting_of(value: Any, hint: Any) -> Any:
+    if is_dataclass(hint):
+        return settings_of(value, hint)
+    if get_origin(hint) is tuple:
+        (each, _) = get_args(hint)  # all are tuple[kind, ...]
+        return tuple(_setting_of(one, each) for one in value)
+    return value
+
+
+def restored_to_json(restored: Restored) -> dict[str, Any]:
+    """Give all but the tasks, of which there is their number; mappings in their order."""
+    return {
+        "tasks": len(restored.tasks),
+        "next_id": restored.next_id,
+        "paused": [[vehicle, int(reason)] for vehicle, reason in restored.paused.items()],
+        "uids": list(restored.uids.items()),
+        "speeds": list(restored.speeds.items()),
+        "plans": [[*key, *plan] for key, plan in restored.plans.items()],
+        "parameters": list(restored.parameters.items()),
+        "signatures": [
+            [time.key, time.link_id, time.system_id, time.component_id, time.timestamp]
+            for time in restored.signatures
+        ],
+        "signed_until": restored.signed_until,
+        "ended_well": restored.ended_well,
+        "idle": restored.idle,
+        "wall_offset": restored.wall_offset,
+    }
+
+
+def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
+    """Give it back. KeyError, TypeError or ValueError: there is something else."""
+    return Restored(
+        tasks=tasks,
+        next_id=values["next_id"],
+        paused={vehicle: TaskReason(reason) for vehicle, reason in values["paused"]},
+        uids=dict(values["uids"]),
+        speeds=dict(values["speeds"]),
+        plans={
+            (vehicle, kind): (plan_id, source) for vehicle, kind, plan_id, source in values["plans"]
+        },
+        parameters=dict(values["parameters"]),
+        signatures=tuple(SignatureTime(*time) for time in values["signatures"]),
+        signed_until=values["signed_until"],
+        ended_well=values["ended_well"],
+        idle=values["idle"],
+        wall_offset=values["wall_offset"],
+    )

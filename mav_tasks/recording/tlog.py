@@ -1,0 +1,121 @@
+"""A telemetry log that any ground station opens: before each packet its time, 8 bytes big-endian.
+
+What cannot be written is counted and lost: nobody waits for it.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from mav_tasks.engine.inputs import (
+    Input,
+    LinkChanged,
+    Outgoing,
+    Packets,
+    PeerChanged,
+    WallClock,
+)
+from mav_tasks.recording.backlog import MOST, ROOM_OF_PACKET, SMALL, Backlog, room_of
+from mav_tasks.recording.losses import Losses
+from mav_tasks.recording.new_files import write_all
+from mav_tasks.recording.tlog_content import TlogContent
+from mav_tasks.recording.tlog_files import TlogFiles
+from mav_tasks.recording.writing import WritingThread
+from mav_tasks.tasks.events import Event
+
+RETRY = 1.0  # s, until a disk that failed is tried again
+AT_ONCE = 1_000  # packets, written before more are looked at
+
+Entry = tuple[float, Input | Sequence[Outgoing]]
+
+
+class Tlog:
+    """A witness that writes telemetry logs into a folder."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        size: int,
+        count: int,
+        component_id: int,
+        most_waiting: int = MOST,
+        write: Callable[[int, bytes], None] = write_all,
+    ) -> None:
+        """``size`` in bytes of one file, ``count`` of files; ``component_id`` is the server's."""
+        self._name = f"telemetry log in {folder}"
+        self._backlog: Backlog[Entry] = Backlog(most_waiting)
+        self._content = TlogContent(component_id=component_id)
+        self._files = TlogFiles(folder, size=size, count=count, write=write)
+        self._too_many = Losses(self._name)
+        self._unwritten = Losses(self._name)
+        self._retry_at = 0.0  # monotonic s
+        self._thread = WritingThread(self._name, write=self._write, end=self._end)
+        self._thread.start()
+
+    def __repr__(self) -> str:
+        return f"Tlog({self._files}, {self._backlog})"
+
+    def __str__(self) -> str:
+        return self._name
+
+    def took_in(self, item: Input | None, *, now: float) -> None:
+        """Note what came, and who is there."""
+        if isinstance(item, Packets):
+            if not self._backlog.put((now, item), room_of(item)):
+                self._too_many.lose(len(item.datagrams), "too much waits to be written")
+        elif isinstance(item, WallClock | LinkChanged | PeerChanged):
+            self._backlog.put((now, item), SMALL)
+
+    def gave_out(
+        self,
+        packets: Sequence[Outgoing],
+        events: Sequence[Event],  # noqa: ARG002
+        *,
+        now: float,
+    ) -> None:
+        """Note what is sent; events have no place in a telemetry log."""
+        if packets and not self._backlog.put((now, packets), ROOM_OF_PACKET * len(packets)):
+            self._too_many.lose(len(packets), "too much waits to be written")
+
+    def close(self) -> None:
+        """Write what waits, for a bounded time."""
+        self._thread.close()
+
+    def _write(self) -> None:
+        packets: list[bytes] = []
+        now = 0.0
+        is_well = True
+        for now, item in self._backlog.taken():
+            if isinstance(item, Sequence):
+                packets += self._content.of_output(item, now=now)
+            else:
+                packets += self._content.of_input(item, now=now)
+            if len(packets) >= AT_ONCE:
+                is_well = self._keep(packets, utc=self._content.utc(now))
+                packets = []
+        if packets:
+            is_well = self._keep(packets, utc=self._content.utc(now))
+        if is_well:
+            self._too_many.over()
+
+    def _keep(self, packets: Sequence[bytes], *, utc: float) -> bool:
+        """Write packets, or lose them."""
+        why = "the disk takes nothing"
+        kept = self._files.kept
+        if time.monotonic() >= self._retry_at:
+            try:
+                self._files.write(packets, utc=utc)
+            except OSError as error:
+                self._retry_at = time.monotonic() + RETRY
+                why = str(error.strerror or error)
+            else:
+                self._unwritten.over()
+                return True
+        self._unwritten.lose(len(packets) - (self._files.kept - kept), why)
+        return False
+
+    def _end(self) -> None:
+        self._unwritten.end()
+        self._too_many.end()
+        self._files.close()

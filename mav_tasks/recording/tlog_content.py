@@ -1,0 +1,111 @@
+"""Which packets stand in a telemetry log: every packet once, as far as that can be told.
+
+What is received is there, of vehicles and of clients, and what is sent to vehicles. Of what is sent
+to clients there is only what the server says itself: the telemetry that it passes on is there
+already as it came.
+"""
+
+import struct
+from collections.abc import Iterator, Sequence
+
+from mav_tasks.engine.inputs import (
+    Input,
+    LinkChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    Peer,
+    PeerChanged,
+    WallClock,
+)
+from mav_tasks.engine.intake import Intake
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.codec import DecodeCounts, crc_fits
+from mav_tasks.mavlink.packet import HEADER_V1, HEADER_V2, MAGIC_V2
+
+_stamped = struct.Struct(">Q").pack  # microseconds since 1970
+
+
+class TlogContent:
+    """Makes of what the engine takes and gives the packets of the log, each with its time."""
+
+    def __init__(self, *, component_id: int) -> None:
+        """``component_id`` is the server's."""
+        self._component_id = component_id
+        self._intake = Intake()
+        self._counts = DecodeCounts()  # kept for nobody: the engine has its own
+        self._vehicle_links: set[str] = set()
+        self._wall_offset = 0.0
+        self._now = 0.0
+        self._heard: set[bytes] = set()  # what vehicles said at ``_now``, without its number
+
+    def utc(self, now: float) -> float:
+        """Give the wall clock's time, seconds since 1970."""
+        return now + self._wall_offset
+
+    def of_input(self, item: Input, *, now: float) -> Iterator[bytes]:
+        """Give what an input adds to the log."""
+        match item:
+            case Packets():
+                yield from self._received(item, now=now)
+            case WallClock(offset=offset):
+                self._wall_offset = offset
+            case LinkChanged(link=link, side=side):
+                self._intake.change_link(item)
+                if side is LinkSide.VEHICLES:
+                    self._vehicle_links.add(link)
+            case PeerChanged():
+                self._intake.change_peer(item)
+
+    def of_output(self, packets: Sequence[Outgoing], *, now: float) -> Iterator[bytes]:
+        """Give what stands in the log of the packets of one turn."""
+        when = self._when(now)
+        told: dict[bytes, tuple[str, Peer]] = {}
+        for link, peer, data, _ in packets:
+            if link in self._vehicle_links or self._is_news(data, (link, peer), told):
+                yield when + data
+
+    def _received(self, item: Packets, *, now: float) -> Iterator[bytes]:
+        if now != self._now:
+            self._now = now
+            self._heard.clear()
+        when = self._when(now)
+        from_vehicles = item.link in self._vehicle_links
+        for _, packet in self._intake.packets(item, self._counts, now=now):
+            if crc_fits(packet):
+                if from_vehicles:
+                    self._heard.add(_words(packet.raw))
+                yield when + packet.raw
+
+    def _is_news(
+        self, data: bytes, to: tuple[str, Peer], told: dict[bytes, tuple[str, Peer]]
+    ) -> bool:
+        """Whether a packet to a client is the server's own, and no copy of what another got.
+
+        Some is said in the name of the autopilot, as answers are; but heartbeats in its name are
+        always passed on, now and then changed, or shown again to who has just come.
+        """
+        component_id, message_id = _head(data)
+        words = _words(data)
+        if component_id != self._component_id and (
+            message_id == m.Heartbeat.id or words in self._heard
+        ):
+            return False
+        return message_id in m.TARGETED or told.setdefault(words, to) == to
+
+    def _when(self, now: float) -> bytes:
+        return _stamped(max(0, round(self.utc(now) * 1e6)))
+
+
+def _head(raw: bytes) -> tuple[int, int]:
+    """Give who of its system sent a packet, and the message's id."""
+    if raw[0] == MAGIC_V2:
+        return raw[6], raw[7] | raw[8] << 8 | raw[9] << 16
+    return raw[4], raw[5]
+
+
+def _words(raw: bytes) -> bytes:
+    """Give a packet's source, message id and payload: all that passing it on leaves as it is."""
+    if raw[0] == MAGIC_V2:
+        return raw[5 : HEADER_V2 + raw[1]]
+    return raw[3 : HEADER_V1 + raw[1]]

@@ -1,0 +1,109 @@
+"""The files of a telemetry log: one after the other, each of a bounded size, the last few kept."""
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from mav_tasks.recording.new_files import new_file, stamp, write_all
+
+SUFFIX = ".tlog"
+OURS = re.compile(r"(\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ)(?:\.(\d+))?\.tlog")
+CHUNK = 1 << 16  # bytes written at once
+
+
+class TlogFiles:
+    """Written by one thread. OSError leaves ``write``; what was kept before that is whole."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        size: int,
+        count: int,
+        write: Callable[[int, bytes], None] = write_all,
+    ) -> None:
+        self._folder = folder
+        self._size = size
+        self._count = count
+        self._write_all = write
+        self._start = ""  # of the run, as names have it
+        self._number = -1
+        self._fd: int | None = None
+        self._path = folder
+        self._written = 0  # bytes of whole packets in this file
+        self.kept = 0  # packets, in all files
+
+    def __repr__(self) -> str:
+        return f"TlogFiles({self._path}, {self._written} bytes, {self.kept} packets)"
+
+    def write(self, packets: Sequence[bytes], *, utc: float) -> None:
+        """Write packets, each with its time before it; ``utc`` names the first file."""
+        chunk: list[bytes] = []
+        length = 0
+        for packet in packets:
+            fits = self._fd is not None and self._written + length + len(packet) <= self._size
+            if chunk and (length > CHUNK or not fits):
+                self._keep(chunk, utc=utc)
+                chunk, length = [], 0
+            chunk.append(packet)
+            length += len(packet)
+        if chunk:
+            self._keep(chunk, utc=utc)
+
+    def close(self) -> None:
+        """Close the file; nothing is kept after that."""
+        if self._fd is not None:
+            os.close(self._fd)
+            self._fd = None
+
+    def _keep(self, chunk: Sequence[bytes], *, utc: float) -> None:
+        data = b"".join(chunk)
+        is_full = self._written > 0 and self._written + len(data) > self._size
+        if self._fd is None or is_full or self._is_removed(self._fd):
+            self._begin(utc)
+        assert self._fd is not None
+        try:
+            self._write_all(self._fd, data)
+        except OSError:
+            self._cut_back(self._fd)
+            raise
+        self._written += len(data)
+        self.kept += len(chunk)
+
+    def _begin(self, utc: float) -> None:
+        self.close()
+        self._start = self._start or stamp(utc)
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # may be gone meanwhile
+        self._fd, self._path, self._number = new_file(
+            self._folder, self._start, self._number + 1, SUFFIX
+        )
+        self._written = 0
+        self._forget_oldest()
+
+    def _is_removed(self, fd: int) -> bool:
+        """Whether nobody can find the file any more: somebody made room, or another server did."""
+        return os.fstat(fd).st_nlink == 0
+
+    def _cut_back(self, fd: int) -> None:
+        """Leave no torn packet behind: readers lose their way in it."""
+        try:
+            os.ftruncate(fd, self._written)
+            os.lseek(fd, self._written, os.SEEK_SET)
+        except OSError:  # then what comes next stands in another file
+            self.close()
+
+    def _forget_oldest(self) -> None:
+        """Remove what is too much of what bears names such as ours, and nothing else."""
+        found = [
+            ((match[1], int(match[2] or 0)), path)
+            for path in self._folder.iterdir()
+            if (match := OURS.fullmatch(path.name)) is not None
+            and path != self._path
+            and path.is_file()
+            and not path.is_symlink()
+        ]
+        for _, path in sorted(found)[: max(0, len(found) + 1 - self._count)]:
+            with suppress(OSError):  # it is tried again with the next file
+                path.unlink()

@@ -1,0 +1,166 @@
+"""A recorded world is replayed in another process, with other hashes: every event is the same."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from json import loads
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.links.memory import Conditions
+from mav_tasks.settings import Clients, Queueing, Settings
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import rc_override
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.store import LateStore, PromptSqliteStore
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
+
+HASHES = "12345"  # PYTHONHASHSEED of the other process; this one's is random
+UTC = 1.8e9  # s
+RELEASE, AGAIN = 54013, 0
+
+
+def one_rover(make_world: MakeWorld, folder: Path) -> World:
+    net = Conditions(delay=0.02, jitter=0.02, loss=0.05, duplication=0.05)
+    settings = Settings(clients=Clients(priorities={"255/190": 7}))
+    world = make_world(records=folder, conditions=net, settings=settings, seed=3)
+    for number, priority in enumerate((3, 8, 5), 1):
+        world.client.move(0.3 * number, priority=priority, nonce=number, repeats=(0.0, 0.5, 1.0))
+        world.run(0.1)
+    world.until(lambda: all(t.state is S.COMPLETED for t in world.tasks()), within=60)
+    return world
+
+
+def many_rovers(make_world: MakeWorld, folder: Path) -> World:
+    world = make_world(records=folder, rovers=4)
+    other = world.add_client("script", system_id=245)
+    for number in range(1, 5):
+        world.client.move(0.5, target=(number, 191))
+        other.rotate(45.0 * number, target=(number, 191))
+    world.until_idle(tasks=8)
+    return world
+
+
+def plans(make_world: MakeWorld, folder: Path) -> World:
+    world = make_world(records=folder, persona=PROMPT_PX4)
+    items = [Item(16, **at(0.0, 0.0), frame=0), Item(16, **at(1.0, 0.0)), Item(16, **at(1.0, 1.0))]
+    upload = Upload(world.client, items, target=(1, 1))
+    world.until(lambda: upload.result is not None, within=5)
+    world.client.command(300, target=(1, 1))
+    world.until_state(1, S.COMPLETED, within=60)
+    return world
+
+
+def stop_and_takeover(make_world: MakeWorld, folder: Path) -> World:
+    world = make_world(records=folder)
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    world.client.rotate(90)
+    world.run(1)
+    world.client.stop()
+    world.run(2)
+    world.client.proceed()
+    world.run(2)
+    world.client.send(rc_override(1500, 1500, 1700, 1500))
+    world.run(1)
+    world.operator_mode(Mode.MANUAL)
+    world.run(1)
+    world.fault(Faults(silent=True))
+    world.run(5)
+    return world
+
+
+def parameters(make_world: MakeWorld, folder: Path) -> World:
+    world = make_world(records=folder)
+    message = common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 0.3, 9)
+    world.client.send(message)
+    world.client.send(common.MAVLink_param_request_list_message(1, 191))
+    world.run(0.5)
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    return world
+
+
+def failing_store(make_world: MakeWorld, folder: Path) -> World:
+    store = LateStore()
+    world = make_world(records=folder, store=store)
+    store.delay = 0.2
+    world.client.move(0.5)
+    world.run(1)
+    store.fail("store x: the disk is full")
+    world.run(0.1)
+    world.client.move(0.5, nonce=9)
+    world.until_idle(tasks=1)
+    return world
+
+
+def restarted(make_world: MakeWorld, folder: Path) -> World:
+    store = PromptSqliteStore(folder / "tasks.sqlite3", wall_offset=UTC)
+    settings = Settings(queueing=Queueing(preemption_gap=3))
+    world = make_world(records=folder, store=store, settings=settings)
+    world.client.send(common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 0.4, 9))
+    upload = Upload(world.client, [Item(16, **at(0.0, 0.0), frame=0), Item(16, **at(1.0, 0.0))])
+    world.until(lambda: upload.result is not None, within=5)
+    world.client.move(2)
+    world.run(3)
+    world.client.rotate(90, nonce=5)
+    world.run(0.5)
+    world.end_server()
+    store.close()
+    world.run(6)
+    later = PromptSqliteStore(folder / "tasks.sqlite3", wall_offset=UTC)
+    world.start_server(later, later.load())
+    world.run(2.5)
+    world.client.command(RELEASE, 2, AGAIN)
+    world.run(0.2)
+    world.client.proceed()
+    world.until(lambda: world.state(3)[0] is S.COMPLETED, within=60)
+    later.close()
+    return world
+
+
+WORLDS: dict[str, Callable[[MakeWorld, Path], World]] = {
+    each.__name__: each
+    for each in (
+        one_rover,
+        many_rovers,
+        plans,
+        stop_and_takeover,
+        parameters,
+        failing_store,
+        restarted,
+    )
+}
+
+
+def replayed(path: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", "replay", str(path), *options],
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+        env={**os.environ, "PYTHONHASHSEED": HASHES},
+    )
+
+
+@pytest.mark.parametrize("kind", WORLDS)
+def test_a_recorded_world_decides_the_same_again(
+    make_world: MakeWorld, tmp_path: Path, kind: str
+) -> None:
+    world = WORLDS[kind](make_world, tmp_path)
+    told = [str(event) for event in world.server.store.events]  # type: ignore[attr-defined]
+    for path in world.end_records():
+        done = replayed(path, "--json")
+        *events, verdict = map(loads, done.stdout.splitlines())
+        assert (done.returncode, verdict["verdict"], done.stderr) == (0, "same", "")
+        assert verdict["why_it_ends"] == "the run is over"
+        assert verdict["events"] == len(events) > 0
+    assert [event["message"] for event in events] == told
