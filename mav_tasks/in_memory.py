@@ -3,13 +3,19 @@
 It is the same engine, store and pump as the runner's; only sockets, clock and signals are missing.
 """
 
+from collections.abc import Mapping, Sequence
+
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import LinkSide, Outgoing, Packets
+from mav_tasks.engine.inputs import KeysChanged, LinkSide, Outgoing, Packets, Shutdown, WallClock
 from mav_tasks.links.memory import MemoryLink, MemoryNet
-from mav_tasks.runner import Pump, link_changed
+from mav_tasks.links.policy import LinkPolicy
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.pump import Pump
+from mav_tasks.runner import TAKES_ALL, link_changed
 from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore, Store
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.witness import Witness
 
 CLIENT_LINK = "server:clients"
 VEHICLE_LINK = "server:vehicles"
@@ -26,16 +32,26 @@ class InMemoryServer:
         settings: Settings | None = None,
         store: Store | None = None,
         restored: Restored | None = None,
+        witnesses: Sequence[Witness] = (),
+        wall_offset: float | None = None,  # UTC less the caller's time, s; None: not known
+        policies: Mapping[str, LinkPolicy] | None = None,
+        keys: tuple[Key, ...] | None = None,
         now: float = 0.0,
     ) -> None:
+        """``policies`` by CLIENT_LINK and VEHICLE_LINK; ``keys`` None: there is no key ring."""
         self.engine = Engine(settings or Settings(), now=now, restored=restored)
         self.store = store or MemoryStore()
-        self.pump = Pump(self.engine, self.store, self._send)
+        self.pump = Pump(self.engine, self.store, self._send, witnesses=witnesses)
         clients = net.link(CLIENT_LINK)
         towards = net.link(VEHICLE_LINK, peers=vehicles)
         self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, towards)}
-        self.pump.handle(link_changed(towards, LinkSide.VEHICLES), now=now)
-        self.pump.handle(link_changed(clients, LinkSide.CLIENTS), now=now)
+        if wall_offset is not None:
+            self.pump.handle(WallClock(wall_offset), now=now)
+        if keys is not None:
+            self.pump.handle(KeysChanged(keys), now=now)
+        for link, side in ((towards, LinkSide.VEHICLES), (clients, LinkSide.CLIENTS)):
+            policy = (policies or {}).get(link.name, TAKES_ALL)
+            self.pump.handle(link_changed(link, side, policy), now=now)
         self.pump.turn(now=now)
 
     def next_deadline(self) -> float | None:
@@ -53,6 +69,11 @@ class InMemoryServer:
         due = self.engine.next_deadline()
         if due is not None and due <= now:
             self.pump.handle_deadline(now=now)
+        self.pump.turn(now=now)
+
+    def shut_down(self, *, now: float) -> None:
+        """Begin the orderly end; it is there once ``pump.is_over``, a second later at the most."""
+        self.pump.handle(Shutdown(), now=now)
         self.pump.turn(now=now)
 
     def _send(self, outgoing: Outgoing) -> None:

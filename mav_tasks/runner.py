@@ -1,41 +1,36 @@
-"""The I/O shell: one loop, one timer, one pump; signals and the orderly end. It decides nothing.
-
-What must be durable first the engine holds back by itself: whatever ``take_packets`` gives may
-leave at once, and so it leaves before the events of the same turn reach the store.
-"""
+"""The I/O shell: one loop, one timer, one pump; signals and the orderly end. It decides nothing."""
 
 import asyncio
 import logging
+import os
 import signal
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
+from typing import Protocol
 
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
-    Committed,
     Congestion,
     Input,
+    KeysChanged,
     LinkChanged,
     LinkSide,
     Outgoing,
     Packets,
     Peer,
     PeerChanged,
+    SettingsChanged,
     Shutdown,
-    StoreFailed,
     WallClock,
 )
 from mav_tasks.links.base import TEND_PERIOD, Link, PeerChange, PeerState, StreamLink
-from mav_tasks.store import Kept, NotKept, Outcome, Store
-from mav_tasks.tasks.events import (
-    Event,
-    QueuePaused,
-    ServerStopped,
-    SubmissionRefused,
-    VehicleNoted,
-)
+from mav_tasks.links.policy import LinkPolicy
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.pump import Pump
+from mav_tasks.settings import Settings
+from mav_tasks.store import NotKept, Store
+from mav_tasks.witness import Witness
 
 log = logging.getLogger("mav_tasks")
 
@@ -44,72 +39,16 @@ AT_A_TIME = 8  # of them, taken in even when a setpoint is due
 EACH_TAKES = 1e-4  # s, about, to take one in: so many are, before the time asks for something
 WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 
+HANGUP = 0.2  # s after SIGHUP, when it is seen whether the terminal is gone
+
 EXIT_FAILED = 70  # EX_SOFTWARE: the engine itself failed
 
 
-class Pump:
-    """Engine, store and links, turned by whoever knows the time."""
-
-    def __init__(self, engine: Engine, store: Store, send: Callable[[Outgoing], None]) -> None:
-        self.engine = engine
-        self._store = store
-        self._send = send
-        self._store_is_away = False
-        self.is_over = False
-
-    def handle(self, item: Input, *, now: float) -> None:
-        """Take one input in; ``turn`` brings out what follows."""
-        self.engine.handle(item, now=now)
-
-    def handle_deadline(self, *, now: float) -> None:
-        """Do what the time asks for; ``turn`` brings out what follows."""
-        self.engine.handle_deadline(now=now)
-
-    def turn(self, *, now: float) -> None:
-        """Send and store until nothing is left to do."""
-        noted: list[Event] = []
-        while True:
-            for outgoing in self.engine.take_packets():
-                self._send(outgoing)
-            events = self.engine.take_events()
-            if events:
-                self._store.append(events)
-                noted += events
-            outcomes = self._store.take_outcomes()
-            if not outcomes:
-                break
-            for outcome in outcomes:
-                self._note_outcome(outcome)
-                self.engine.handle(
-                    Committed(outcome.through)
-                    if isinstance(outcome, Kept)
-                    else StoreFailed(outcome.text),
-                    now=now,
-                )
-        self._note(noted)  # last: whoever waits for an answer does not wait for the log
-
-    def send_last_words(self) -> None:
-        """Stop every vehicle that is being driven, without asking the engine anything."""
-        for outgoing in self.engine.last_words:
-            with suppress(Exception):  # what fails for one must not keep it from the next
-                self._send(outgoing)
-
-    def _note_outcome(self, outcome: Outcome) -> None:
-        if isinstance(outcome, NotKept):
-            log.error("%s: submissions are refused until it is mended", outcome.text)
-        elif self._store_is_away:
-            log.warning("the store takes events again")
-        self._store_is_away = isinstance(outcome, NotKept)
-
-    def _note(self, events: list[Event]) -> None:
-        for event in events:
-            noteworthy = isinstance(event, SubmissionRefused | VehicleNoted | QueuePaused)
-            log.log(logging.WARNING if noteworthy else logging.INFO, "%s", event)
-            if isinstance(event, ServerStopped):
-                self.is_over = True
+#: of a link of which nothing else is said
+TAKES_ALL = LinkPolicy()
 
 
-def link_changed(link: Link, side: LinkSide) -> LinkChanged:
+def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> LinkChanged:
     """Give the input that says that a link is up."""
     return LinkChanged(
         link.name,
@@ -118,6 +57,8 @@ def link_changed(link: Link, side: LinkSide) -> LinkChanged:
         peers=link.peers,
         is_local=link.is_local,
         is_stream=link.is_stream,
+        takes_unsigned=policy.takes_unsigned,
+        key=policy.key,
     )
 
 
@@ -130,23 +71,63 @@ def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion:
             return Congestion(link.name, change.peer, is_congested=state is PeerState.CONGESTED)
 
 
+class Reload(Protocol):
+    """Whoever reads the settings again when they may be others."""
+
+    @property
+    def was_asked(self) -> bool:
+        """Whether it was asked for before the runner ran."""
+
+    def begin(self, put: Callable[[Settings], Mapping[str, float]]) -> None:
+        """Read them in its own time, and give them to ``put``, which gives what clients set."""
+
+
+class Keys(Protocol):
+    """Whoever knows the keys, and when they change."""
+
+    @property
+    def keys(self) -> tuple[Key, ...] | None:
+        """Those in force; None: there is no key ring."""
+
+    def begin(self, put: Callable[[tuple[Key, ...]], None]) -> None:
+        """Give each change to ``put`` from now on, in the loop."""
+
+    def close(self) -> None:
+        """Give no more."""
+
+
 class Runner:
     """Runs an engine on real links until a signal ends it."""
 
     def __init__(
-        self, engine: Engine, store: Store, *, clients: Sequence[Link], vehicles: Sequence[Link]
+        self,
+        engine: Engine,
+        store: Store,
+        *,
+        clients: Sequence[Link],
+        vehicles: Sequence[Link],
+        witnesses: Sequence[Witness] = (),
+        reload: Reload | None = None,
+        policies: Mapping[str, LinkPolicy] | None = None,
+        keys: Keys | None = None,
     ) -> None:
+        """``policies`` by the names of links; one without takes unsigned packets."""
+        self._reload = reload
+        self._policies = policies or {}
+        self._keys = keys
+        self._terminals = [fd for fd in range(3) if os.isatty(fd)]
         self._sides = [(link, LinkSide.VEHICLES) for link in vehicles]
         self._sides += [(link, LinkSide.CLIENTS) for link in clients]
         self._links = {link.name: link for link, _ in self._sides}
         self._streams = [link for link, _ in self._sides if isinstance(link, StreamLink)]
         self._store = store
         self._store_fd = store.fileno()
-        self._pump = Pump(engine, store, self._send)
+        self._pump = Pump(engine, store, self._send, witnesses=witnesses)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._over: asyncio.Future[int] | None = None
         self._wall_offset: float | None = None
+        self._is_ending = False
 
     async def run(self) -> int:
         """Serve until SIGINT or SIGTERM; gives the exit code."""
@@ -155,13 +136,20 @@ class Runner:
         for number in (signal.SIGINT, signal.SIGTERM):
             self._loop.add_signal_handler(number, self._on_signal)
         try:
+            if self._keys is not None:
+                self._begin_keys(self._keys)
             for link, side in self._sides:
-                self._guarded(link_changed(link, side))
+                policy = self._policies.get(link.name, TAKES_ALL)
+                self._guarded(link_changed(link, side, policy))
                 self._loop.add_reader(link.fileno(), self._on_readable, link)
             if self._store_fd is not None:
                 self._loop.add_reader(self._store_fd, self._on_stored)
             if self._streams:
                 self._tend(self._loop)
+            if self._reload is not None:
+                self._loop.add_signal_handler(signal.SIGHUP, self._on_hangup, self._reload)
+                if self._reload.was_asked:
+                    self._reload.begin(self._put)
             return await self._over
         finally:
             if self._store_fd is not None:
@@ -169,7 +157,10 @@ class Runner:
             for link, _ in self._sides:
                 self._loop.remove_reader(link.fileno())
                 link.close()
+            if self._keys is not None:
+                self._keys.close()
             self._close_store()
+            self._pump.close()
 
     def _on_readable(self, link: Link) -> None:
         if not isinstance(link, StreamLink):
@@ -228,9 +219,44 @@ class Runner:
 
     def _on_signal(self) -> None:
         assert self._loop is not None
+        self._is_ending = True
         for number in (signal.SIGINT, signal.SIGTERM):  # a second one is not waited for
             self._loop.add_signal_handler(number, self._leave_at_once)
         self._guarded(Shutdown())
+
+    def _on_hangup(self, reload: Reload) -> None:
+        """Read the settings again; but if it is the terminal that is gone, end."""
+        assert self._loop is not None
+        if self._terminals:  # the signal may come a moment before it is
+            self._loop.call_later(HANGUP, self._end_or_begin, reload)
+        else:
+            reload.begin(self._put)
+
+    def _end_or_begin(self, reload: Reload) -> None:
+        if self._is_ending:  # of a closing terminal the kernel tells, and the shell
+            return
+        if all(map(os.isatty, self._terminals)):
+            reload.begin(self._put)
+        else:
+            self._on_signal()
+
+    def _put(self, settings: Settings) -> Mapping[str, float]:
+        """Take new settings into force; gives what clients have set, which comes before them."""
+        before = self._pump.engine.not_in_force
+        self._guarded(SettingsChanged(settings))
+        for why in self._pump.engine.not_in_force:
+            if why not in before:
+                log.warning("not in force, though set before: %s", why)
+        return self._pump.engine.parameters
+
+    def _begin_keys(self, keys: Keys) -> None:
+        """Before the first packet, the keys; and from then on as they change."""
+        if keys.keys is not None:
+            self._put_keys(keys.keys)
+        keys.begin(self._put_keys)
+
+    def _put_keys(self, keys: tuple[Key, ...]) -> None:
+        self._guarded(KeysChanged(keys))
 
     def _leave_at_once(self) -> None:
         self._pump.send_last_words()
@@ -247,8 +273,8 @@ class Runner:
         try:
             self._turn(item)
         except Exception:  # whatever our own mistake is, a vehicle must not drive on for it
+            self._pump.send_last_words()  # first: a traceback reads files, from whatever disk
             log.critical("internal error: stopping every vehicle and ending", exc_info=True)
-            self._pump.send_last_words()
             self._finish(EXIT_FAILED)
 
     def _turn(self, item: Input | None) -> None:

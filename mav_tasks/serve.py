@@ -1,86 +1,84 @@
-"""Starts a server from what the command line says: settings, links, store, runner."""
+"""Starts a server from its settings: links, store, runner."""
 
 import asyncio
 import gc
 import logging
+import os
 import signal
 import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-from platformdirs import user_data_path
-
+from mav_tasks.config.reload import Reload
 from mav_tasks.engine.engine import Engine
-from mav_tasks.errors import StoreError, UsageError
+from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
+from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.link_keys import check_keys, in_words
+from mav_tasks.links.asked import faults_of, links_of, pushing_url
 from mav_tasks.links.base import Link
 from mav_tasks.links.opening import open_link
-from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint, parse_url, refuse_insecure
+from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint
 from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES, WayOut
+from mav_tasks.logs.field_notes import FieldNotes
+from mav_tasks.logs.setup import log_to_stderr
+from mav_tasks.logs.vehicle_texts import VehicleTexts
+from mav_tasks.recording import witnesses
 from mav_tasks.runner import Runner
-from mav_tasks.settings import ARMING, Retention, Settings
+from mav_tasks.settings import Links, Retention, ServerSettings
 from mav_tasks.store import MemoryStore
+from mav_tasks.store.place import path_of_store
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.restored import Restored
-
-IN_MEMORY = ":memory:"
-DEFAULT_STORE = "mav-tasks.sqlite3"
+from mav_tasks.witness import Witness
 
 
-def serve(
-    *,
-    clients: Sequence[str],
-    push: Sequence[str],
-    vehicles: Sequence[str],
-    arming: str,
-    store: str | None,
-    insecure: bool,
-    keep_days: float,
-    keep_tasks: int,
-) -> int:
-    """Run until a signal; gives the exit code. UsageError says what the operator can mend."""
-    if arming not in ARMING:
-        raise UsageError(f"--arming {arming}: expected one of {', '.join(ARMING)}")
-    retention = Retention(max_age=keep_days * 86_400.0, max_count=keep_tasks)
-    settings = replace(Settings(), arming=arming, retention=retention)
-    client_urls = [parse_url(text) for text in clients]
-    vehicle_urls = [parse_url(text) for text in vehicles]
-    pushed = tuple(parse_endpoint(text, what=f"--push {text}") for text in push)
-    _refuse_doubles(client_urls + vehicle_urls)
-    if not insecure:
-        for url in client_urls + vehicle_urls:
-            refuse_insecure(url)
-        for host, port in pushed:
-            refuse_insecure(LinkUrl("udpout", host, port))
-    log_to_stderr()
+def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
+    """Run until a signal; gives the exit code. UsageError says what the operator can mend.
+
+    With ``reload`` SIGHUP reads the configuration again.
+    """
+    links, retention = settings.links, settings.engine.retention
+    for _, fault in faults_of(links):
+        raise fault
+    asked, pushing = links_of(links), pushing_url(links)
+    pushed = tuple(parse_endpoint(text, what=f"--push {text}") for text in links.push)
     for number in (signal.SIGINT, signal.SIGTERM):  # until the loop takes them over
         signal.signal(number, _leave_before_serving)
+    if reload is not None:
+        signal.signal(signal.SIGHUP, reload.note)
     with ExitStack() as opened:
-        # Pushing from the first UDP link: who answers is served by the socket that called.
-        pushing = next((url for url in client_urls if _is_udp(url)), None)
+        opened.enter_context(log_to_stderr(settings.log))
+        keys = _watched_ring(links)
         client_links = [
-            _open(opened, url, TO_CLIENTS, push=pushed if url is pushing else ())
-            for url in client_urls
+            _open(opened, link.url, TO_CLIENTS, push=pushed if link.url == pushing else ())
+            for link in asked
+            if link.side == "clients"
         ]
-        vehicle_links = [_open(opened, url, TO_VEHICLES) for url in vehicle_urls]
+        vehicle_links = [
+            _open(opened, link.url, TO_VEHICLES) for link in asked if link.side == "vehicles"
+        ]
         gc.disable()  # many tasks are read: it would look through them again and again
-        journal = open_store(store, retention)
+        journal = open_store(settings.store or None, retention)
         opened.callback(journal.close)
         restored = journal.load() if isinstance(journal, SqliteStore) else None
-        for link in client_links:
-            _say(f"clients on {link.name}")
+        if reload is not None and reload.file is not None:
+            _say(f"configuration {reload.file}")
+        if keys.keys is not None:
+            usable = sum(1 for key in keys.keys if key.secret)
+            _say(f"key ring {keys.path}, {usable} keys")
+        for link in asked:
+            signatures = in_words(link, has_ring=keys.keys is not None)
+            waiting = "" if link.side == "clients" else ", waiting for the first heartbeat"
+            _say(f"{link.side} on {link.url}{signatures}{waiting}")
         if pushed and pushing is None:
             _say("nobody is spoken to unasked: none of the links for clients is UDP")
-        for link in vehicle_links:
-            _say(f"vehicles on {link.name}, waiting for the first heartbeat")
         _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
             _say(f"parameters set before: {_in_words(restored.parameters)}")
-        sys.stdout.flush()
-        return asyncio.run(_run(settings, journal, restored, client_links, vehicle_links))
+        running = _run(settings, journal, restored, client_links, vehicle_links, reload, keys)
+        return asyncio.run(running)
 
 
 def _leave_before_serving(_number: int, _frame: object) -> None:
@@ -101,18 +99,27 @@ def tame_collector() -> None:
 
 def open_store(path: str | None, retention: Retention | None = None) -> SqliteStore | MemoryStore:
     """Open the store at a path; None: in the user's data folder. StoreError says why not."""
-    if path == IN_MEMORY:
+    chosen = path_of_store(path)
+    if chosen is None:
         return MemoryStore()
-    if path == "":
-        raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
-    chosen = Path(path) if path else user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE
     return SqliteStore(
-        chosen, wall_offset=lambda: time.time() - time.monotonic(), retention=retention
+        chosen,
+        wall_offset=lambda: time.time() - time.monotonic(),
+        retention=retention,
     )
 
 
-def _is_udp(url: LinkUrl | SerialUrl) -> bool:
-    return isinstance(url, LinkUrl) and url.kind.startswith("udp")
+def _watched_ring(links: Links) -> RingWatch:
+    """Give the key ring, and look at it for changes later; UsageError if the links need others.
+
+    That the user's own is not there is no fault: then there is none yet.
+    """
+    path = path_of_ring(links.keys)
+    loaded: Loaded | None = None
+    if links.keys or os.path.lexists(path):
+        loaded = load(path)
+    check_keys(links, None if loaded is None else loaded.ring, where=str(path))
+    return RingWatch(path, loaded)
 
 
 def _open(
@@ -124,19 +131,36 @@ def _open(
 
 
 async def _run(
-    settings: Settings,
+    settings: ServerSettings,
     store: SqliteStore | MemoryStore,
     restored: Restored | None,
     clients: Sequence[Link],
     vehicles: Sequence[Link],
+    reload: Reload | None,
+    keys: RingWatch,
 ) -> int:
     now = asyncio.get_running_loop().time()
-    engine = Engine(settings, now=now, restored=restored)  # what the store gave back
+    engine = Engine(settings.engine, now=now, restored=restored)  # what the store gave back
     for why in engine.not_in_force:
         _say(f"not in force, though set before: {why}")
-    sys.stdout.flush()
+    recorders = witnesses(settings.recording, settings.engine, restored, now=now)
+    for recorder in recorders:
+        _say(f"{recorder}")
     tame_collector()
-    return await Runner(engine, store, clients=clients, vehicles=vehicles).run()
+    listeners: list[Witness] = [VehicleTexts(), *recorders]
+    if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
+        listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
+    runner = Runner(
+        engine,
+        store,
+        clients=clients,
+        vehicles=vehicles,
+        reload=reload,
+        witnesses=listeners,
+        policies={str(link.url): link.policy for link in links_of(settings.links)},
+        keys=keys,
+    )
+    return await runner.run()
 
 
 def _in_words(parameters: Mapping[str, float]) -> str:
@@ -144,25 +168,11 @@ def _in_words(parameters: Mapping[str, float]) -> str:
 
 
 def _say(words: str) -> None:
-    sys.stdout.write(f"mav-tasks: {words}\n")
-
-
-def _refuse_doubles(urls: Sequence[LinkUrl | SerialUrl]) -> None:
-    seen: set[LinkUrl | SerialUrl] = set()
-    for url in urls:
-        if url in seen:
-            raise UsageError(f"link {url} is given twice")
-        seen.add(url)
-
-
-def log_to_stderr() -> None:
-    """Write the log where the operator sees it."""
-    # Each event is one line, and under load there are thousands a second: what no line shows is
-    # not looked up for it (logging's own manual, "Optimization").
-    logging._srcfile = None
-    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
-    logging.basicConfig(
-        stream=sys.stderr,
-        level=logging.INFO,
-        format="%(asctime)s %(levelname)s %(message)s",
-    )
+    """Tell who started the server; that nobody listens is no reason not to serve."""
+    if sys.stdout is None:  # closed from the beginning
+        return
+    try:
+        sys.stdout.write(f"mav-tasks: {words}\n")
+        sys.stdout.flush()
+    except OSError:  # nor shall the interpreter fail for it when it ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,6 +1,5 @@
 """What the operator can mend is said in one clear line, exit code 2, never a traceback."""
 
-import os
 import re
 import socket
 import subprocess
@@ -9,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.kit.processes import free_tcp_ports, free_udp_ports, process
+from tests.kit.processes import environment_with, free_tcp_ports, free_udp_ports, process
 
 
 def run(*arguments: str, environment: dict[str, str] | None = None) -> tuple[int, str, str]:
@@ -19,7 +18,7 @@ def run(*arguments: str, environment: dict[str, str] | None = None) -> tuple[int
         capture_output=True,
         text=True,
         timeout=30,
-        env={**os.environ, "MAV_TASKS_STORE": ":memory:", **(environment or {})},
+        env=environment_with(**{"MAV_TASKS_STORE": ":memory:", **(environment or {})}),
         check=False,
     )
     return done.returncode, done.stdout, done.stderr

@@ -71,6 +71,28 @@ def test_a_utc_start_is_exact_and_moves_with_the_clock_and_nothing_else_does(wor
     world.until_idle(tasks=2)
 
 
+@pytest.mark.parametrize("step", [DAY, -DAY, 2.0, -2.0])
+def test_a_step_of_the_clock_changes_no_motion_no_delay_and_no_deadline(
+    world: World, step: float
+) -> None:
+    set_clock(world, UTC)
+    driven, late = submit(world, 2.0), submit(world)
+    world.client.command(MODIFY, late, DEADLINE, 1.5)
+    world.run(0.1)
+    delayed = submit(world, delay=3.0)
+    at = world.now
+    world.run(1.0)
+    assert world.state(driven)[0] is S.EXECUTING
+    set_clock(world, UTC + step)
+    assert world.state(late)[0] is S.QUEUED
+    world.until_state(late, S.EXPIRED, within=1.0)
+    world.until(lambda: world.state(delayed)[0] is S.QUEUED, within=3.5)
+    assert world.now - at == pytest.approx(3.0, abs=0.1)
+    world.until_state(driven, S.COMPLETED, within=20)
+    states = [state for state, _ in world.history(driven)]
+    assert states == [S.STARTING, S.EXECUTING, S.COMPLETED]  # and 20 Hz: the observer looks at it
+
+
 def test_a_utc_start_in_a_float_is_refused(world: World) -> None:
     task = submit(world, 3)
     waiting = submit(world)

@@ -6,7 +6,9 @@ import logging
 import os
 import signal
 import threading
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from time import monotonic
 
 import pytest
 
@@ -24,12 +26,14 @@ from mav_tasks.engine.inputs import (
     WallClock,
 )
 from mav_tasks.links.base import PeerChange, PeerState
-from mav_tasks.runner import EXIT_FAILED, Pump, Runner
+from mav_tasks.pump import Pump
+from mav_tasks.runner import EXIT_FAILED, Runner
 from mav_tasks.serve import open_store
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Driving, Queueing, Settings
 from mav_tasks.store import MemoryStore
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import VehicleSeen
+from mav_tasks.tasks.restored import Restored
 from tests.kit.store import LateStore
 
 
@@ -62,6 +66,49 @@ def test_a_failing_store_is_told_to_the_engine_and_ends_nothing(
     assert engine.inputs == [StoreFailed("store x: the disk is full")] * 2 + [Committed(1)]
     assert [record.levelname for record in caplog.records] == ["ERROR", "ERROR", "WARNING"]
     assert not pump.is_over
+
+
+class Failing:
+    """A witness that fails in one of its methods."""
+
+    def __init__(self, method: str) -> None:
+        self._method = method
+        self.told: list[str] = []
+
+    def took_in(self, item: object, *, now: float) -> None:
+        self._tell("took_in")
+
+    def gave_out(self, packets: object, events: object, *, now: float) -> None:
+        self._tell("gave_out")
+
+    def close(self) -> None:
+        self._tell("close")
+
+    def _tell(self, method: str) -> None:
+        self.told.append(method)
+        if method == self._method:
+            raise ValueError(method)
+
+
+@pytest.mark.parametrize("method", ["took_in", "gave_out", "close"])
+def test_a_witness_that_fails_is_let_go_and_ends_nothing(
+    method: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    failing, other = Failing(method), Failing("never")
+    pump = Pump(Engine(Settings(), now=0.0), MemoryStore(), send, witnesses=[failing, other])
+    link = LinkChanged("clients", LinkSide.CLIENTS, up=True, peers=("somebody",))
+    vehicles = LinkChanged("vehicles", LinkSide.VEHICLES, up=True, peers=("rover",))
+    for now in (0.0, 1.0):
+        pump.handle(link, now=now)
+        pump.handle(vehicles, now=now)
+        pump.handle_deadline(now=now)
+        pump.turn(now=now)
+    pump.close()
+    assert failing.told.count(method) == 1
+    assert other.told.count("took_in") == 6
+    assert other.told.count("gave_out") >= 2
+    assert other.told[-1] == "close"
+    assert [record.levelname for record in caplog.records] == ["ERROR"]
 
 
 def test_what_the_store_says_comes_in_at_once(tmp_path: Path) -> None:
@@ -253,6 +300,35 @@ def test_the_engine_is_told_who_comes_before_its_words_and_who_goes_after_them(
     assert [record.getMessage() for record in caplog.records] == words
 
 
+def test_a_step_of_the_wall_clock_is_told_with_the_next_input_and_nothing_less_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    steps = [3600.0, 3600.3, -86_400.0]  # s; the second is below what is told
+    stepped = 0.0
+    monkeypatch.setattr("mav_tasks.runner.time.time", lambda: monotonic() + 1e9 + stepped)
+
+    async def run() -> list[float]:
+        nonlocal stepped
+        engine, link = Recorder(), FakeStream()
+        engine.handle_deadline = lambda *, now: None  # type: ignore[method-assign]
+        loop = asyncio.get_running_loop()
+        running = loop.create_task(Runner(engine, MemoryStore(), clients=[link], vehicles=[]).run())
+        await asyncio.sleep(0)
+        for number, step in enumerate(steps, 1):
+            stepped = step
+            link.comes([], b"word")
+            while sum(isinstance(item, Packets) for item in engine.inputs) < number:
+                await asyncio.wait_for(link.tends.get(), 10)
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.02)
+        await asyncio.wait_for(running, 10)
+        return [item.offset for item in engine.inputs if isinstance(item, WallClock)]
+
+    offsets = [offset - 1e9 for offset in asyncio.run(run())]
+    assert offsets == pytest.approx([0.0, 3600.0, -86_400.0], abs=0.1)
+
+
 def test_who_goes_while_the_engine_is_told_of_others_is_gone_before_anybody_comes() -> None:
     """A packet that it sends then finds nobody there; the next one comes from the same place."""
     link = FakeStream()
@@ -327,6 +403,18 @@ def test_after_the_last_words_of_a_failed_engine_nothing_of_it_is_sent() -> None
     assert link.firsts == [b"hold"]
 
 
+def test_the_last_words_of_a_failed_engine_do_not_wait_for_its_traceback(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is made of source files, from a disk that may be slow."""
+    link = FakeStream()
+    sent_before: list[bytes] = []
+    log = logging.getLogger("mav_tasks")
+    monkeypatch.setattr(log, "critical", lambda *_, **__: sent_before.extend(link.sent))
+    assert run_broken(link) == EXIT_FAILED
+    assert sent_before[-2:] == [b"zero", b"hold"]
+
+
 def test_a_failed_engine_ends_the_server_even_if_its_last_words_fail_too() -> None:
     class Mute(FakeStream):
         def send(self, peer: object, data: bytes, *, first: bool = False) -> None:
@@ -337,3 +425,71 @@ def test_a_failed_engine_ends_the_server_even_if_its_last_words_fail_too() -> No
     link = Mute()
     assert run_broken(link) == EXIT_FAILED
     assert link.sent[-1] == b"hold"
+
+
+class FakeReload:
+    """Gives the same settings whenever they are asked for."""
+
+    def __init__(self, settings: Settings, *, was_asked: bool) -> None:
+        self.settings, self.was_asked = settings, was_asked
+        self.begun = asyncio.Queue[Mapping[str, float]]()
+
+    def begin(self, put: Callable[[Settings], Mapping[str, float]]) -> None:
+        self.begun.put_nowait(put(self.settings))
+
+
+@pytest.mark.parametrize("was_asked", [True, False])
+def test_sighup_brings_new_settings_also_if_it_came_before(
+    was_asked: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    kept = {"TSK_SPEED": 1.5, "TSK_QUOTA": 7.0}
+
+    async def run() -> tuple[Mapping[str, float], Settings]:
+        loop = asyncio.get_running_loop()
+        engine = Engine(Settings(), now=loop.time(), restored=Restored(parameters=kept))
+        slow = Settings(driving=Driving(speed=0.4, max_speed=1.0))
+        reload = FakeReload(slow, was_asked=was_asked)
+        runner = Runner(engine, MemoryStore(), clients=[], vehicles=[], reload=reload)
+        runner._terminals = []  # whatever the tests are run in
+        running = loop.create_task(runner.run())
+        if not was_asked:
+            await asyncio.sleep(0)
+            os.kill(os.getpid(), signal.SIGHUP)
+        parameters = await asyncio.wait_for(reload.begun.get(), 10)
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert await asyncio.wait_for(running, 10) == 0
+        return parameters, engine._settings
+
+    with caplog.at_level(logging.INFO, "mav_tasks"):
+        parameters, settings = asyncio.run(run())
+    assert settings == Settings(
+        driving=Driving(speed=0.4, max_speed=1.0), queueing=Queueing(quota=7)
+    )
+    assert parameters == {"TSK_QUOTA": 7.0}
+    words = "not in force, though set before: TSK_SPEED 1.5 is more than TSK_SPEED_MAX 1"
+    assert words in [record.getMessage() for record in caplog.records]
+
+
+def test_a_terminal_that_is_gone_is_told_of_twice_and_ends_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By the kernel and by the shell; a second order to stop would begin the stopping anew."""
+
+    async def run() -> list[object]:
+        engine, reload = Recorder(), FakeReload(Settings(), was_asked=False)
+        engine.handle_deadline = lambda *, now: None  # type: ignore[method-assign]
+        runner = Runner(engine, MemoryStore(), clients=[], vehicles=[], reload=reload)
+        runner._terminals = [0]
+        monkeypatch.setattr("mav_tasks.runner.HANGUP", 0.0)
+        monkeypatch.setattr(os, "isatty", lambda _: False)
+        running = asyncio.get_running_loop().create_task(runner.run())
+        await asyncio.sleep(0)
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGHUP)
+            await asyncio.sleep(0.02)
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert await asyncio.wait_for(running, 10) == 0
+        assert reload.begun.empty()
+        return engine.inputs
+
+    assert asyncio.run(run()).count(Shutdown()) == 1
