@@ -1,0 +1,89 @@
+"""A MAVLink task server for ground rovers, and the library to give it tasks.
+
+What is public is here; each name loads what it needs when it is first used::
+
+    from mav_tasks import Client, Move
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mav_tasks.client.aio import Client as Client
+    from mav_tasks.client.handle import Task as Task
+    from mav_tasks.client.sync import SyncClient as SyncClient
+    from mav_tasks.client.sync import SyncTask as SyncTask
+    from mav_tasks.client.values import QueueStatus as QueueStatus
+    from mav_tasks.client.values import TaskStatus as TaskStatus
+    from mav_tasks.client.values import TaskTiming as TaskTiming
+    from mav_tasks.client.values import Text as Text
+    from mav_tasks.client.values import VehicleStatus as VehicleStatus
+    from mav_tasks.errors import ClientError as ClientError
+    from mav_tasks.errors import MavTasksError as MavTasksError
+    from mav_tasks.errors import NoAnswer as NoAnswer
+    from mav_tasks.errors import NoSuchVehicle as NoSuchVehicle
+    from mav_tasks.errors import Refused as Refused
+    from mav_tasks.errors import TaskFailed as TaskFailed
+    from mav_tasks.errors import UsageError as UsageError
+    from mav_tasks.mavlink.signing import Key as Key
+    from mav_tasks.plan_files import read_plan as read_plan
+    from mav_tasks.plan_files import write_plan as write_plan
+    from mav_tasks.tasks.goal import Drive as Drive
+    from mav_tasks.tasks.goal import Face as Face
+    from mav_tasks.tasks.goal import GlobalPlace as GlobalPlace
+    from mav_tasks.tasks.goal import GoTo as GoTo
+    from mav_tasks.tasks.goal import LocalPlace as LocalPlace
+    from mav_tasks.tasks.goal import Move as Move
+    from mav_tasks.tasks.goal import Rotate as Rotate
+    from mav_tasks.tasks.goal import Wait as Wait
+    from mav_tasks.tasks.lifecycle import TaskReason as TaskReason
+    from mav_tasks.tasks.lifecycle import TaskState as TaskState
+
+_HOMES = {
+    "mav_tasks.client.aio": ("Client",),
+    "mav_tasks.client.handle": ("Task",),
+    "mav_tasks.client.sync": ("SyncClient", "SyncTask"),
+    "mav_tasks.client.values": (
+        "QueueStatus",
+        "TaskStatus",
+        "TaskTiming",
+        "Text",
+        "VehicleStatus",
+    ),
+    "mav_tasks.errors": (
+        "ClientError",
+        "MavTasksError",
+        "NoAnswer",
+        "NoSuchVehicle",
+        "Refused",
+        "TaskFailed",
+        "UsageError",
+    ),
+    "mav_tasks.mavlink.signing": ("Key",),
+    "mav_tasks.plan_files": ("read_plan", "write_plan"),
+    "mav_tasks.tasks.goal": (
+        "Drive",
+        "Face",
+        "GlobalPlace",
+        "GoTo",
+        "LocalPlace",
+        "Move",
+        "Rotate",
+        "Wait",
+    ),
+    "mav_tasks.tasks.lifecycle": ("TaskReason", "TaskState"),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = sorted(_HOME_OF)  # noqa: PLE0605  # strings, all of them
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOME_OF.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(home), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,333 @@
+"""A client's end of the contract as one pure object: packets and time in, packets out.
+
+It says hello, finds the task servers inside the rovers, keeps what they tell, and sees that what is
+asked is answered or given up. What it means for a script is ``aio``'s affair.
+"""
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mav_tasks.client.calls import AGAIN, Call, Calls, Command
+from mav_tasks.client.fleet_view import KEPT, FleetView
+from mav_tasks.client.transfers import MESSAGES as TRANSFER_MESSAGES
+from mav_tasks.client.transfers import Transfers
+from mav_tasks.client.values import (
+    TaskStatus,
+    TaskTiming,
+    Text,
+    VehicleStatus,
+    reason_of,
+    task_status_of,
+    task_timing_of,
+)
+from mav_tasks.client.watch import Followed, Watch
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, MavState
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import text_receiver
+from mav_tasks.services.heartbeat import HeartbeatSender, component_heartbeat
+from mav_tasks.services.text_receiver import TextReceiver
+from mav_tasks.tasks.lifecycle import TaskReason, words_of
+
+#: s, in which the words of a refusal follow its ack
+WORDS_WITHIN = 0.25
+#: Hz, of telemetry that somebody may ask about; a client's share of a busy link is small
+TELEMETRY_RATE = 1
+FOLLOWED_AGAIN = 3.0  # s that an unanswered question about a followed task goes on
+
+DECODED = frozenset(
+    kind.id
+    for kind in (
+        m.Heartbeat,
+        m.CommandAck,
+        m.Statustext,
+        m.TaskStatus,
+        m.TaskQueueStatus,
+        m.TaskTiming,
+        *TRANSFER_MESSAGES,
+    )
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What was answered to a command, with the words of a refusal."""
+
+    result: int
+    value: int
+    words: str = ""
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether it was."""
+        return self.result == MavResult.ACCEPTED
+
+
+Done = Callable[[Reply | None], None]
+
+
+@dataclass(slots=True)
+class _Refused:
+    vehicle: int
+    ack: m.CommandAck
+    done: Done
+    until: float
+
+
+class Session:
+    """What one client knows and what it is about.
+
+    The callbacks are the shell's: what it does with news.
+    """
+
+    def __init__(self, address: Address, *, now: float) -> None:
+        self.address = address
+        self.fleet = FleetView()
+        self.watch = Watch()
+        self._encoder = Encoder(address)
+        self._decoder = Decoder()
+        self._heartbeat = HeartbeatSender(now=now)
+        self._calls = Calls()
+        self._texts = TextReceiver()
+        self._transfers: dict[Address, Transfers] = {}
+        self._refused: list[_Refused] = []
+        self._out: list[bytes] = []
+        self.on_served: Callable[[], None] = lambda: None
+        self.on_news: Callable[[Followed], None] = lambda _followed: None
+        self.on_status: Callable[[TaskStatus], None] = lambda _status: None
+        self.on_queue: Callable[[m.TaskQueueStatus, int], None] = lambda _message, _vehicle: None
+        self.on_timing: Callable[[TaskTiming], None] = lambda _timing: None
+        self.on_text: Callable[[Text], None] = lambda _text: None
+
+    def __repr__(self) -> str:
+        return f"Session({self.address}, {self.fleet!r}, {self._calls!r})"
+
+    # time and packets
+
+    def receive(self, packet: Packet, *, now: float) -> None:
+        """Take one packet in."""
+        if packet.message_id in KEPT:
+            self.fleet.telemetry(packet)
+        if packet.message_id not in DECODED:
+            return
+        message = self._decoder.decode(packet)
+        if message is None or not self._is_meant(message):
+            return
+        match message:
+            case m.Heartbeat():
+                self._heard(packet, message, now=now)
+            case m.CommandAck():
+                self._calls.receive(message, vehicle=packet.system_id, now=now)
+            case m.TaskStatus():
+                self._task_status(task_status_of(message, packet.system_id), now=now)
+            case m.TaskQueueStatus():
+                self._served(packet.source)
+                self.on_queue(message, packet.system_id)
+            case m.TaskTiming():
+                self.on_timing(task_timing_of(message, packet.system_id))
+            case m.Statustext():
+                for text in self._texts.receive(packet.source, message, now=now):
+                    self._text(text)
+            case _:
+                transfers = self._transfers.get(packet.source)
+                if transfers is not None:
+                    transfers.receive(message, now=now)
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do."""
+        due = [
+            self._texts.next_deadline(),
+            self._heartbeat.next_deadline(),
+            *(refused.until for refused in self._refused),
+        ]
+        maybe = [self._calls.next_deadline(), self.fleet.next_deadline()]
+        maybe += [self.watch.next_deadline()]
+        maybe += [transfers.next_deadline() for transfers in self._transfers.values()]
+        due += [at for at in maybe if at is not None]
+        return min(due)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Do what is due."""
+        if self._heartbeat.is_due(now=now):
+            self.greet()
+        for vehicle in self.fleet.to_ask(now=now):
+            self._ask_server(vehicle, now=now)
+        for followed in self.watch.to_ask(now=now):
+            self.ask_about(followed, now=now)
+        for text in self._texts.handle_deadline(now=now):
+            self._text(text)
+        self._calls.handle_deadline(now=now)
+        for transfers in self._transfers.values():
+            transfers.handle_deadline(now=now)
+        for refused in [each for each in self._refused if now >= each.until]:
+            self._refused.remove(refused)
+            refused.done(_reply(refused.ack, ""))
+
+    def take_packets(self) -> list[bytes]:
+        """Give what is to be sent since the last call, in order."""
+        for command in self._calls.take():
+            self.send(command)
+        for transfers in self._transfers.values():
+            for message in transfers.take():
+                self.send(message)
+        out, self._out = self._out, []
+        return out
+
+    # what the shell asks for
+
+    def greet(self) -> None:
+        """Say that somebody is here: a script, no ground station whose loss could mean a stop."""
+        self.send(component_heartbeat(MavState.ACTIVE))
+
+    def send(self, message: m.Message) -> None:
+        """Send a message now."""
+        self._out.append(self._encoder.encode(message))
+
+    def check(self, message: m.Message) -> None:
+        """Raise ValueError for what no packet can carry: found when it is sent, it hit all else."""
+        try:
+            Packer().pack(message, self.address, seq=0)
+        except (OverflowError, struct.error) as error:
+            words = f"a number of {type(message).__name__} is too large to be sent: {error}"
+            raise ValueError(words) from None
+
+    def call(
+        self,
+        message: Command,
+        done: Done,
+        *,
+        now: float,
+        within: float,
+        fits: Callable[[m.CommandAck], bool] = lambda _ack: True,
+        again: float = AGAIN,
+        is_told_apart: bool = True,
+        is_urgent: bool = False,
+    ) -> Call:
+        """Send a command until it is answered; ``done`` is called once, with None for silence.
+
+        See Call for the rest. ValueError if it has a number that cannot be sent.
+        """
+        self.check(message)
+        vehicle = message.target_system
+
+        def ended(ack: m.CommandAck | None, *, now: float) -> None:
+            if ack is None:
+                done(None)
+            elif ack.result == MavResult.ACCEPTED or not ack.result_param2:
+                done(_reply(ack, ""))
+            else:
+                self._refused.append(_Refused(vehicle, ack, done, now + WORDS_WITHIN))
+
+        call = Call(message, ended, within, fits, again, is_told_apart, is_urgent)
+        self._calls.begin(call, now=now)
+        return call
+
+    def settle(self, call: Call, *, is_answered: bool, now: float) -> None:
+        """A call was answered by something else than an ack, or nobody waits for it any more."""
+        self._calls.settle(call, is_answered=is_answered, now=now)
+
+    def transfers(self, target: Address) -> Transfers:
+        """Give the plans on their way to and from a component."""
+        transfers = self._transfers.get(target)
+        if transfers is None:
+            transfers = self._transfers[target] = Transfers(target)
+        return transfers
+
+    def vehicles(self, *, now: float) -> tuple[VehicleStatus, ...]:
+        """Give the rovers in which a task server has answered, by id."""
+        views = (self.fleet.get(system_id) for system_id in self.fleet.served())
+        return tuple(v.status(self._decoder, now=now) for v in views if v is not None)
+
+    def follow(self, task_id: int, vehicle: int, *, nonce: int | None, now: float) -> Followed:
+        """Follow a task; one of its id but another nonce is lost: the server has begun anew."""
+        before = self.watch.get(task_id)
+        if before is not None and nonce is not None and before.nonce not in (None, nonce):
+            self.watch.lose(before)
+            self.on_news(before)
+        return self.watch.follow(task_id, vehicle, nonce=nonce, now=now)
+
+    def ask_about(self, followed: Followed, *, now: float) -> None:
+        """Ask how a followed task fares; what comes of it is news as any other."""
+        vehicle = followed.vehicle
+        followed.is_asked = True
+
+        def done(reply: Reply | None) -> None:
+            followed.is_asked = False
+            if reply is None or reply.is_accepted or followed.is_over:
+                return
+            if reply.value == TaskReason.NOT_FOUND:
+                self.watch.lose(followed)
+                self.on_news(followed)
+
+        request = request_message(vehicle, m.TaskStatus.id, float(followed.id))
+        self.call(request, done, now=now, within=FOLLOWED_AGAIN)
+        interval = self.watch.stream_of(vehicle)
+        if interval is not None and followed.status is not None and followed.status.is_active:
+            self.set_stream(vehicle, interval, now=now)
+
+    def set_stream(self, vehicle: int, interval: float | None, *, now: float) -> None:
+        """Have the active task told each ``interval`` seconds; None: only when it changes."""
+        us = -1.0 if interval is None else interval * 1e6
+        command = m.CommandLong(
+            vehicle, AUTOPILOT, MavCmd.SET_MESSAGE_INTERVAL, 0, m.TaskStatus.id, us, 0, 0, 0, 0, 0
+        )
+        self.call(command, lambda _reply: None, now=now, within=FOLLOWED_AGAIN)
+
+    # what came
+
+    def _is_meant(self, message: m.Message) -> bool:
+        return target_of(message).reaches(self.address)
+
+    def _heard(self, packet: Packet, message: m.Heartbeat, *, now: float) -> None:
+        if not self.fleet.heartbeat(packet, message, now=now):
+            return
+        vehicle = packet.system_id
+        self.send(m.RequestDataStream(vehicle, AUTOPILOT, 0, TELEMETRY_RATE, 1))
+        self.watch.hurry(vehicle, now=now)
+        interval = self.watch.stream_of(vehicle)
+        if interval is not None:
+            self.set_stream(vehicle, interval, now=now)
+
+    def _ask_server(self, vehicle: int, *, now: float) -> None:
+        request = request_message(vehicle, m.TaskQueueStatus.id)
+        self.call(request, lambda _reply: None, now=now, within=AGAIN)
+
+    def _served(self, source: Address) -> None:
+        view = self.fleet.get(source.system_id)
+        if view is not None:
+            view.server_component = source.component_id
+            self.on_served()
+
+    def _task_status(self, status: TaskStatus, *, now: float) -> None:
+        followed = self.watch.receive(status, now=now)
+        self.on_status(status)
+        if followed is not None:
+            self.on_news(followed)
+
+    def _text(self, text: text_receiver.Text) -> None:
+        vehicle, component = text.sender
+        view = self.fleet.get(vehicle)
+        is_ours = view is not None and view.server_component in (None, component)
+        if is_ours and text.severity == MavSeverity.WARNING:
+            for refused in self._refused:
+                if refused.vehicle in (0, vehicle):
+                    self._refused.remove(refused)
+                    refused.done(_reply(refused.ack, text.words))
+                    break
+        self.on_text(Text(vehicle, component, text.severity, text.words))
+
+
+def request_message(vehicle: int, message_id: int, *params: float) -> m.CommandLong:
+    """Give the REQUEST_MESSAGE that asks a vehicle's task server for something."""
+    filled = (*params, *(0.0,) * (6 - len(params)))
+    return m.CommandLong(vehicle, AUTOPILOT, MavCmd.REQUEST_MESSAGE, 0, float(message_id), *filled)
+
+
+def _reply(ack: m.CommandAck, words: str) -> Reply:
+    if ack.result != MavResult.ACCEPTED and not words:
+        reason = reason_of(ack.result_param2)
+        words = words_of(reason) if reason else f"result {ack.result}"
+    return Reply(ack.result, ack.result_param2, words)

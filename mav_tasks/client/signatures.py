@@ -1,0 +1,92 @@
+"""A client's signatures: all that it sends is signed, and only what its server signed is believed.
+
+Its clock alone gives the times of its signatures; a tick is 10 µs, so that one run follows another
+within less than it takes to start one. Each client has a link id of its own, by chance: two of one
+key and address are two streams, and the one does not make the other old.
+"""
+
+from dataclasses import dataclass
+from secrets import randbelow
+
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.signing import (
+    FROM_RADIOS,
+    KEY_LENGTH,
+    UNITS,
+    Key,
+    Signer,
+    StreamTimes,
+    is_signed_with,
+    stream_of,
+    timestamp_at,
+    timestamp_of,
+)
+
+WINDOW = int(60 * UNITS)  # as the server's, if nobody has set it otherwise
+
+
+@dataclass(slots=True)
+class NotBelieved:
+    """What was heard and not believed, in packets."""
+
+    unsigned: int = 0
+    unknown: int = 0  # signed with another key
+    old: int = 0  # signed well, but heard before, or of a clock that is far behind
+
+
+class ClientSignatures:
+    """Signs and verifies with one key. Times in seconds since 1970."""
+
+    def __init__(self, key: Key | bytes, *, link_id: int | None = None) -> None:
+        """``link_id`` 0 to 255, None: by chance. ValueError: the key has not 32 bytes."""
+        self.key = Key("", key) if isinstance(key, bytes) else key
+        if len(self.key.secret) != KEY_LENGTH:
+            raise ValueError(f"a key has {KEY_LENGTH} bytes, not {len(self.key.secret)}")
+        if link_id is not None and not 0 <= link_id <= 255:
+            raise ValueError(f"link_id {link_id}: not in 0..255")
+        self._signer = Signer(self.key, link_id=randbelow(256) if link_id is None else link_id)
+        self._times = StreamTimes()
+        self.not_believed = NotBelieved()
+
+    def __repr__(self) -> str:
+        return f"ClientSignatures({self._named()}, {self.not_believed})"
+
+    def sealed(self, raw: bytes, *, utc: float) -> bytes:
+        """Give a packet as it is to leave.
+
+        DEVIATION: what the server's clock says is not taken over: of two clients with one key, that
+        one which has heard the server would be ahead of the other one's clock.
+        """
+        return self._signer.sign(raw, clock=timestamp_at(utc))
+
+    def believes(self, packet: Packet, *, utc: float) -> bool:
+        """Whether a packet is the server's, and is no repetition."""
+        if not packet.is_signed:
+            self.not_believed.unsigned += packet.message_id not in FROM_RADIOS
+            return packet.message_id in FROM_RADIOS
+        if not is_signed_with(packet, self.key.secret):
+            self.not_believed.unknown += 1
+            return False
+        stream, timestamp = stream_of(packet), timestamp_of(packet)
+        if not self._times.is_news(stream, timestamp, clock=timestamp_at(utc), window=WINDOW):
+            self.not_believed.old += 1
+            return False
+        self._times.note(stream, timestamp)
+        return True
+
+    def why_silent(self) -> str:
+        """Give what may be the matter when nothing was believed, in words."""
+        heard = self.not_believed
+        if heard.unknown:
+            return f"what is heard is signed with another key than {self._named()}"
+        if heard.old:
+            return "what is heard is signed for another time: are both clocks right?"
+        if heard.unsigned:
+            return (
+                f"what is heard is not signed: does the server know key {self._named()}, "
+                "and are both clocks right?"
+            )
+        return f"does the server know key {self._named()}, and are both clocks right?"
+
+    def _named(self) -> str:
+        return f"{self.key.name} ({self.key.fingerprint})".lstrip()

@@ -1,0 +1,183 @@
+"""Plans on their way to and from task servers: one after another, tried again while that is safe.
+
+An upload that came to nothing is repeated with the same bytes: within 10 s of the last try the
+server takes it for the same one. While it takes one from another client it refuses at once, and is
+asked again a little later. Pure.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavMissionResult
+from mav_tasks.services.mission_downloader import MissionDownloader
+from mav_tasks.services.mission_item import Item
+from mav_tasks.services.mission_uploader import MissionUploader, Patience
+
+#: the server itself gives up after 2.3 s without an item
+PATIENCE = Patience(count_again=0.5, give_up=2.6, at_most=60.0, last_again=0.5)
+TRIES = 4
+BUSY_AGAIN = 0.25  # s until the next try, where another client's upload is under way
+BUSY_WITHIN = 10.0  # s of such tries
+REST = 0.6  # s after a refusal, in which copies of it may still come
+LATE = 3.0  # s after an upload, in which copies of its ack may still come
+
+MESSAGES = (
+    m.MissionAck,
+    m.MissionCount,
+    m.MissionItem,
+    m.MissionItemInt,
+    m.MissionRequest,
+    m.MissionRequestInt,
+)
+
+#: MAV_MISSION_RESULT, None for silence; the plan's id
+Uploaded = Callable[[MavMissionResult | None, int], None]
+Downloaded = Callable[[tuple[Item, ...] | None, MavMissionResult | None], None]
+
+
+@dataclass(slots=True)
+class _Upload:
+    mission_type: int
+    items: tuple[Item, ...]
+    done: Uploaded
+    tries: int = 0
+    is_asked: bool = False  # an item of it was
+    give_way_until: float = 0.0
+
+
+@dataclass(slots=True)
+class _Download:
+    mission_type: int
+    done: Downloaded
+
+
+class Transfers:
+    """Those with one component."""
+
+    def __init__(self, target: Address) -> None:
+        self.target = target
+        self._uploader = MissionUploader(target, patience=PATIENCE, fits=self._fits)
+        self._downloader = MissionDownloader(target)
+        self._waiting: deque[_Upload | _Download] = deque()
+        self._uploaded: dict[int, tuple[_Upload, float]] = {}  # by id; until when acks may come
+        self._now = 0.0
+        self._rests_until: float | None = None
+
+    def __repr__(self) -> str:
+        return f"Transfers({self.target}, {len(self._waiting)} to do)"
+
+    def upload(
+        self, mission_type: int, items: tuple[Item, ...], done: Uploaded, *, now: float
+    ) -> None:
+        """Send a plan; ``done`` is called once."""
+        self._begin(_Upload(mission_type, items, done), now=now)
+
+    def drop(self, done: Uploaded) -> None:
+        """Nobody waits for an upload any more: one that has not begun is left out.
+
+        One that has begun comes to its end, and is not tried again: it may be there already.
+        """
+        for upload in list(self._waiting):
+            if isinstance(upload, _Upload) and upload.done is done:
+                upload.tries = TRIES
+                if upload is not self._waiting[0] or self._rests_until is not None:
+                    self._waiting.remove(upload)
+
+    def download(self, mission_type: int, done: Downloaded, *, now: float) -> None:
+        """Fetch a plan; ``done`` is called once."""
+        self._begin(_Download(mission_type, done), now=now)
+
+    def receive(self, message: m.Message, *, now: float) -> None:
+        """Take in what the component says of plans."""
+        self._now = now
+        if not self._waiting or self._rests_until is not None:
+            return
+        transfer = self._waiting[0]
+        if isinstance(transfer, _Upload):
+            transfer.is_asked |= isinstance(message, m.MissionRequest | m.MissionRequestInt)
+            self._uploader.receive(message, now=now)
+        else:
+            self._downloader.receive(message, now=now)
+
+    def next_deadline(self) -> float | None:
+        """Give when ``handle_deadline`` has something to do."""
+        begin_at = self._rests_until if self._waiting else None
+        due = (self._uploader.next_deadline(), self._downloader.next_deadline(), begin_at)
+        return min((at for at in due if at is not None), default=None)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Ask and send again."""
+        for each in (self._uploader, self._downloader):
+            due = each.next_deadline()
+            if due is not None and now >= due:
+                each.handle_deadline(now=now)
+        if self._rests_until is not None and now >= self._rests_until:
+            self._rests_until = None
+            if self._waiting:
+                self._start(now=now)
+
+    def take(self) -> list[m.Message]:
+        """Give what is to be sent since the last call."""
+        return self._downloader.take() + self._uploader.take()
+
+    def _fits(self, opaque_id: int) -> bool:
+        """Whether an id can be that of the upload under way: of another plan it is not."""
+        upload = self._waiting[0]
+        assert isinstance(upload, _Upload)
+        earlier, until = self._uploaded.get(opaque_id, (upload, 0.0))
+        is_same = (earlier.mission_type, earlier.items) == (upload.mission_type, upload.items)
+        return is_same or self._now >= until
+
+    def _begin(self, transfer: _Upload | _Download, *, now: float) -> None:
+        self._waiting.append(transfer)
+        if self._rests_until is not None and now >= self._rests_until:
+            self._rests_until = None
+        if len(self._waiting) == 1 and self._rests_until is None:
+            self._start(now=now)
+
+    def _start(self, *, now: float) -> None:
+        transfer = self._waiting[0]
+        if isinstance(transfer, _Upload):
+            transfer.tries += 1
+            transfer.give_way_until = transfer.give_way_until or now + BUSY_WITHIN
+            self._uploader.begin(transfer.mission_type, transfer.items, self._tried, now=now)
+        else:
+            self._downloader.begin(transfer.mission_type, self._fetched, now=now)
+
+    def _tried(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:
+        upload = self._waiting[0]
+        assert isinstance(upload, _Upload)
+        is_others_turn = result == MavMissionResult.DENIED and upload.items and not upload.is_asked
+        if is_others_turn and upload.tries < TRIES and now < upload.give_way_until:
+            upload.tries -= 1
+            self._rests_until = now + BUSY_AGAIN
+            return
+        is_in_vain = result in (None, MavMissionResult.OPERATION_CANCELLED)
+        if is_in_vain and upload.tries < TRIES:
+            self._start(now=now)
+            return
+        self._uploaded = {k: v for k, v in self._uploaded.items() if now < v[1]}
+        if result == MavMissionResult.ACCEPTED:
+            self._uploaded[opaque_id] = upload, now + LATE
+        elif result is not None:
+            self._rests_until = now + REST
+        self._end(now=now)
+        upload.done(result, opaque_id)
+
+    def _fetched(
+        self, items: tuple[Item, ...] | None, refused: MavMissionResult | None, *, now: float
+    ) -> None:
+        download = self._waiting[0]
+        assert isinstance(download, _Download)
+        if refused is not None:
+            self._rests_until = now + REST
+        self._end(now=now)
+        download.done(items, refused)
+
+    def _end(self, *, now: float) -> None:
+        self._waiting.popleft()
+        if self._waiting and self._rests_until is None:
+            self._start(now=now)

@@ -1,0 +1,230 @@
+"""What a client learns: frozen values of what the server's messages say. SI units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from math import isfinite
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
+
+UNKNOWN_POSITION = 65535
+UNKNOWN_PROGRESS = 255
+
+
+class Unit(IntEnum):
+    """TASK_UNIT: what ``TaskStatus.remaining`` counts."""
+
+    NONE = 0
+    METRES = 1
+    RADIANS = 2
+    SECONDS = 3
+    ITEMS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class TaskStatus:
+    """One task as the server told it last.
+
+    ``progress`` is 0 to 1, ``remaining`` in ``unit``, times in seconds; None is "not known".
+    ``position`` counts the tasks that run before it; only answers to a question have it. ``step``
+    of ``steps`` is the item of a plan that is being driven. ``version`` grows with each change.
+    """
+
+    id: int
+    vehicle: int
+    state: TaskState
+    reason: TaskReason
+    words: str
+    priority: int
+    after: int
+    nonce: int
+    command: int
+    progress: float | None
+    remaining: float | None
+    unit: Unit
+    position: int | None
+    time_to_start: float | None
+    time_to_finish: float | None
+    execution_time: float | None
+    step: int
+    steps: int
+    submitter: str
+    version: int
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended, in whatever way."""
+        return self.state in TERMINAL
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it has begun and is not over."""
+        return self.state in ACTIVE
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it has not begun."""
+        return self.state in WAITING
+
+
+@dataclass(frozen=True, slots=True)
+class QueueStatus:
+    """A rover's queue. ``paused`` says why nothing runs, None: it does.
+
+    ``counts`` are its tasks by state; ``waiting`` are those asked for, in the order in which they
+    run, those that wait for a time or another task after them.
+    """
+
+    vehicle: int
+    running: int | None
+    next: int | None
+    capacity: int
+    counts: Mapping[TaskState, int]
+    paused: TaskReason | None
+    waiting: tuple[TaskStatus, ...]
+    current: TaskStatus | None
+    version: int
+
+    @property
+    def waiting_count(self) -> int:
+        """How many tasks have not begun."""
+        return sum(self.counts.get(state, 0) for state in WAITING)
+
+
+@dataclass(frozen=True, slots=True)
+class TaskTiming:
+    """How evenly the setpoints of a task left the server while it was being driven.
+
+    ``rate`` in Hz is what the server is set to; of the ``count`` intervals between two setpoints
+    half were at most ``p50`` seconds, 99 in 100 at most ``p99``, and the longest is ``max``; None
+    where there was no interval. ``late`` of them were longer than one and a half of what ``rate``
+    asks for.
+    """
+
+    id: int
+    vehicle: int
+    rate: float
+    count: int
+    late: int
+    p50: float | None
+    p99: float | None
+    max: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleStatus:
+    """A rover as its telemetry shows it. ``north`` and ``east`` in m, ``yaw`` in rad, ``speed`` in
+    m/s; None is "not heard". ``is_heard``: its heartbeats come. ``server_component`` is the task
+    server's component id inside its system.
+    """
+
+    id: int
+    kind: str
+    armed: bool
+    mode: str
+    is_heard: bool
+    server_component: int
+    north: float | None = None
+    east: float | None = None
+    yaw: float | None = None
+    speed: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A STATUSTEXT: ``severity`` 0 (emergency) to 7 (debug), who said it, and the words."""
+
+    vehicle: int
+    component: int
+    severity: int
+    words: str
+
+
+def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
+    """Give what a TASK_STATUS says; ``vehicle`` is the system that it came from."""
+    reason = reason_of(message.reason)
+    return TaskStatus(
+        id=message.task_id,
+        vehicle=vehicle,
+        state=state_of(message.state),
+        reason=reason,
+        words=_text(message.text) or words_of(reason),
+        priority=message.priority,
+        after=message.after_task_id,
+        nonce=message.nonce,
+        command=message.command,
+        progress=None if message.progress == UNKNOWN_PROGRESS else message.progress / 100,
+        remaining=known(message.remaining),
+        unit=unit_of(message.remaining_unit),
+        position=None if message.queue_position == UNKNOWN_POSITION else message.queue_position,
+        time_to_start=known(message.time_to_start),
+        time_to_finish=known(message.time_to_finish),
+        execution_time=known(message.execution_time),
+        step=message.step,
+        steps=message.step_count,
+        submitter=f"{message.submitter_system}/{message.submitter_component}",
+        version=message.version,
+    )
+
+
+def task_timing_of(message: m.TaskTiming, vehicle: int) -> TaskTiming:
+    """Give what a TASK_TIMING says; ``vehicle`` is the system that it came from."""
+    return TaskTiming(
+        id=message.task_id,
+        vehicle=vehicle,
+        rate=message.rate,
+        count=message.count,
+        late=message.late,
+        p50=known(message.p50),
+        p99=known(message.p99),
+        max=known(message.longest),
+    )
+
+
+def queue_status_of(
+    message: m.TaskQueueStatus,
+    vehicle: int,
+    waiting: tuple[TaskStatus, ...],
+    current: TaskStatus | None,
+) -> QueueStatus:
+    """Give what a TASK_QUEUE_STATUS says, with tasks that were asked for besides."""
+    counts = {
+        state: count for state, count in zip(TaskState, message.counts, strict=False) if count
+    }
+    return QueueStatus(
+        vehicle=vehicle,
+        running=message.running_id or None,
+        next=message.next_id or None,
+        capacity=message.capacity,
+        counts=counts,
+        paused=reason_of(message.paused_reason) if message.paused_reason else None,
+        waiting=waiting,
+        current=current,
+        version=message.version,
+    )
+
+
+def reason_of(number: int) -> TaskReason:
+    """Give a TASK_REASON; one of a newer server, that is not known here, as NONE."""
+    return TaskReason(number) if number in TaskReason._value2member_map_ else TaskReason.NONE
+
+
+def state_of(number: int) -> TaskState:
+    """Give a TASK_STATE; one that is not known here as UNKNOWN."""
+    return TaskState(number) if number in TaskState._value2member_map_ else TaskState.UNKNOWN
+
+
+def unit_of(number: int) -> Unit:
+    """Give a TASK_UNIT; one that is not known here as NONE."""
+    return Unit(number) if number in Unit._value2member_map_ else Unit.NONE
+
+
+def known(value: float) -> float | None:
+    """Give a number, None for NaN."""
+    return value if isfinite(value) else None
+
+
+def _text(text: str | bytes) -> str:
+    raw = text if isinstance(text, bytes) else text.encode("utf-8", "replace")
+    return raw.split(b"\0")[0].decode("utf-8", "replace")

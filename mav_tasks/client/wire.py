@@ -1,0 +1,226 @@
+"""Goals → commands and mission items, in the units and with the parameters that the contract names.
+
+Pure. Our own three goals go as commands, which carry a nonce and their terms; every other goal goes
+as a plan of one, whose TASK_OPTIONS item carries both: so that each submission can be repeated and
+is one task, and two equal ones are two.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees, isfinite
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.plan_files.values import PlanItem
+from mav_tasks.services.mission_item import Item
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    GlobalPlace,
+    GoTo,
+    LocalPlace,
+    Move,
+    Place,
+    Rotate,
+    Wait,
+)
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID
+
+#: what a client can ask for; angles in radians
+Goal = Move | Rotate | Drive | GoTo | Face | Wait
+Command = m.CommandLong | m.CommandInt
+
+LOCAL_SCALE = 1e4  # x and y in a local frame are metres times this
+LARGEST = 0x7FFFFFFE  # of x and y; one more is "not given"
+ON_THE_SPOT = 0.01  # m, how near a place is "there" where nothing is said
+STOPPING = 0.01  # s; a place without any time at it is passed
+NORTH = 360.0  # deg; 0 would be "as it comes"
+LEAST_YAW = 1e-4  # deg, which is north
+OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: as configured
+
+
+@dataclass(frozen=True, slots=True)
+class WishedTerms:
+    """On what terms a task is to run: seconds from now, an id, a priority."""
+
+    priority: int = DEFAULT_PRIORITY
+    after: int = 0
+    delay: float = 0.0
+    deadline: float = 0.0
+
+    def __post_init__(self) -> None:
+        _whole("priority", self.priority, 0, MAX_PRIORITY)
+        _whole("after", self.after, 0, MAX_TASK_ID)
+        for name, value in (("delay", self.delay), ("deadline", self.deadline)):
+            if not (isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} {value!r}: expected seconds, 0 or more")
+
+
+def check_nonce(nonce: int) -> None:
+    """Raise ValueError for what is no nonce, and not 0 for none."""
+    _whole("nonce", nonce, 0, MAX_TASK_ID)
+
+
+def is_command(goal: Goal) -> bool:
+    """Whether a goal has a command of our own."""
+    return isinstance(goal, Move | Rotate | Drive)
+
+
+def command_of(
+    goal: Move | Rotate | Drive, terms: WishedTerms, *, target: tuple[int, int], nonce: int
+) -> m.CommandLong:
+    """Give the command that submits a goal; its deadline, if any, is set afterwards."""
+    command, first, second, third = _own(goal)
+    return m.CommandLong(
+        *target,
+        command,
+        0,
+        first,
+        second,
+        third,
+        float(nonce),
+        float(terms.after),
+        terms.delay,
+        float(terms.priority),
+    )
+
+
+def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
+    """Give the items of a plan that drives these goals in their order."""
+    for goal in goals:
+        if not isinstance(goal, Goal):
+            raise ValueError(f"{goal!r}: expected a goal, such as Move(2.0)")
+    return tuple(item for goal in goals for item in _items(goal))
+
+
+def items_of_file(items: Sequence[PlanItem]) -> tuple[Item, ...]:
+    """Give the items of a file as they are sent."""
+    return tuple(
+        Item(i.frame, i.command, 0, int(i.autocontinue), *i.params, i.x, i.y, i.z) for i in items
+    )
+
+
+def file_items(items: Sequence[Item]) -> tuple[PlanItem, ...]:
+    """Give items that were fetched as a file has them: the inverse of ``items_of_file``."""
+    return tuple(
+        PlanItem(
+            i.command,
+            i.frame,
+            (i.param1, i.param2, i.param3, i.param4),
+            i.x,
+            i.y,
+            i.z,
+            bool(i.autocontinue),
+        )
+        for i in items
+    )
+
+
+def with_home(items: Sequence[Item]) -> tuple[Item, ...]:
+    """Give items behind a home, as ArduPilot has it: each jump goes one further."""
+    home = Item(MavFrame.GLOBAL, MavCmd.NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+    moved = (
+        item._replace(param1=item.param1 + 1) if item.command == MavCmd.DO_JUMP else item
+        for item in items
+    )
+    return (home, *moved)
+
+
+def options_of(terms: WishedTerms, *, nonce: int) -> Item:
+    """Give the item about the plan as a whole.
+
+    It goes last, so that the numbers in jumps stay right. The nonce tells this plan from an equal
+    one, and has the server know it when it is sent again, however late.
+    """
+    return Item(
+        MavFrame.MISSION,
+        MavCmd.TASK_OPTIONS,
+        0,
+        1,
+        float(terms.priority),
+        terms.delay,
+        terms.deadline,
+        float(terms.after),
+        nonce,
+        0,
+        0.0,
+    )
+
+
+def _own(goal: Move | Rotate | Drive) -> tuple[int, float, float, float]:
+    match goal:
+        case Move():
+            _numbers(goal, distance=goal.distance, speed=goal.speed or 0.0)
+            return MavCmd.TASK_MOVE, goal.distance, goal.speed or 0.0, 0.0
+        case Rotate():
+            _numbers(goal, angle=goal.angle, rate=goal.rate or 0.0)
+            return MavCmd.TASK_ROTATE, degrees(goal.angle), degrees(goal.rate or 0.0), 0.0
+        case Drive():
+            _numbers(goal, forward=goal.forward, yaw_rate=goal.yaw_rate, duration=goal.duration)
+            return MavCmd.TASK_DRIVE, goal.forward, degrees(goal.yaw_rate), goal.duration
+
+
+def _items(goal: Goal) -> tuple[Item, ...]:
+    match goal:
+        case Move() | Rotate() | Drive():
+            command, first, second, third = _own(goal)
+            return (_item(command, first, second, third, 0.0),)
+        case Wait(duration=duration):
+            _numbers(goal, duration=duration)
+            return (_item(MavCmd.NAV_DELAY, duration, 0.0, 0.0, 0.0),)
+        case Face(yaw=yaw, direction=direction, rate=rate):
+            _numbers(goal, yaw=yaw, rate=rate or 0.0)
+            heading, how = degrees(yaw) % 360.0, float(direction)
+            return (_item(MavCmd.CONDITION_YAW, heading, degrees(rate or 0.0), how, 0.0),)
+        case GoTo():
+            return _way(goal)
+
+
+def _way(goal: GoTo) -> tuple[Item, ...]:
+    _numbers(goal, wait=goal.wait, radius=goal.radius or 0.0, speed=goal.speed or 0.0)
+    wait = goal.wait if goal.passes else max(goal.wait, STOPPING)
+    yaw = 0.0
+    if goal.yaw is not None:
+        _numbers(goal, yaw=goal.yaw)
+        yaw = degrees(goal.yaw) % 360.0
+        yaw = NORTH if yaw < LEAST_YAW else yaw
+    if goal.place is None:
+        if goal.wait or goal.yaw is not None or goal.radius:
+            raise ValueError(f"{goal}: a return takes a speed alone; let a Wait or Face follow it")
+        way = _item(MavCmd.NAV_RETURN_TO_LAUNCH, 0.0, 0.0, 0.0, 0.0)
+    else:
+        frame, x, y = _at(goal.place)
+        radius = goal.radius or (0.0 if goal.passes else ON_THE_SPOT)
+        way = Item(frame, MavCmd.NAV_WAYPOINT, 0, 1, wait, radius, 0.0, yaw, x, y, 0.0)
+    if goal.speed is None:
+        return (way,)
+    return _speed(goal.speed), way, _speed(OWN_DEFAULT)
+
+
+def _at(place: Place) -> tuple[int, int, int]:
+    if isinstance(place, GlobalPlace):
+        return MavFrame.GLOBAL, place.latitude_degE7, place.longitude_degE7
+    _numbers(place, north=place.north, east=place.east)
+    x, y = round(place.north * LOCAL_SCALE), round(place.east * LOCAL_SCALE)
+    if max(abs(x), abs(y)) > LARGEST:
+        raise ValueError(f"{place}: further away than a mission item can name")
+    return MavFrame.LOCAL_NED, x, y
+
+
+def _speed(speed: float) -> Item:
+    return _item(MavCmd.DO_CHANGE_SPEED, 1.0, speed, -1.0, 0.0)
+
+
+def _item(command: int, p1: float, p2: float, p3: float, p4: float) -> Item:
+    return Item(MavFrame.MISSION, command, 0, 1, p1, p2, p3, p4, 0, 0, 0.0)
+
+
+def _numbers(goal: Goal | LocalPlace, **values: float) -> None:
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise ValueError(f"{goal}: {name} is no number")
+
+
+def _whole(name: str, value: int, low: int, high: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ValueError(f"{name} {value!r}: expected a whole number from {low} to {high}")

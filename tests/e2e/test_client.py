@@ -1,0 +1,304 @@
+"""The client library against a real server and rover: what a script author relies on."""
+
+import asyncio
+import signal
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from math import radians
+from pathlib import Path
+
+import pytest
+
+from mav_tasks import (
+    Client,
+    GoTo,
+    LocalPlace,
+    Move,
+    NoAnswer,
+    NoSuchVehicle,
+    Refused,
+    Rotate,
+    SyncClient,
+    TaskFailed,
+    TaskReason,
+    TaskState,
+    TaskStatus,
+    Wait,
+)
+from tests.kit.awaited import awaited
+from tests.kit.processes import Process, Stand, free_udp_ports, process, stand
+
+S, R = TaskState, TaskReason
+
+pytestmark = pytest.mark.slow
+
+CLIENTS = 50
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
+    """One server and rover for all of them; each leaves the queue empty."""
+    with stand(tmp_path_factory.mktemp("client")) as it:
+        yield it
+
+
+def url(it: Stand) -> str:
+    return f"udpout:127.0.0.1:{it.client_port}"
+
+
+def serve(
+    folder: Path, client_port: int, rover_port: int, name: str
+) -> AbstractContextManager[Process]:
+    return process(
+        *("-m", "mav_tasks.cli", "serve", "--no-push"),
+        *("--client", f"udpin:127.0.0.1:{client_port}"),
+        *("--vehicle", f"udpout:127.0.0.1:{rover_port}"),
+        *("--store", str(folder / "tasks.sqlite3")),
+        folder=folder,
+        name=name,
+    )
+
+
+@awaited
+async def test_a_script_submits_watches_and_awaits(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        (rover,) = tasks.vehicles()
+        assert (rover.id, rover.kind, rover.server_component) == (1, "ardupilot", 191)
+
+        first = await tasks.submit(Move(0.4), priority=3)
+        turn = await tasks.submit(Rotate(radians(30)), priority=8)
+        way = await tasks.submit([GoTo(LocalPlace(0.0, 0.0), radius=0.3), Wait(0.3)], after=turn)
+
+        queue = await tasks.queue()
+        assert (queue.running, queue.waiting_count) == (first.id, 2)
+        assert [(t.id, t.state) for t in queue.waiting] == [
+            (turn.id, S.QUEUED),
+            (way.id, S.BLOCKED),
+        ]
+        seen = [status async for status in first.updates(interval=0.1)]
+        shares = [status.progress or 0.0 for status in seen]
+        assert shares == sorted(shares)
+        assert len(set(shares)) > 4
+        assert seen[-1].state is S.COMPLETED
+        assert (await turn.done()).state is S.COMPLETED
+        done = await way.done()
+        assert (done.step, done.steps) == (3, 3)
+        assert (done.execution_time or 0.0) > 0.3
+
+
+@awaited
+async def test_a_refusal_says_why_in_words(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        with pytest.raises(Refused, match="param1 distance") as refused:
+            await tasks.submit(Move(1e6))
+        assert (refused.value.result, refused.value.reason) == (2, R.BAD_PARAMETER)
+        with pytest.raises(Refused, match="no task 999999") as unknown:
+            await tasks.status(999_999)
+        assert unknown.value.reason == R.NOT_FOUND
+        with pytest.raises(Refused):
+            await tasks.submit([GoTo(LocalPlace(50_000.0, 0.0)), Wait(1.0)])
+        with pytest.raises(Refused, match="no task is running"):
+            await tasks.cancel()
+        with pytest.raises(NoSuchVehicle, match="rover 9 is not there: there is rover 1"):
+            await tasks.submit(Move(1.0), vehicle=9)
+
+
+@awaited
+async def test_how_a_task_ended_otherwise_is_one_error(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        later = await tasks.submit(Move(1.0), delay=1000.0)
+        assert (await later.refresh()).state is S.SCHEDULED
+        await later.modify(priority=9, deadline=500.0)
+        assert (await later.refresh()).priority == 9
+        await later.cancel()
+        with pytest.raises(TaskFailed, match=f"task {later.id} cancelled") as failed:
+            await later.done()
+        assert (failed.value.state, failed.value.task_id) == (S.CANCELLED, later.id)
+        with pytest.raises(Refused):
+            await later.cancel()
+
+
+@awaited
+async def test_stop_pause_and_resume(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        moving = await tasks.submit(Move(5.0))
+        async for status in moving.updates(interval=0.1):
+            if status.progress:
+                break
+        await tasks.pause()
+        assert (await tasks.queue()).paused is R.OPERATOR
+        await tasks.resume()
+        await tasks.stop(clear=True)
+        with pytest.raises(TaskFailed, match="killed") as killed:
+            await moving.done()
+        assert killed.value.reason == R.STOP
+        assert (await tasks.queue()).paused is R.STOPPED
+        await tasks.resume()
+        assert (await tasks.queue()).paused is None
+
+
+@awaited
+async def test_a_mission_from_a_list_staged_started_and_fetched(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        staged = await tasks.stage_mission([Wait(0.2), Rotate(0.2)])
+        assert (await staged.refresh()).reason is R.WAITING_FOR_START
+        assert [item.command for item in await tasks.mission()] == [16, 93, 54001]
+        started = await tasks.start_mission()
+        assert started.id == staged.id
+        assert (await started.done()).state is S.COMPLETED
+
+
+@awaited
+async def test_a_task_of_somebody_else_is_awaited_as_ones_own(running: Stand) -> None:
+    async with Client(url(running)) as theirs, Client(url(running)) as ours:
+        submitted = await theirs.submit(Rotate(0.3))
+        watched = await ours.task(submitted.id)
+        assert (await watched.done()).state is S.COMPLETED
+        again = await ours.task(submitted.id)  # long over
+        assert (await again.done()).state is S.COMPLETED
+
+
+@awaited
+async def test_texts_are_heard(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        texts = tasks.texts()
+        hearing = asyncio.ensure_future(anext(texts))
+        await asyncio.sleep(0)
+        task = await tasks.submit(Rotate(0.1))
+        heard = await asyncio.wait_for(hearing, 10)
+        assert heard.words.startswith(f"Task {task.id} ")
+        await texts.aclose()  # type: ignore[attr-defined]
+        await task.done()
+
+
+@awaited
+async def test_fifty_clients_each_learn_of_their_own(running: Stand) -> None:
+    async def one(number: int) -> tuple[int, int]:
+        async with Client(url(running), timeout=20.0) as tasks:
+            task = await tasks.submit(Move(1.0 + number), delay=600.0)
+            told = (await task.refresh()).remaining
+            assert told == pytest.approx(1.0 + number)
+            await task.cancel()
+            with pytest.raises(TaskFailed) as ended:
+                await task.done()
+            return ended.value.task_id, task.id
+
+    ended = await asyncio.gather(*(one(number) for number in range(CLIENTS)))
+    assert all(told == own for told, own in ended)
+    assert len({own for _, own in ended}) == CLIENTS
+
+
+def test_the_same_without_asyncio(running: Stand) -> None:
+    with SyncClient(url(running)) as tasks:
+        task = tasks.submit(Rotate(-0.3))
+        progress = [status.progress for status in task.updates(interval=0.1)]
+        assert progress[-1] == 1.0
+        assert task.done(timeout=1.0).state is S.COMPLETED
+        later = tasks.submit(Move(1.0), delay=600.0)
+        words = rf"task {later.id} is not over after 0.2 s: move 1 m: scheduled \(start time\)"
+        with pytest.raises(TimeoutError, match=words):
+            later.done(timeout=0.2)
+        assert tasks.queue().waiting_count == 1
+        tasks.clear()
+        with pytest.raises(TaskFailed, match="cleared"):
+            later.done(timeout=5.0)
+        assert [rover.id for rover in tasks.vehicles()] == [1]
+        soon = tasks.submit(Rotate(0.1), delay=0.5)
+        words = f"Task {soon.id} started"
+        assert next(text.vehicle for text in tasks.texts() if text.words == words) == 1
+        soon.done(timeout=10.0)
+
+
+def test_what_is_still_read_when_the_client_is_closed_ends_quietly(
+    running: Stand, caplog: pytest.LogCaptureFixture
+) -> None:
+    with SyncClient(url(running)) as tasks:
+        task = tasks.submit(Rotate(0.05), delay=1.0)  # of which something is said when it begins
+        texts, updates = tasks.texts(), task.updates()
+        next(updates)
+        next(texts)
+        task.done(timeout=10.0)
+    assert not caplog.records
+
+
+@awaited
+async def test_nobody_there_is_said_in_time() -> None:
+    (port,) = free_udp_ports(1)
+    with pytest.raises(NoAnswer, match=f"nothing heard on udpout:127.0.0.1:{port} within 0.3 s"):
+        async with Client(f"udpout:127.0.0.1:{port}", timeout=0.3):
+            pass
+
+
+@awaited
+async def test_a_rover_without_a_task_server_is_told_apart(running: Stand) -> None:
+    with pytest.raises(NoAnswer, match=r"rover 1 is heard on .*, but no task server answered"):
+        async with Client(f"udpout:127.0.0.1:{running.rover_port}", timeout=2.5):
+            pass
+
+
+@awaited
+async def test_who_waits_is_told_when_the_client_is_closed(running: Stand) -> None:
+    async with Client(url(running)) as tasks:
+        task = await tasks.submit(Move(1.0), delay=600.0)
+        waiting = asyncio.ensure_future(task.done())
+        await asyncio.sleep(0)
+    with pytest.raises(Exception, match="the client was closed"):
+        await waiting
+    async with Client(url(running)) as tasks:
+        await tasks.clear()
+
+
+@pytest.mark.parametrize(
+    ("number", "state", "end"),
+    [(signal.SIGKILL, S.HELD, S.CANCELLED), (signal.SIGTERM, S.PAUSED, S.COMPLETED)],
+)
+@awaited
+async def test_handles_outlive_the_server(
+    tmp_path: Path, number: int, state: TaskState, end: TaskState
+) -> None:
+    client_port, rover_port = free_udp_ports(2)
+    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic")
+    with process(*rover, folder=tmp_path, name="rover"):
+        with serve(tmp_path, client_port, rover_port, "first") as server:
+            server.wait_for("vehicle 1: found")
+            tasks = Client(f"udpout:127.0.0.1:{client_port}")
+            tasks.open()
+            await tasks.found()
+            driving = await tasks.submit(Move(1.0))
+            waiting = await tasks.submit(Rotate(0.3))
+            cancelled = await tasks.submit(Move(1.0), delay=600.0)
+            ends = [asyncio.ensure_future(t.done()) for t in (driving, waiting, cancelled)]
+            async for status in driving.updates(interval=0.1):
+                if status.progress:
+                    break
+            server.end(number)
+        with serve(tmp_path, client_port, rover_port, "second") as server:
+            server.wait_for("vehicle 1: found")
+            async for status in driving.updates():
+                if status.state is state:
+                    break
+            if state is S.HELD:
+                assert status.reason is R.OUTCOME_UNKNOWN
+                await driving.release("skip")
+            await cancelled.cancel()
+            await tasks.resume()
+            done = await asyncio.gather(*ends, return_exceptions=True)
+            await tasks.close()
+    assert [_state(each) for each in done] == [end, S.COMPLETED, S.CANCELLED]
+
+
+def _state(end: TaskStatus | BaseException) -> int:
+    return end.state if isinstance(end, TaskStatus | TaskFailed) else -1
+
+
+@awaited
+async def test_a_server_that_knows_nothing_any_more_says_so(tmp_path: Path) -> None:
+    with stand(tmp_path) as it:  # its store is in its memory
+        async with Client(url(it)) as tasks:
+            task = await tasks.submit(Move(1.0), delay=600.0)
+            ending = asyncio.ensure_future(task.done())
+            it.server.end(signal.SIGKILL)
+            with serve(tmp_path, it.client_port, it.rover_port, "second") as again:
+                again.wait_for("vehicle 1: found")
+                with pytest.raises(TaskFailed, match="does not know it any more"):
+                    await ending
