@@ -1,0 +1,155 @@
+"""``mav-tasks probe``: find out about one rover, directly, and write its profile."""
+
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli.command import command
+
+if TYPE_CHECKING:
+    from mav_tasks.probe.probe import Probe
+
+Url = Annotated[
+    str,
+    typer.Argument(
+        metavar="URL",
+        help="Of the rover itself: udpout:host:port, udpin:…, tcp:…, serial:/dev/ttyUSB0:57600.",
+    ),
+]
+DriveFlag = Annotated[
+    bool,
+    typer.Option("--drive", help="Arm it and drive it, slowly, within 1 m of where it stands."),
+]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="With --drive: do not ask first.")]
+Speed = Annotated[
+    float,
+    typer.Option(min=0.1, max=0.5, metavar="M/S", help="At which stopping is measured."),
+]
+Number = Annotated[
+    int | None, typer.Option(min=1, max=255, metavar="N", help="Which rover, if several are heard.")
+]
+Timeout = Annotated[
+    float,
+    typer.Option(
+        "--timeout", min=1.0, metavar="SECONDS", help="Until a rover must have been heard."
+    ),
+]
+Output = Annotated[
+    str | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="Where its profile is written; default: the folder vehicles in your configuration.",
+    ),
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Allow a link that other machines can reach.")
+]
+Sign = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME", envvar="MAV_TASKS_SIGN", help="Sign with this key, and hear only it."
+    ),
+]
+Keys = Annotated[
+    str, typer.Option(metavar="FILE", help="The key ring; default: that of the configuration.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+QUESTION = """\
+The rover will be armed and driven, at up to {speed:g} m/s, within a box of 2 m about its place.
+Is there room, is nobody near it, and can you stop it by hand? If this program is killed, only the
+rover's own time-out stops it. Type "yes" to drive: """
+SIGNALLED = 128  # as a shell reports a signal
+
+
+@command
+async def probe(
+    url: Url,
+    drive: DriveFlag = False,
+    yes: Yes = False,
+    speed: Speed = 0.3,
+    vehicle: Number = None,
+    find_within: Timeout = 10.0,
+    output: Output = None,
+    insecure: Insecure = False,
+    sign: Sign = "",
+    keys: Keys = "",
+    as_json: Json = False,
+) -> None:
+    """Find out what a rover can do, directly, with no server between.
+
+    It changes nothing for good and moves nothing, unless --drive is said.
+    """
+    from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415
+    from mav_tasks.errors import NoAnswer, UsageError  # noqa: PLC0415
+    from mav_tasks.probe.probe import NothingHeard, Occupied, Options  # noqa: PLC0415
+    from mav_tasks.probing import run_probe  # noqa: PLC0415
+
+    if drive and not yes:
+        _confirm(speed)
+    key = key_to_sign_with(sign, keys) if sign else None
+    options = Options(drive=drive, speed=speed, system_id=vehicle, find_within=find_within)
+    done, signal = await run_probe(url, options, insecure=insecure, key=key, on_stage=_say)
+    if isinstance(done.error, NothingHeard):
+        raise NoAnswer(str(done.error))
+    if isinstance(done.error, Occupied):
+        raise UsageError(str(done.error))
+    _show(done, output, as_json=as_json)
+    if signal:
+        raise typer.Exit(SIGNALLED + signal)
+    if done.findings.drive is not None and done.findings.drive.ended:
+        raise typer.Exit(1)
+
+
+def _confirm(speed: float) -> None:
+    from mav_tasks.errors import UsageError  # noqa: PLC0415
+
+    if not sys.stdin.isatty():
+        raise UsageError("--drive moves the rover: say --yes where nobody can be asked")
+    sys.stderr.write(QUESTION.format(speed=speed))
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() != "yes":
+        raise UsageError("not driven: the answer was not yes")
+
+
+def _show(done: "Probe", output: str | None, *, as_json: bool) -> None:
+    """Print the report, and write the profile; ConfigError, after all was said, if it cannot be."""
+    from mav_tasks.cli import output as out  # noqa: PLC0415
+    from mav_tasks.errors import ConfigError  # noqa: PLC0415
+    from mav_tasks.probe import report  # noqa: PLC0415
+    from mav_tasks.probe.profile import why_none  # noqa: PLC0415
+
+    why, path, fault = why_none(done.findings), "", None
+    if not why:
+        try:
+            path = _keep(done, output)
+        except ConfigError as error:
+            why, fault = str(error), error
+    if as_json:
+        values = report.as_json(done.findings)
+        out.say_json(values | {"profile": path or None, "no_profile": why or None})
+    else:
+        from mav_tasks.cli.probe_table import table_of  # noqa: PLC0415
+
+        out.show(table_of(report.lines_of(done.findings)))
+        out.say(f"profile written to {path}" if path else f"no profile: {why}")
+    if fault is not None:
+        raise fault
+
+
+def _keep(done: "Probe", output: str | None) -> str:
+    """Write the profile; gives its path."""
+    from datetime import UTC, datetime  # noqa: PLC0415
+
+    from mav_tasks.config import profiles  # noqa: PLC0415
+    from mav_tasks.probe.profile import profile_of  # noqa: PLC0415
+
+    profile = profile_of(done.findings, probed=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")
+    return str(profiles.write(profile, output))
+
+
+def _say(words: str) -> None:
+    sys.stderr.write(f"mav-tasks: {words}\n")
+    sys.stderr.flush()

@@ -1,0 +1,1 @@
+"""Finding out about one rover, directly: questions, and with leave a little driving. Pure."""

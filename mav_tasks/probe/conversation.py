@@ -1,0 +1,254 @@
+"""One end of a talk with one rover: what it says, what it was asked, what is to be sent. Pure."""
+
+from collections import Counter
+
+from mav_tasks.engine.motion_monitor import MotionMonitor
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.codec import Decoder, Encoder
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavType
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.probe.others import SETPOINTS, Others
+from mav_tasks.probe.steps import Steps, Wait
+from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.heartbeat import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
+from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
+from mav_tasks.services.persona import Persona
+from mav_tasks.services.text_receiver import TextReceiver
+from mav_tasks.settings import Watch
+
+NO_ANSWER = "no answer"
+GIVE_UP = 1.0  # s, of a command that is not answered
+MOST_TEXTS = 200
+NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
+USED = SETPOINTS | {
+    kind.id
+    for kind in (
+        m.Heartbeat,
+        m.Attitude,
+        m.LocalPositionNed,
+        m.AutopilotVersion,
+        m.CommandAck,
+        m.MessageInterval,
+        m.MissionCount,
+        m.MissionAck,
+        m.ParamValue,
+        m.Statustext,
+        m.SysStatus,
+        m.TaskQueueStatus,
+        m.TaskStatus,
+    )
+}
+
+
+class Conversation:
+    """Packets and time in, packets out; the steps of the probe look at it and ask through it."""
+
+    def __init__(self, source: Address, *, system_id: int | None, watch: Watch, now: float) -> None:
+        """``system_id``: of the rover that is meant; None: the first that is heard."""
+        self.now = now
+        self.source = source
+        self.watch = watch
+        self.others = Others(source)
+        self.sender = CommandSender(source)
+        self.motion = MotionMonitor(watch)
+        self.control: OffboardControl | None = None
+        self.persona: Persona | None = None
+        self.rover: Address | None = None
+        self.monitor: HeartbeatMonitor | None = None
+        #: of the autopilot, by id
+        self.latest: dict[int, m.Message] = {}
+        self.counts: Counter[int] = Counter()
+        self.parameters: dict[str, m.ParamValue] = {}
+        self.intervals: dict[int, int] = {}  # µs, by message id, as MESSAGE_INTERVAL has them
+        self.texts: list[str] = []
+        self._wanted_id = system_id
+        self._decoder = Decoder()
+        self._encoder = Encoder(source)
+        self._heartbeat = HeartbeatSender(now=now)
+        self._text_receiver = TextReceiver()
+        self._answers: dict[int, m.CommandAck | None] = {}
+        self._outgoing: list[m.Message] = []
+        self._requests: list[m.Message] = []
+
+    def __repr__(self) -> str:
+        return f"Conversation({self.rover}, {self.monitor!r})"
+
+    @property
+    def target(self) -> Address:
+        """The rover's autopilot; it must have been heard."""
+        assert self.rover is not None
+        return self.rover
+
+    @property
+    def armed(self) -> bool:
+        """Whether it was last seen armed."""
+        return self.monitor is not None and self.monitor.armed
+
+    @property
+    def mode(self) -> int:
+        """The custom_mode that it showed last; -1: none."""
+        return -1 if self.monitor is None else self.monitor.custom_mode
+
+    # time and packets
+
+    def receive(self, packet: Packet, *, now: float) -> None:
+        """Take a packet in."""
+        self.now = now
+        is_rover = packet.source == self.rover
+        if is_rover:
+            self.counts[packet.message_id] += 1
+        if packet.message_id not in USED:
+            return
+        message = self._decoder.decode(packet)
+        if message is None:
+            return
+        self.others.receive(packet, message)
+        if self.rover is None and isinstance(message, m.Heartbeat):
+            self._meet(packet, message)
+        elif is_rover:
+            self._hear(packet, message)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Repeat and give up what is due; say that we are here."""
+        self.now = now
+        if self._heartbeat.is_due(now=now):
+            self.send(gcs_heartbeat())
+        self.sender.handle_deadline(now=now)
+        for text in self._text_receiver.handle_deadline(now=now):
+            self._note_text(text.words)
+        self._take_answers()
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do."""
+        due = [self._heartbeat.next_deadline(), self._text_receiver.next_deadline()]
+        at = self.sender.next_deadline()
+        return min(due if at is None else [*due, at])
+
+    def take_packets(self) -> list[bytes]:
+        """Give what is to be sent since the last call, in order."""
+        self._take_answers()
+        requests, self._requests = self._requests, []
+        setpoints = [] if self.control is None else self.control.take_messages()
+        # in the control mode a zero comes before arming
+        in_order = (requests, setpoints) if self._holds_first() else (setpoints, requests)
+        messages = [*self._outgoing, *in_order[0], *in_order[1]]
+        self._outgoing = []
+        return [self._encoder.encode(message) for message in messages]
+
+    def last_words(self) -> list[bytes]:
+        """Give zero, HOLD and disarming, for an end on which nothing can be waited for.
+
+        None where nothing is in our hands.
+        """
+        control = self.control
+        if control is None or not (control.is_engaged or control.we_armed):
+            return []
+        words: list[m.Message] = [control.hold_request(), control.zero_setpoint()]
+        if self._zero_first():
+            words.reverse()
+        if control.we_armed:
+            words.append(_arm_request(self.target, arm=False))
+        return [self._encoder.encode(message) for message in words]
+
+    # what the steps ask
+
+    def send(self, message: m.Message) -> None:
+        """Send a message once."""
+        self._outgoing.append(message)
+
+    def ask(self, command: MavCmd, *params: float, component: int = AUTOPILOT) -> Steps[str]:
+        """Send a command until it is answered; gives the result's name, "no answer" for none."""
+        filled = (*params, *(0.0,) * (7 - len(params)))
+        message = m.CommandLong(self.target.system_id, component, command, 0, *filled)
+        self._answers.pop(command, None)
+        self.sender.request(message, now=self.now, give_up_after=GIVE_UP)
+        yield Wait(lambda: command in self._answers, GIVE_UP + 1.0)
+        ack = self._answers.get(command)
+        return NO_ANSWER if ack is None else result_name(ack.result)
+
+    def ask_to_show(self) -> None:
+        """Have the rover send a heartbeat now; one that does not, sends its own each second."""
+        command = MavCmd.REQUEST_MESSAGE
+        self.send(m.CommandLong(*self.target, command, 0, m.Heartbeat.id, 0, 0, 0, 0, 0, 0))
+
+    def begin_control(self, persona: Persona) -> OffboardControl:
+        """Give the hold on the rover; it does nothing yet."""
+        self.control = OffboardControl(self.target, persona, self.sender, self.watch)
+        self.control.heard(armed=self.armed, mode=self.mode, now=self.now)
+        return self.control
+
+    def _holds_first(self) -> bool:
+        control, persona = self.control, self.persona
+        if control is None or persona is None:
+            return False
+        is_handed_back = control.phase is Phase.RELEASING and persona.has_loss_failsafe
+        return is_handed_back or control.phase is Phase.STOPPING
+
+    def _zero_first(self) -> bool:
+        """A zero would end a failsafe of one that holds because setpoints were lost."""
+        return self.persona is not None and not self.persona.has_loss_failsafe
+
+    def _meet(self, packet: Packet, heartbeat: m.Heartbeat) -> None:
+        if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
+            return
+        if self._wanted_id not in (None, packet.system_id) or packet.system_id == 0:
+            return
+        self.rover = packet.source
+        self.others.system_id = packet.system_id
+        lost_after = self.watch.heartbeat_lost
+        self.monitor = HeartbeatMonitor(heartbeat, lost_after=lost_after, now=self.now)
+        self.latest[m.Heartbeat.id] = heartbeat
+
+    def _hear(self, packet: Packet, message: m.Message) -> None:
+        self.latest[packet.message_id] = message
+        match message:
+            case m.Heartbeat():
+                assert self.monitor is not None
+                self.monitor.receive(message, now=self.now)
+                if self.control is not None:
+                    self.control.heard(armed=self.armed, mode=self.mode, now=self.now)
+            case m.CommandAck():
+                self.sender.receive(message, component=packet.component_id, now=self.now)
+                self._take_answers()
+            case m.Attitude() | m.LocalPositionNed():
+                self.motion.receive(message, now=self.now)
+            case m.ParamValue():
+                self.parameters.setdefault(name_of(message), message)
+            case m.MessageInterval():
+                self.intervals[message.message_id] = message.interval_us
+            case m.Statustext():
+                for text in self._text_receiver.receive(packet.source, message, now=self.now):
+                    self._note_text(text.words)
+
+    def _note_text(self, words: str) -> None:
+        if len(self.texts) < MOST_TEXTS:
+            self.texts.append("".join(each if each.isprintable() else "?" for each in words))
+
+    def _take_answers(self) -> None:
+        outgoing, answers = self.sender.take()
+        self._requests += [each for each in outgoing if not isinstance(each, Packet)]
+        for answer in answers:
+            self._dispatch(answer)
+
+    def _dispatch(self, answer: Answered) -> None:
+        if is_request_of(answer) and self.control is not None:
+            self.control.answered(answer, now=self.now)
+        self._answers[answer.command] = answer.ack
+
+
+def name_of(message: m.ParamValue) -> str:
+    """Give a parameter's name."""
+    name = message.param_id
+    text = name.decode("ascii", "replace") if isinstance(name, bytes) else name
+    return str(text).rstrip("\0")
+
+
+def result_name(result: int) -> str:
+    """Give a MAV_RESULT in words."""
+    known = {each.value: each.name for each in MavResult}
+    return known.get(result, f"result {result}")
+
+
+def _arm_request(target: Address, *, arm: bool) -> m.CommandLong:
+    return m.CommandLong(*target, MavCmd.COMPONENT_ARM_DISARM, 0, float(arm), 0, 0, 0, 0, 0, 0)

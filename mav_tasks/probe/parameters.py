@@ -1,0 +1,89 @@
+"""Which parameters say what a rover does when it is left alone, and how they are read.
+
+MAVLink guide, "Parameter Protocol": an integer stands in a float by its bytes, or cast to one.
+"""
+
+from collections.abc import Mapping
+from math import isnan
+from struct import pack, unpack
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.probe.conversation import Conversation
+from mav_tasks.probe.findings import Findings
+from mav_tasks.probe.steps import Steps, Wait
+from mav_tasks.services.loss_failsafe import AFTER, LossFailsafe
+
+BYTEWISE = 16  # MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+FORMATS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}  # by MAV_PARAM_TYPE
+ASKS, ASK_AGAIN = 3, 0.4  # s
+#: of ArduPilot; the newest names too (4.7), of which a rover has the one or the other
+ARDUPILOT = (
+    *("SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_OPTIONS"),
+    *("FS_ACTION", "FS_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_THR_ENABLE"),
+    *("FS_EKF_ACTION", "FS_CRASH_CHECK", "GUID_OPTIONS", "FENCE_ENABLE", "FENCE_ACTION"),
+    *("ARMING_CHECK", "ARMING_REQUIRE", "WP_SPEED", "CRUISE_SPEED", "ATC_DECEL_MAX"),
+)
+PX4 = (
+    *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_IN_MODE", "COM_RC_LOSS_T", "COM_DL_LOSS_T"),
+    *("NAV_RCL_ACT", "NAV_DLL_ACT", "COM_FAIL_ACT_T", "COM_DISARM_PRFLT", "RD_MAX_SPEED"),
+)
+BY_PERSONA: Mapping[str, tuple[str, ...]] = {"ardupilot": ARDUPILOT, "px4": PX4, "generic": PX4}
+#: what an ArduPilot Rover does, whatever its parameters say
+FIXED = "stops by its make: 3 s after the last setpoint, a constant (as observed on 4.6.3)"
+
+
+def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
+    """Read those that matter for the rover's make; who lacks one does not answer."""
+    names = BY_PERSONA.get(findings.autopilot, ())
+    for _ in range(ASKS):
+        missing = [name for name in names if name not in talk.parameters]
+        for name in missing:
+            talk.send(m.ParamRequestRead(*talk.target, name.encode(), -1))
+        yield Wait(lambda: all(name in talk.parameters for name in names), ASK_AGAIN)
+    unsaid = 0 if findings.autopilot == "ardupilot" else BYTEWISE
+    flags = unsaid if findings.capabilities is None else findings.capabilities
+    is_bytewise = bool(flags & BYTEWISE)
+    for name in names:
+        value = talk.parameters.get(name)
+        if value is None:
+            findings.missing_parameters.append(name)
+        else:
+            findings.parameters[name] = value_of(value, is_bytewise=is_bytewise)
+    findings.loss_by_parameters = _loss_of(talk)
+
+
+def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:
+    """Give the value that a PARAM_VALUE means."""
+    form = FORMATS.get(message.param_type)
+    if not is_bytewise or form is None:
+        return float(message.param_value)
+    (number,) = unpack(form, pack("<f", message.param_value))
+    return float(number)
+
+
+def loss_failsafe_of(talk: Conversation) -> LossFailsafe:
+    """Give what is known of the failsafe on which the server looks, too."""
+    persona = talk.persona
+    is_by_parameters = persona is not None and persona.has_loss_failsafe
+    failsafe = LossFailsafe(talk.target, is_by_parameters=is_by_parameters)
+    for message in talk.parameters.values():
+        failsafe.receive(message)
+    return failsafe
+
+
+def _loss_of(talk: Conversation) -> str:
+    persona = talk.persona
+    if persona is None:
+        return ""
+    if not persona.has_loss_failsafe:
+        return FIXED
+    failsafe = loss_failsafe_of(talk)
+    if AFTER not in talk.parameters:
+        return "does not say whether it stops when setpoints stop"
+    return failsafe.take_news() or "stops when setpoints stop"
+
+
+def loss_time_of(findings: Findings) -> float:
+    """Give the seconds after which it is to stop without setpoints, as far as it says."""
+    after = findings.parameters.get(AFTER, 3.0)
+    return 3.0 if isnan(after) else after

@@ -1,0 +1,203 @@
+"""The probe of one rover as one pure object: packets and time in, packets and findings out."""
+
+from dataclasses import dataclass
+
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.probe.box import Box
+from mav_tasks.probe.conversation import Conversation
+from mav_tasks.probe.findings import Drive, Findings
+from mav_tasks.probe.parameters import loss_failsafe_of, loss_time_of
+from mav_tasks.probe.questions import ask_everything, ask_rates, give_rates_back, listen
+from mav_tasks.probe.steps import Steps, Wait, Walk
+from mav_tasks.probe.trials import Trials
+from mav_tasks.probe.wheel import DriveEnded, Wheel, is_fresh
+from mav_tasks.services.loss_failsafe import ACTION
+from mav_tasks.services.offboard import Phase
+from mav_tasks.settings import Identity, Watch
+from mav_tasks.tasks.guidance import Motion
+
+FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven
+DRIVEN_TYPES = frozenset({10, 11})  # MAV_TYPE: ground rover, surface boat
+RETURNS = 3  # COM_OBL_RC_ACT: the return mode
+NEEDED = ("LOCAL_POSITION_NED", "ATTITUDE")
+
+
+class NothingHeard(Exception):
+    """No rover is at the other end; the text says for how long it was waited."""
+
+
+class Occupied(Exception):
+    """Somebody else is there, by whom the rover is driven, or may be; the text says who."""
+
+
+class Interrupted(Exception):
+    """Whoever started it wants it to end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a probe may do."""
+
+    drive: bool = False
+    speed: float = 0.3  # m/s
+    system_id: int | None = None  # None: the first rover that is heard
+    find_within: float = 10.0  # s
+
+
+class Probe:
+    """Asks, and with ``options.drive`` drives; then gives back what it has changed."""
+
+    def __init__(self, options: Options, *, now: float, watch: Watch | None = None) -> None:
+        identity = Identity()
+        source = Address(identity.system_id, identity.component_id)
+        self.findings = Findings()
+        self.talk = Conversation(
+            source, system_id=options.system_id, watch=watch or Watch(), now=now
+        )
+        self._options = options
+        self._has_rates = False
+        self._is_clearing_up = False
+        self._walk = Walk(self._run())
+        #: what it is about, in words
+        self.stage = "waiting for a rover"
+        #: why it ended before its time
+        self.error: Exception | None = None
+
+    def __repr__(self) -> str:
+        return f"Probe({self.talk!r}, {self._walk!r})"
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has done all that it does; ``take_packets`` once more."""
+        return self._walk.is_over
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether the rover is in our hands."""
+        return self.talk.control is not None and self.talk.control.phase is not Phase.IDLE
+
+    def receive(self, packet: Packet, *, now: float) -> None:
+        """Take a packet in."""
+        self.talk.receive(packet, now=now)
+        self._walk.go_on(now=now)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Do what is due; may come for nothing."""
+        self.talk.handle_deadline(now=now)
+        self._walk.go_on(now=now)
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do."""
+        at = self._walk.next_deadline()
+        return self.talk.next_deadline() if at is None else min(at, self.talk.next_deadline())
+
+    def take_packets(self) -> list[bytes]:
+        """Give what is to be sent since the last call, in order."""
+        return self.talk.take_packets()
+
+    def interrupt(self, words: str, *, now: float) -> None:
+        """End, but leave the rover as it is to be left; what that takes goes on."""
+        self.talk.now = now
+        if not self._is_clearing_up:
+            self._walk.interrupt(Interrupted(words), now=now)
+
+    def last_words(self) -> list[bytes]:
+        """Give what makes a rover in our hands stand, for an end that cannot wait."""
+        return self.talk.last_words()
+
+    def _run(self) -> Steps[None]:
+        try:
+            yield from self._look()
+            if self._options.drive:
+                yield from self._drive()
+        except (NothingHeard, Occupied, Interrupted) as error:
+            self.error = error
+        self._is_clearing_up = True
+        if self._has_rates:
+            yield from give_rates_back(self.talk, self.findings)
+
+    def _look(self) -> Steps[None]:
+        talk, findings = self.talk, self.findings
+        within = self._options.find_within
+        yield Wait(lambda: talk.rover is not None, within)
+        if talk.rover is None:
+            which = self._options.system_id
+            who = "a rover" if which is None else f"rover {which}"
+            raise NothingHeard(f"no heartbeat of {who} within {within:g} s")
+        self.stage = f"listening to rover {talk.target.system_id}, and asking it"
+        yield from listen(talk, findings)
+        findings.is_rover = findings.vehicle_type in DRIVEN_TYPES
+        self._leave_if_occupied()
+        yield from ask_everything(talk, findings)
+        self._has_rates = True
+        yield from ask_rates(talk, findings)
+        findings.armed = talk.armed
+        self._leave_if_occupied()
+
+    def _leave_if_occupied(self) -> None:
+        why = self.talk.others.why_leave()
+        if why:
+            raise Occupied(why)
+
+    def _drive(self) -> Steps[None]:
+        talk, persona = self.talk, self.talk.persona
+        drive = self.findings.drive = Drive()
+        why, motion = self._why_not_drive(), talk.motion.latest()
+        if why or persona is None or motion is None:
+            drive.ended = f"not driven: {why}"
+            return
+        wheel = Wheel(talk, persona, drive, Box(motion.pose))
+        with_loss = self._may_try_loss(drive)
+        self.stage = "driving in a box of 2 m: keep clear; Ctrl-C stops it"
+        try:
+            yield from wheel.take()
+            trials = Trials(
+                wheel,
+                persona,
+                drive,
+                speed=self._options.speed,
+                loss_time=loss_time_of(self.findings),
+            )
+            yield from trials.run(with_loss=with_loss)
+        except DriveEnded as end:
+            drive.ended = str(end)
+        except Interrupted as error:
+            drive.ended, self.error = str(error), error
+        self._is_clearing_up = True
+        yield from wheel.give_back()
+
+    def _may_try_loss(self, drive: Drive) -> bool:
+        """Whether it is seen what it does without setpoints; not if it would drive far for it."""
+        failsafe = loss_failsafe_of(self.talk)
+        action = self.findings.parameters.get(ACTION)
+        if failsafe.why_off:
+            drive.loss_stop = "no"
+            drive.loss_note = f"not tried: {failsafe.why_off}"
+        elif action == RETURNS:
+            drive.loss_note = f"not tried: {ACTION} is {action:g}, it would drive home"
+        return not drive.loss_note
+
+    def _why_not_drive(self) -> str:
+        talk, findings = self.talk, self.findings
+        motion = talk.motion.latest()
+        slow = [rate for rate in findings.rates if rate.name in NEEDED]
+        slow = [rate for rate in slow if (rate.granted or 0.0) < FRESH_ENOUGH]
+        if talk.others.why_not_drive():
+            return talk.others.why_not_drive()
+        if talk.persona is None or not findings.is_rover:
+            return "it is no rover that the server drives"
+        if talk.armed:
+            return "it is armed, and not by us"
+        if not is_fresh(talk.motion, now=talk.now, within=talk.watch.motion_fresh):
+            return "it does not say where it is"
+        if slow:
+            each = ", ".join(f"{rate.name} at {rate.granted:.1f} Hz" for rate in slow)
+            return f"{each}: too seldom to drive by"
+        if not _is_still(motion, talk.watch):
+            return "it moves"
+        return ""
+
+
+def _is_still(motion: Motion | None, watch: Watch) -> bool:
+    return motion is not None and motion.speed < watch.still_speed

@@ -1,0 +1,37 @@
+"""The profile that follows from what a probe has found: what the server drives by."""
+
+from mav_tasks.probe.findings import Findings
+from mav_tasks.settings import VehicleProfile
+
+
+def why_none(findings: Findings) -> str:
+    """Give in words why there is no profile to keep; "": there is one."""
+    drive = findings.drive
+    if drive is None:
+        return "without --drive nothing is measured"
+    if not findings.firmware:
+        return "the rover does not say which one it is"
+    if drive.ended and drive.loss_stop != "no":  # that it drives on is worth keeping in any case
+        return "the driving was not carried through"
+    return ""
+
+
+def profile_of(findings: Findings, *, probed: str) -> VehicleProfile:
+    """Give it; ``probed`` is when, UTC. There must be one, see ``why_none``."""
+    drive = findings.drive
+    assert drive is not None
+    return VehicleProfile(
+        system_id=findings.system_id,
+        uid=findings.uid,
+        autopilot=findings.autopilot,
+        firmware=findings.firmware,
+        probed=probed,
+        yaw_rate=drive.yaw_rate,
+        reverse=drive.reverse,
+        setpoints=tuple(drive.accepted),
+        loss_stop=drive.loss_stop,
+        setpoint_timeout=drive.setpoint_timeout,
+        speed=drive.speed,
+        stopping_distance=drive.stopping_distance,
+        stopping_time=drive.stopping_time,
+    )

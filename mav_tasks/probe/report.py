@@ -1,0 +1,191 @@
+"""What was found, as lines for people and as values for scripts."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from enum import Enum
+from math import isfinite
+from typing import Any, NamedTuple
+
+from mav_tasks.mavlink.enums import MavResult, MavType
+from mav_tasks.probe.findings import Drive, Findings, Rate
+from mav_tasks.settings import Identity
+
+NOT_TRIED = "not tried: that needs --drive"
+UNKNOWN = "not known"
+TYPES: Mapping[int, str] = {MavType.GROUND_ROVER: "ground rover", MavType.SURFACE_BOAT: "boat"}
+SETPOINT_BIT, COMMAND_INT_BIT = 128, 8  # MAV_PROTOCOL_CAPABILITY
+
+
+class Mark(Enum):
+    """How a line is meant."""
+
+    PLAIN = ""
+    GOOD = "ok"
+    #: to be looked at before it is driven
+    WARNING = "!"
+    #: it is not as it must be
+    BAD = "!!"
+
+
+class Line(NamedTuple):
+    """One thing that was looked at."""
+
+    topic: str
+    words: str
+    mark: Mark = Mark.PLAIN
+
+
+def lines_of(findings: Findings) -> list[Line]:
+    """Give the report, in the order of reading."""
+    return list(_lines(findings))
+
+
+def as_json(findings: Findings) -> dict[str, Any]:
+    """Give all of it; what is not a number is null, and what is not known is null or empty."""
+    values = asdict(findings)
+    values["parameters"] = {
+        name: value if isfinite(value) else None for name, value in findings.parameters.items()
+    }
+    return values
+
+
+def _lines(findings: Findings) -> Iterator[Line]:
+    make = findings.autopilot or "not supported"
+    kind = TYPES.get(findings.vehicle_type, f"type {findings.vehicle_type}, no rover")
+    is_known = bool(findings.autopilot) and findings.is_rover
+    yield Line(
+        "rover",
+        f"{findings.system_id}: {make}, {kind}",
+        Mark.GOOD if is_known else Mark.BAD,
+    )
+    yield Line(
+        "firmware",
+        findings.firmware or UNKNOWN,
+        Mark.GOOD if findings.firmware else Mark.WARNING,
+    )
+    yield Line("unique id", findings.uid or "it does not say")
+    yield from _capabilities(findings)
+    yield Line("mode", f"{findings.mode or UNKNOWN}, {'ARMED' if findings.armed else 'disarmed'}")
+    for other in findings.others:
+        yield Line("also there", other, Mark.WARNING)
+    yield Line(
+        "HEARTBEAT", f"{findings.heartbeat_rate:.1f} Hz", _good(findings.heartbeat_rate > 0.5)
+    )
+    for rate in findings.rates:
+        yield _rate(rate)
+    if findings.rates_given_back:
+        is_bad = findings.rates_given_back.startswith("no")
+        words = findings.rates_given_back
+        yield Line("rates given back", words, Mark.WARNING if is_bad else Mark.PLAIN)
+    yield from _arming(findings)
+    yield from _mission(findings)
+    stops = findings.loss_by_parameters.startswith("stops")
+    yield Line(
+        "without setpoints",
+        findings.loss_by_parameters or UNKNOWN,
+        Mark.GOOD if stops else Mark.WARNING,
+    )
+    for name, value in findings.parameters.items():
+        yield _parameter(name, value, findings)
+    if findings.missing_parameters:
+        yield Line("not there", ", ".join(findings.missing_parameters))
+    yield from _drive(findings.drive)
+
+
+def _parameter(name: str, value: float, findings: Findings) -> Line:
+    operator = findings.parameters.get("SYSID_MYGCS")
+    ours = Identity().system_id
+    if name == "SYSID_ENFORCE" and value and operator != ours:
+        words = f"{value:g}: it obeys system {operator:g} only" if operator else f"{value:g}"
+        return Line(name, f"{words}, and the server is {ours}", Mark.WARNING)
+    if name == "FS_GCS_ENABLE" and value:
+        words = f"{value:g}: without heartbeats of SYSID_MYGCS it does as FS_ACTION says"
+        return Line(name, words, Mark.WARNING)
+    return Line(name, f"{value:g}")
+
+
+def _capabilities(findings: Findings) -> Iterator[Line]:
+    flags = findings.capabilities
+    if flags is None:
+        return
+    for words, bit in (("COMMAND_INT", COMMAND_INT_BIT), ("local setpoints", SETPOINT_BIT)):
+        yield Line(f"takes {words}", "so it says" if flags & bit else "it does not say so")
+
+
+def _rate(rate: Rate) -> Line:
+    if rate.granted is None:
+        return Line(rate.name, f"{rate.unasked:.1f} Hz unasked")
+    is_enough = rate.granted >= 0.5 * rate.wanted
+    words = f"{rate.granted:.1f} Hz of {rate.wanted:.1f} asked for, {rate.unasked:.1f} unasked"
+    if rate.answer != MavResult.ACCEPTED.name:
+        words += f"; answer: {rate.answer}"
+    return Line(rate.name, words, _good(is_enough))
+
+
+def _arming(findings: Findings) -> Iterator[Line]:
+    if findings.prearm:
+        words = "; ".join([findings.prearm, *findings.prearm_texts])
+        yield Line("arming checks", words, _good(findings.prearm == "ok"))
+    elif findings.prearm_texts:
+        yield Line("arming checks", "; ".join(findings.prearm_texts), Mark.WARNING)
+    else:
+        yield Line("arming checks", UNKNOWN)
+
+
+def _mission(findings: Findings) -> Iterator[Line]:
+    count = findings.mission_items
+    if count:
+        words = f"{count} items: its mission mode would drive them, and nobody sees it"
+        yield Line("mission on board", words, Mark.WARNING)
+    else:
+        yield Line("mission on board", UNKNOWN if count is None else "none")
+
+
+def _drive(drive: Drive | None) -> Iterator[Line]:
+    if drive is None:
+        yield Line("driving", NOT_TRIED)
+        return
+    words = drive.ended or "carried through"
+    yield Line("driving", words, Mark.BAD if drive.ended else Mark.GOOD)
+    if drive.left:
+        yield Line("left in", drive.left, Mark.BAD if "ARMED" in drive.left else Mark.GOOD)
+    if drive.arming:
+        yield Line("arming", drive.arming, _good(drive.arming == "accepted"))
+    if drive.hold:
+        yield Line("HOLD", "accepted" if drive.hold == "yes" else "NOT seen", _bad(drive.hold))
+    for name in drive.accepted:
+        yield Line("setpoint", f"{name}: followed", Mark.GOOD)
+    for name in drive.refused:
+        yield Line("setpoint", f"{name}: not followed")
+    if drive.yaw_rate:
+        share = drive.turned_of_wanted
+        turned = "" if share is None else f" ({share:.0%} of the turn, on the spot)"
+        yield Line("yaw rate", drive.yaw_rate + turned)
+    if drive.reverse:
+        yield Line("reverse", drive.reverse)
+    if drive.speed is not None:
+        words = f"{drive.stopping_distance:.2f} m and {drive.stopping_time:.1f} s"
+        yield Line("stop on zeros", f"{words} from {drive.speed:.2f} m/s")
+    yield from _loss(drive)
+    yield Line("farthest", f"{drive.farthest:.2f} m from where it began")
+
+
+def _loss(drive: Drive) -> Iterator[Line]:
+    if drive.loss_stop == "yes" and drive.loss_distance is not None:
+        after = drive.setpoint_timeout
+        words = f"stops by itself, {drive.loss_distance:.2f} m on from {drive.loss_speed:.2f} m/s"
+        words += "" if after is None else f", after {after:.1f} s"
+        yield Line("setpoints stop", words, Mark.GOOD)
+    elif drive.loss_stop == "no":
+        words = drive.loss_note or "it drives on"
+        yield Line("setpoints stop", f"does NOT stop by itself; {words}", Mark.BAD)
+    elif drive.loss_note:
+        yield Line("setpoints stop", drive.loss_note, Mark.WARNING)
+
+
+def _good(is_good: bool) -> Mark:
+    return Mark.GOOD if is_good else Mark.WARNING
+
+
+def _bad(said: str) -> Mark:
+    return Mark.GOOD if said == "yes" else Mark.BAD

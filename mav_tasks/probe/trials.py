@@ -1,0 +1,248 @@
+"""What a rover is made to do to see how it does it: short, slow, and inside the box."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, hypot, pi, sin
+
+from mav_tasks.mavlink.enums import MavFrame
+from mav_tasks.probe.findings import Drive
+from mav_tasks.probe.steps import Steps
+from mav_tasks.probe.wheel import DriveEnded, Wheel
+from mav_tasks.services.orders import STANDING, Speeds
+from mav_tasks.services.persona import ARDUPILOT, PX4, Persona
+from mav_tasks.tasks.guidance import wrap
+from mav_tasks.tasks.task import Pose
+
+TRIAL_SPEED = 0.2  # m/s
+TRIAL_WAY = 0.1  # m; further a trial need not go
+FOLLOWED = 0.04  # m by which it must have moved
+TRIAL_TIME = 1.5  # s at the most
+OF_THE_FAILSAFE = 0.7  # of its time: a setpoint that does not count must not set it off
+TURN_RATE = 0.4  # rad/s
+TURN_TIME = 1.5  # s
+TURNED = 0.5  # of the wanted turn: it turns on the spot
+STRAIGHT = 0.3  # rad, of heading that driving backwards may change
+RUN_UP = 10.0  # s at the most: it may have to turn round first
+AT_SPEED = 0.85  # of the speed wanted
+STEADY = 0.3  # s
+ON_COURSE = 0.15  # rad
+SLOWING = 0.7  # of the speed: below, it has begun to stop
+STOP_TIME = 5.0  # s in which it must stand
+LOSS_SPARE = 3.0  # s beyond the time that its failsafe says
+LEAST_SPEED = 0.08  # m/s, at which a stop still shows
+BACK_TO = -0.4  # m ahead of the middle, from where there is room for the rest
+
+
+class Kind:
+    """One kind of velocity setpoints."""
+
+    def __init__(self, persona: Persona, mask: int, frame: MavFrame, *, by_course: bool) -> None:
+        self.name = f"{frame.name} 0x{mask:04X}"
+        self.persona = replace(
+            persona,
+            turns_on_spot=not by_course,
+            setpoint_mask=mask,
+            setpoint_frame=frame,
+        )
+        self.by_course = by_course
+
+    def __repr__(self) -> str:
+        return f"Kind({self.name})"
+
+    def speeds(self, speed: float, course: float) -> Speeds:
+        """Give what asks for this speed, in the direction in which it points anyway."""
+        return Speeds(speed, 0.0, course if self.by_course else None)
+
+
+def kinds_of(persona: Persona) -> list[Kind]:
+    """Give all that the server could use, the persona's own first."""
+    kinds = [
+        Kind(persona, PX4.setpoint_mask, MavFrame.LOCAL_NED, by_course=True),
+        Kind(persona, PX4.setpoint_mask, MavFrame.BODY_NED, by_course=False),
+        Kind(persona, ARDUPILOT.setpoint_mask, MavFrame.BODY_NED, by_course=False),
+    ]
+    return sorted(
+        kinds,
+        key=lambda kind: (
+            kind.persona.setpoint_mask != persona.setpoint_mask
+            or kind.persona.setpoint_frame != persona.setpoint_frame
+        ),
+    )
+
+
+class Trials:
+    """Goes through them, and writes down what came of each."""
+
+    def __init__(
+        self, wheel: Wheel, persona: Persona, drive: Drive, *, speed: float, loss_time: float
+    ) -> None:
+        """``speed`` m/s of the stop; ``loss_time`` s without setpoints until it is to stop."""
+        self._wheel = wheel
+        self._persona = persona
+        self._drive = drive
+        self._speed = speed
+        self._loss_time = loss_time
+        self._own = kinds_of(persona)[0]
+
+    def __repr__(self) -> str:
+        return f"Trials({self._drive})"
+
+    def run(self, *, with_loss: bool) -> Steps[None]:
+        """All of them; DriveEnded if one cannot go on."""
+        for kind in kinds_of(self._persona):
+            yield from self._try_kind(kind)
+        yield from self._try_turning()
+        yield from self._try_reverse()
+        self._wheel.speak(self._own.persona)
+        yield from self._measure_stop()
+        if with_loss:
+            yield from self._measure_loss()
+
+    def _try_kind(self, kind: Kind) -> Steps[None]:
+        wheel = self._wheel
+        before = wheel.motion.pose
+        wanted = kind.speeds(TRIAL_SPEED, before.yaw)
+        yield from self._with(kind, wanted, lambda: _way(before, wheel))
+        yield from self._rest()
+        followed = _way(before, wheel) >= FOLLOWED
+        (self._drive.accepted if followed else self._drive.refused).append(kind.name)
+        if not followed and kind.name == self._own.name:
+            raise DriveEnded(f"it does not follow {kind.name}")
+
+    def _with(self, kind: Kind, wanted: Speeds, way: Callable[[], float]) -> Steps[None]:
+        wheel, limit = self._wheel, TRIAL_TIME
+        if self._persona.has_loss_failsafe and kind.name != self._own.name:
+            limit = min(limit, OF_THE_FAILSAFE * self._loss_time)
+        wheel.speak(kind.persona)
+        end = wheel.now + limit
+        while wheel.now < end and abs(way()) < TRIAL_WAY:
+            yield from wheel.drive(wanted)
+
+    def _rest(self) -> Steps[None]:
+        self._wheel.speak(self._own.persona)
+        if not (yield from self._wheel.stand()):
+            raise DriveEnded("it does not stand on zeros")
+
+    @property
+    def _rate_kind(self) -> Kind | None:
+        rate = Kind(self._persona, ARDUPILOT.setpoint_mask, MavFrame.BODY_NED, by_course=False)
+        return rate if rate.name in self._drive.accepted else None
+
+    def _try_turning(self) -> Steps[None]:
+        kind, wheel, drive = self._rate_kind, self._wheel, self._drive
+        if kind is None:
+            drive.yaw_rate = "ignored"
+            return
+        shares: list[float] = []
+        for rate in (TURN_RATE, -TURN_RATE):
+            wheel.speak(kind.persona)
+            before, end, turned = wheel.motion.pose.yaw, wheel.now + TURN_TIME, 0.0
+            while wheel.now < end:
+                yield from wheel.drive(Speeds(0.0, rate))
+                turned = wrap(wheel.motion.pose.yaw - before)
+            shares.append(turned / (rate * TURN_TIME))
+            yield from self._rest()
+        drive.turned_of_wanted = round(min(shares), 2)
+        drive.yaw_rate = "honoured" if min(shares) >= TURNED else "ignored"
+
+    def _try_reverse(self) -> Steps[None]:
+        kind, wheel, drive = self._rate_kind, self._wheel, self._drive
+        if kind is None:
+            drive.reverse = "no"
+            return
+        before = wheel.motion.pose
+        yield from self._with(kind, Speeds(-TRIAL_SPEED), lambda: _along(before, wheel))
+        backed = _along(before, wheel) <= -FOLLOWED
+        straight = abs(wrap(wheel.motion.pose.yaw - before.yaw)) < STRAIGHT
+        drive.reverse = "yes" if backed and straight else "no"
+        if drive.reverse == "yes":  # and on, for room ahead
+            end = wheel.now + RUN_UP
+            while wheel.ahead > BACK_TO and wheel.now < end:
+                yield from wheel.drive(Speeds(-TRIAL_SPEED))
+        yield from self._rest()
+
+    def _measure_stop(self) -> Steps[None]:
+        wheel, drive = self._wheel, self._drive
+        speed = yield from self._run_up(self._speed, stop_time=1.0)
+        before, began = wheel.motion.pose, wheel.now
+        stood_at = began
+        end = began + STOP_TIME
+        while not wheel.is_still and wheel.now < end:
+            yield from wheel.drive(STANDING)
+            if wheel.motion.speed > wheel.still_speed:
+                stood_at = wheel.now
+        if not wheel.is_still:
+            raise DriveEnded(f"it does not stand within {STOP_TIME:g} s of zeros")
+        drive.speed = round(speed, 3)
+        drive.stopping_distance = round(_way(before, wheel), 3)
+        drive.stopping_time = round(stood_at - began, 2)
+
+    def _measure_loss(self) -> Steps[None]:
+        """Drive, then say nothing: does it stop by itself, and where?"""
+        wheel, drive = self._wheel, self._drive
+        course, room = self._roomiest()
+        speed = min(TRIAL_SPEED, (room - 0.25) / (self._loss_time + 1.5))
+        if speed < LEAST_SPEED:
+            drive.loss_note = f"no room: {room:.1f} m ahead, and {self._loss_time:g} s to wait"
+            return
+        speed = yield from self._run_up(speed, stop_time=self._loss_time, course=course)
+        before, began = wheel.motion.pose, wheel.now
+        end = began + self._loss_time + LOSS_SPARE
+        slowed_at: float | None = None
+        try:
+            while not wheel.is_still and wheel.now < end:
+                yield from wheel.let_go()
+                if slowed_at is None and wheel.motion.speed < SLOWING * speed:
+                    slowed_at = wheel.now
+        except DriveEnded:
+            if wheel.now > began + self._loss_time + 1.0 and slowed_at is None:
+                drive.loss_stop = "no"
+            raise
+        drive.loss_stop = "yes" if wheel.is_still else "no"
+        drive.loss_speed = round(speed, 3)
+        drive.loss_distance = round(_way(before, wheel), 3)
+        if slowed_at is not None:
+            drive.setpoint_timeout = round(slowed_at - began, 2)
+        if drive.loss_stop == "no":
+            raise DriveEnded(f"it drives on {wheel.now - began:.1f} s after the last setpoint")
+
+    def _run_up(
+        self, speed: float, *, stop_time: float, course: float | None = None
+    ) -> Steps[float]:
+        """Drive straight until the speed is steady; gives it. It turns round where there is room.
+
+        ``stop_time``: s that it may go on at that speed when the run-up is over.
+        """
+        wheel, kind = self._wheel, self._own
+        if course is None:
+            course, _ = self._roomiest()
+        end, steady_since = wheel.now + RUN_UP, wheel.now
+        while wheel.now < end:
+            yield from wheel.drive(kind.speeds(speed, course))
+            motion = wheel.motion
+            is_off = abs(wrap(course - motion.pose.yaw)) > ON_COURSE
+            if is_off or motion.forward < AT_SPEED * speed:
+                steady_since = wheel.now
+            if wheel.now - steady_since >= STEADY:
+                return motion.forward
+            if not is_off and wheel.box.room(motion.pose, course) < speed * (stop_time + 0.5):
+                break
+        raise DriveEnded(f"it does not come to {speed:.2f} m/s in the room that there is")
+
+    def _roomiest(self) -> tuple[float, float]:
+        """Give the direction, ahead or where it can turn to by itself, with the most room; m."""
+        wheel = self._wheel
+        yaw = wheel.motion.pose.yaw
+        courses = [yaw, yaw + pi] if self._own.by_course else [yaw]
+        return max(((c, wheel.box.room(wheel.motion.pose, c)) for c in courses), key=lambda x: x[1])
+
+
+def _way(before: Pose, wheel: Wheel) -> float:
+    pose = wheel.motion.pose
+    return hypot(pose.north - before.north, pose.east - before.east)
+
+
+def _along(before: Pose, wheel: Wheel) -> float:
+    pose = wheel.motion.pose
+    north, east = pose.north - before.north, pose.east - before.east
+    return north * cos(before.yaw) + east * sin(before.yaw)

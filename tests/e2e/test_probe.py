@@ -1,0 +1,186 @@
+"""``mav-tasks probe`` with real processes: driven, ended midway, and what serve makes of it."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import degrees
+from pathlib import Path
+
+import pytest
+from pymavlink import mavutil
+
+from tests.e2e.test_usage import assert_one_clear_line, run
+from tests.kit.processes import (
+    Stand,
+    command_long,
+    environment_with,
+    free_udp_ports,
+    process,
+    submit,
+    wait_until,
+)
+
+ROTATE, DENIED = 54001, 2
+OVER = 60  # s
+
+
+@contextmanager
+def rover(folder: Path, *options: str) -> Iterator[int]:
+    """A simulated rover that tells its true poses; gives its port."""
+    (port,) = free_udp_ports(1)
+    arguments = ("--port", str(port), "--body", "kinematic", "--truth", str(folder / "truth.csv"))
+    with process("-m", "rover_sim", *arguments, *options, folder=folder, name="rover") as it:
+        it.wait_for("rover_sim: rover 1")
+        yield port
+
+
+@contextmanager
+def probe(folder: Path, port: int, *options: str) -> Iterator["subprocess.Popen[str]"]:
+    """A probe of it."""
+    popen = subprocess.Popen(
+        [sys.executable, "-m", "mav_tasks.cli", "probe", f"udpout:127.0.0.1:{port}", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        env=environment_with(XDG_CONFIG_HOME=str(folder)),
+    )
+    try:
+        yield popen
+    finally:
+        popen.kill()
+        popen.communicate()
+
+
+def truth(folder: Path) -> list[dict[str, float]]:
+    text = (folder / "truth.csv").read_text(encoding="ascii")
+    rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
+    return [{key: float(value) for key, value in row.items()} for row in rows]
+
+
+def is_moving(folder: Path) -> bool:
+    rows = truth(folder)
+    return bool(rows) and abs(rows[-1]["forward_speed"]) > 0.15
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(150)
+def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path) -> None:
+    """A PX4 that turns at a yaw rate: denied by default, turned with its profile."""
+    known = tmp_path / "known"
+    known.mkdir()
+    with rover(tmp_path, "--persona", "px4", "--honours-yaw-rate") as port:
+        file = str(tmp_path / "found.toml")
+        with probe(tmp_path, port, "--drive", "--yes", "--output", file) as popen:
+            out, error = popen.communicate(timeout=OVER)
+        assert popen.returncode == 0, error
+        assert re.search(
+            r"^yaw rate +honoured \(\d\d% of the turn, on the spot\)$", out, re.MULTILINE
+        ), out
+        assert re.search(r"^left in +ok +Hold, disarmed$", out, re.MULTILINE), out
+        assert out.endswith(f"profile written to {file}\n")
+        assert "driving in a box of 2 m: keep clear; Ctrl-C stops it" in error
+        poses = truth(tmp_path)
+        assert all(abs(row["north"]) < 1.0 and abs(row["east"]) < 1.0 for row in poses)
+        assert max(abs(row["north"]) for row in poses) > 0.1
+        clients, push = free_udp_ports(2)
+        serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{clients}"]
+        serve += ["--push", f"127.0.0.1:{push}", "--store", ":memory:"]
+        serve += ["--vehicle", f"udpout:127.0.0.1:{port}", "--set", f"vehicles.profiles={known}"]
+        with process(*serve, folder=tmp_path, name="server") as server:
+            server.wait_for("vehicle 1: found")
+            stand = Stand(server, server, clients, port, push, tmp_path / "truth.csv")
+            client = stand.connect()
+            assert command_long(client, ROTATE, 90).result == DENIED
+            (known / "rover.toml").write_bytes(Path(file).read_bytes())
+            server.popen.send_signal(signal.SIGHUP)
+            server.wait_for("vehicles.profiles: read again, 1 in force")
+            server.wait_for("vehicle 1: profile of .* is used")
+            yaw = degrees(truth(tmp_path)[-1]["yaw"])
+            submit(client, ROTATE, 90)
+            server.wait_for("task 1 completed")
+            turned = (degrees(truth(tmp_path)[-1]["yaw"]) - yaw) % 360
+            assert turned == pytest.approx(90, abs=3)
+            beside = run("probe", f"udpout:127.0.0.1:{clients}")
+            assert_one_clear_last_line(beside, "a task server is there (1/191): probe the rover")
+            stand.close()
+
+
+def assert_one_clear_last_line(result: tuple[int, str, str], *words: str) -> None:
+    """Before it, the probe has said what it is about."""
+    code, out, error = result
+    assert_one_clear_line((code, out, error.splitlines()[-1]), *words)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(90)
+def test_ended_while_it_drives_it_leaves_the_rover_at_rest(tmp_path: Path) -> None:
+    number = signal.SIGINT
+    with (
+        rover(tmp_path) as port,
+        probe(tmp_path, port, "--drive", "--yes", "--json") as popen,
+    ):
+        wait_until(lambda: is_moving(tmp_path), within=40, what="the rover moving")
+        popen.send_signal(number)
+        out, _ = popen.communicate(timeout=15)
+        assert popen.returncode == 128 + number
+        found = json.loads(out)
+        assert found["drive"]["ended"] == f"ended by {number.name}"
+        assert found["drive"]["left"] == "HOLD, disarmed"
+        assert (found["autopilot"], found["uid"], found["mission_items"]) == ("ardupilot", "1", 0)
+        assert found["profile"] is None
+        assert not list(tmp_path.glob("**/*.toml"))
+        wait_until(lambda: not is_moving(tmp_path), within=2, what="the rover standing")
+        seen = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=254)
+        seen.mav.heartbeat_send(6, 8, 0, 0, 4)
+        beat = seen.recv_match(type="HEARTBEAT", blocking=True, timeout=10)
+        assert (beat.custom_mode, beat.base_mode & 128) == (4, 0)
+        seen.close()
+
+
+def test_what_cannot_be_done_is_said_in_one_line() -> None:
+    (port,) = free_udp_ports(1)
+    url = f"udpout:127.0.0.1:{port}"
+    assert_one_clear_line(run("probe", "udpout:192.0.2.1:14550"), "192.0.2.1", "--insecure")
+    assert_one_clear_line(run("probe", "pigeon:1"), "udpin:host:port")
+    code, _, error = run("probe", url, "--timeout", "1")
+    assert (code, error.splitlines()[-1]) == (3, "mav-tasks: no heartbeat of a rover within 1 s")
+
+
+def test_nothing_is_driven_where_nobody_could_say_yes() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", "probe", "udpout:127.0.0.1:1", "--drive"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env={**os.environ},
+        check=False,
+    )
+    assert_one_clear_line((done.returncode, done.stdout, done.stderr), "--yes")
+
+
+def test_a_rover_that_signs_is_probed_by_who_has_its_key(tmp_path: Path) -> None:
+    ring = tmp_path / "mav-tasks" / "keys.toml"
+    added = subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", "keys", "add", "r1", "--role", "vehicle"],
+        env=environment_with(XDG_CONFIG_HOME=str(tmp_path)),
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert added.returncode == 0, added.stderr
+    with rover(tmp_path, "--sign", "r1", "--keys", str(ring)) as port:
+        with probe(tmp_path, port, "--sign", "r1", "--json") as signed:
+            out, err = signed.communicate(timeout=OVER)
+        with probe(tmp_path, port, "--timeout", "2") as unsigned:
+            _, nothing = unsigned.communicate(timeout=OVER)
+    assert signed.returncode == 0, err
+    assert json.loads(out)["autopilot"] == "ardupilot"
+    assert unsigned.returncode == 3, nothing

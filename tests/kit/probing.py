@@ -1,0 +1,157 @@
+"""A probe and a simulated rover on one net, in virtual time; what may never be is watched."""
+
+from collections.abc import Callable
+from math import hypot, isfinite
+
+from mav_tasks.links.memory import MemoryLink, MemoryNet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Decoder, Encoder
+from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.probe.findings import Drive
+from mav_tasks.probe.probe import Options, Probe
+from rover_sim.body import Body, Pose
+from rover_sim.faults import Faults
+from rover_sim.personas import ARDUPILOT, Mode, Persona
+from rover_sim.vehicle import make_vehicle
+from rover_sim.virtual import RoverParty, VirtualWorld
+from tests.kit.world import kinematic_body
+
+BOOT = 5.0  # s before anybody asks: its estimate has settled
+OVER_WITHIN = 120.0  # s
+BOX = 1.0  # m from its middle to a side
+GUIDED_BEFORE = 0.2  # s that a setpoint may be under way after the rover has left the mode
+
+
+class ProbeParty:
+    """The probe on its link."""
+
+    def __init__(self, link: MemoryLink, options: Options, *, now: float) -> None:
+        self.probe = Probe(options, now=now)
+        self._link = link
+        self.sent: list[tuple[float, m.Message]] = []
+        self._decoder = Decoder()
+
+    def next_deadline(self) -> float | None:
+        """Give when the probe is due."""
+        return None if self.probe.is_over else self.probe.next_deadline()
+
+    def turn(self, *, now: float) -> None:
+        """Read, do what is due, send."""
+        for _, data in self._link.receive(len(self._link.arrived)):
+            for packet in split_datagram(data):
+                if not self.probe.is_over:
+                    self.probe.receive(packet, now=now)
+        if not self.probe.is_over and self.probe.next_deadline() <= now:
+            self.probe.handle_deadline(now=now)
+        for data in self.probe.take_packets():
+            for packet in split_datagram(data):
+                message = self._decoder.decode(packet)
+                assert message is not None
+                self.sent.append((now, message))
+            self._link.send("rover1", data)
+
+
+class ProbeWorld(VirtualWorld):
+    """One rover that has just settled, and who probes it."""
+
+    def __init__(
+        self,
+        *,
+        drive: bool = False,
+        speed: float = 0.3,
+        persona: Persona = ARDUPILOT,
+        body: Callable[[Pose], Body] = kinematic_body,
+        start: Pose = Pose(),  # noqa: B008  # frozen
+    ) -> None:
+        super().__init__(MemoryNet())
+        self.start = start
+        self.rover = make_vehicle(body(start), system_id=1, now=0.0, persona=persona)
+        self.join(RoverParty(self.rover, self.net.link("rover1")))
+        self.run(BOOT)
+        self._stranger = self.net.link("stranger")
+        options = Options(drive=drive, speed=speed)
+        link = self.net.link("probe", peers=("rover1",))
+        self.party = ProbeParty(link, options, now=self.now)
+        self.farthest = 0.0
+        self._looked_at = 0
+        self._driven_at = -1.0  # when it was last really armed and in the mode for it
+        self.join(self.party)
+        self.watch(self._look)
+
+    @property
+    def probe(self) -> Probe:
+        """The probe itself."""
+        return self.party.probe
+
+    @property
+    def driven(self) -> Drive:
+        """What came of driving."""
+        assert self.probe.findings.drive is not None
+        return self.probe.findings.drive
+
+    def finish(self) -> Probe:
+        """Let time pass until the probe is over."""
+        assert self.run_until(lambda: self.probe.is_over, within=OVER_WITHIN), repr(self.probe)
+        return self.probe
+
+    def until_moving(self) -> None:
+        """Let time pass until the rover really moves."""
+        moving = self.run_until(lambda: abs(self.rover.truth.forward_speed) > 0.15, within=60)
+        assert moving, repr(self.probe)
+
+    def fault(self, faults: Faults) -> None:
+        """Break something in the rover; ``Faults()`` mends it."""
+        self.rover.autopilot.set_faults(faults)
+
+    def somebody_sends(self, message: m.Message, source: Address) -> None:
+        """Let the probe hear a message of somebody else."""
+        self._stranger.send("probe", Encoder(source).encode(message))
+
+    def stands(self) -> bool:
+        """Whether the rover really stands."""
+        truth = self.rover.truth
+        return abs(truth.forward_speed) < 0.01 and abs(truth.yaw_rate) < 0.01
+
+    def rests(self) -> bool:
+        """Whether it stands in HOLD, disarmed."""
+        autopilot = self.rover.autopilot
+        return self.stands() and autopilot.mode is Mode.HOLD and not autopilot.armed
+
+    def commands(self) -> list[tuple[int, float]]:
+        """Give id and first parameter of every command that was sent."""
+        return [
+            (message.command, message.param1)
+            for _, message in self.party.sent
+            if isinstance(message, m.CommandLong)
+        ]
+
+    def setpoints(self) -> list[tuple[float, m.SetPositionTargetLocalNed]]:
+        """Give every setpoint that was sent, and when."""
+        return [
+            (at, message)
+            for at, message in self.party.sent
+            if isinstance(message, m.SetPositionTargetLocalNed)
+        ]
+
+    def _look(self, now: float) -> None:
+        """No NaN, nothing that moves it unless it is armed and in the mode for it, and the box."""
+        autopilot, truth = self.rover.autopilot, self.rover.truth
+        if autopilot.armed and autopilot.mode is Mode.GUIDED:
+            self._driven_at = now
+        for at, message in self.party.sent[self._looked_at :]:
+            if not isinstance(message, m.SetPositionTargetLocalNed):
+                continue
+            values = (message.vx, message.vy, message.vz, message.yaw_rate)
+            assert all(map(isfinite, values)), message
+            assert not any(values) or at - self._driven_at <= GUIDED_BEFORE, f"{at}: {message}"
+        self._looked_at = len(self.party.sent)
+        self.farthest = max(
+            self.farthest, abs(truth.north - self.start.north), abs(truth.east - self.start.east)
+        )
+        assert hypot(truth.north - self.start.north, truth.east - self.start.east) < BOX * 1.5
+
+
+def is_moving(message: m.SetPositionTargetLocalNed) -> bool:
+    """Whether a setpoint asks for any motion."""
+    return any((message.vx, message.vy, message.vz, message.yaw_rate))
