@@ -1,0 +1,6 @@
+"""``python -m mav_tasks.cli`` is ``mav-tasks``."""
+
+from mav_tasks.cli.app import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""All commands together: composition only."""
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from mav_tasks.cli import config, control, exit_codes, keys, plans, submit
+from mav_tasks.cli.demo import demo
+from mav_tasks.cli.log import log
+from mav_tasks.cli.probe import probe
+from mav_tasks.cli.qgc_actions import qgc_actions
+from mav_tasks.cli.queue import queue
+from mav_tasks.cli.replay import replay
+from mav_tasks.cli.root import Root, root
+from mav_tasks.cli.serve import serve
+from mav_tasks.cli.sim import sim
+from mav_tasks.cli.status import status
+from mav_tasks.cli.vehicles import vehicles
+
+app = typer.Typer(
+    cls=Root,
+    callback=root,
+    no_args_is_help=True,
+    rich_markup_mode=None,  # plain help: rich alone would cost a third of the time to show it
+    pretty_exceptions_enable=False,
+    epilog=exit_codes.TABLE,
+)
+
+PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+app.command()(serve)
+app.command(context_settings=PASSED_ON, add_help_option=False)(sim)
+app.command(context_settings=PASSED_ON, add_help_option=False)(demo)
+app.add_typer(submit.app, name="submit")
+app.command()(status)
+app.command()(queue)
+app.command()(control.cancel)
+app.command()(control.clear)
+app.command()(control.stop)
+app.command()(control.pause)
+app.command()(control.resume)
+app.command()(control.modify)
+app.command()(control.release)
+app.command()(vehicles)
+app.command()(probe)
+app.add_typer(plans.mission, name="mission")
+app.add_typer(plans.fence, name="fence")
+app.add_typer(plans.rally, name="rally")
+app.command()(log)
+app.command()(replay)
+app.add_typer(config.app, name="config")
+app.add_typer(keys.app, name="keys")
+app.command("qgc-actions")(qgc_actions)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: what goes wrong is one line on standard error, and an exit status."""
+    try:
+        app(arguments, prog_name="mav-tasks")
+    except exit_codes.TOLD as error:
+        sys.exit(exit_codes.tell(error))

@@ -1,0 +1,96 @@
+"""``mav-tasks config``: what is in force, whether a file is good, and a file to begin with."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.errors import StoreError, UsageError
+
+if TYPE_CHECKING:
+    from mav_tasks.settings import ServerSettings
+
+app = typer.Typer(
+    help="Show, check and begin the configuration of the server.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+STANDARD_INPUT = "-"
+
+
+@app.command()
+def show(
+    keys: Annotated[
+        list[str] | None, typer.Argument(metavar="[KEY]...", help="Only these, or whole tables.")
+    ] = None,
+    config: Annotated[
+        str | None, typer.Option(metavar="FILE", help="Instead of the file that serve would read.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON, for scripts.")] = False,
+) -> None:
+    """Print each key with the value in force and where it comes from."""
+    from mav_tasks.config import report  # noqa: PLC0415
+    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
+
+    names = report.chosen(keys or ())
+    configuration = Sources(config, dict(os.environ)).load()
+    shown = report.Report(configuration, _parameters(configuration.settings))
+    sys.stdout.write(shown.as_json(names) if as_json else shown.as_toml(names))
+    for words in shown.not_in_force:
+        sys.stderr.write(f"mav-tasks: not in force, though set before: {words}\n")
+
+
+@app.command()
+def check(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="- for standard input.")],
+) -> None:
+    """Say "ok", or every fault of a file by its line; exit code 2 then."""
+    from mav_tasks.config import configuration, toml_file  # noqa: PLC0415
+
+    if file == STANDARD_INPUT:
+        data = sys.stdin.buffer.read(toml_file.LARGEST + 1)
+        text = toml_file.decoded(data, name="standard input")
+    else:
+        text = toml_file.read_text(Path(file))
+    name = "standard input" if file == STANDARD_INPUT else file
+    configuration.merged([toml_file.layer_of(text, name=name)])
+    sys.stdout.write("ok\n")
+
+
+@app.command()
+def init(
+    path: Annotated[
+        str | None, typer.Argument(help="A file that is not there yet; default: print it.")
+    ] = None,
+) -> None:
+    """Print or write a sample file.
+
+    It has each key with its meaning, its range and its default.
+    """
+    from mav_tasks.config.sample import sample  # noqa: PLC0415
+
+    if path is None:
+        sys.stdout.write(sample())
+        return
+    try:
+        with Path(path).open("x", encoding="utf-8") as file:
+            file.write(sample())
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from error
+    sys.stdout.write(f"wrote {path}\n")
+
+
+def _parameters(settings: "ServerSettings") -> dict[str, float]:
+    """Give what clients have set as MAVLink parameters, as far as the store can be looked at."""
+    from mav_tasks.store.place import path_of_store  # noqa: PLC0415
+    from mav_tasks.store.reading import read_parameters  # noqa: PLC0415
+
+    try:
+        path = path_of_store(settings.store)
+        path = None if path is None else path.expanduser().absolute()
+        return read_parameters(path) if path is not None and path.exists() else {}
+    except (StoreError, OSError, RuntimeError) as error:
+        sys.stderr.write(f"mav-tasks: parameters set by clients are not shown: {error}\n")
+        return {}

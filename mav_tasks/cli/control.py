@@ -1,0 +1,190 @@
+"""Commands that steer what is there: cancel, clear, stop, pause, resume, modify, release."""
+
+import sys
+from typing import Annotated, get_args
+
+import typer
+
+from mav_tasks.cli import output
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common, Deadline, StartAt, StartIn, TaskId, seconds_of, start_of
+from mav_tasks.errors import UsageError
+
+MaybeTaskId = Annotated[
+    int | None, typer.Argument(metavar="[ID]", min=1, help="Of the task; without: the running one.")
+]
+
+
+@command
+async def cancel(
+    common: Common,
+    task_id: MaybeTaskId = None,
+    kill: Annotated[
+        bool, typer.Option("--kill", help="Put the rover into HOLD at once, too.")
+    ] = False,
+) -> None:
+    """Call a task off: the one named, or the one that runs."""
+    from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        if task_id is not None:
+            task = await find_task(client, common, task_id)
+            await (task.kill() if kill else task.cancel())
+        else:
+            task_id = await (client.kill() if kill else client.cancel())
+    _done(common, "kill" if kill else "cancel", f"task {task_id} is called off", task=task_id)
+
+
+@command
+async def clear(
+    common: Common,
+    everything: Annotated[bool, typer.Option("--all", help="The running one, too.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+) -> None:
+    """Call off all tasks that wait."""
+    if everything and not yes:
+        _confirm("Call off all tasks, the running one, too?")
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        await client.clear(running_too=everything)
+    which = "all tasks are" if everything else "all tasks that waited are"
+    _done(common, "clear", f"{which} called off", running_too=everything)
+
+
+@command
+async def stop(
+    common: Common,
+    clear: Annotated[bool, typer.Option("--clear", help="Call off what waits, too.")] = False,
+) -> None:
+    """Stop every rover at once, or the one named, until you resume."""
+    from mav_tasks.cli.session import unfound  # noqa: PLC0415
+    from mav_tasks.errors import Refused  # noqa: PLC0415
+    from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
+
+    async with unfound(common) as client:  # looking for the rovers would take a second
+        try:
+            await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
+        except Refused as error:
+            if error.reason == TaskReason.VEHICLE_SILENT:
+                words = (
+                    f"{error}: STOP stays in force, and reaches the rover when it is heard again"
+                )
+                raise Refused(words, result=error.result, reason=error.reason) from error
+            raise
+    which = "every rover" if common.vehicle is None else f"rover {common.vehicle}"
+    words = f"STOP holds for {which}: nothing runs until 'mav-tasks resume'"
+    words += " (with --vehicle N where there are several)" if common.vehicle is None else ""
+    _done(common, "stop", words, vehicle=common.vehicle, cleared=clear)
+
+
+@command
+async def pause(common: Common) -> None:
+    """Stop the rover where it is; its task can go on from there."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        await client.pause()
+    _done(common, "pause", "paused; to go on: mav-tasks resume")
+
+
+@command
+async def resume(common: Common) -> None:
+    """Go on after a pause, a STOP or a takeover."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        await client.resume()
+    _done(common, "resume", "goes on")
+
+
+@command
+async def modify(
+    task_id: TaskId,
+    common: Common,
+    priority: Annotated[int | None, typer.Option(metavar="0..10", help="10 runs first.")] = None,
+    start_in: StartIn = "",
+    start_at: StartAt = "",
+    deadline: Deadline = "",
+    after: Annotated[
+        int | None, typer.Option(metavar="ID", help="A task that must complete first; 0: none.")
+    ] = None,
+    preemptible: Annotated[
+        bool | None,
+        typer.Option("--preemptible/--no-preemptible", help="Others may interrupt it."),
+    ] = None,
+    preemptive: Annotated[
+        bool | None, typer.Option("--preemptive/--no-preemptive", help="It may interrupt others.")
+    ] = None,
+) -> None:
+    """Change a task that is not over.
+
+    What is not given stays as it is.
+    """
+    start = start_of(start_in, start_at)
+    until = seconds_of("--deadline", deadline)
+    wishes = (priority, start.delay, start.at, until, after, preemptible, preemptive)
+    if all(wish is None for wish in wishes):
+        raise UsageError(f"modify {task_id}: say what is to be changed, --priority or another")
+    from mav_tasks.cli.session import find_task, opened, values_checked  # noqa: PLC0415
+
+    async with opened(common) as client:
+        task = await find_task(client, common, task_id)
+        with values_checked():
+            await task.modify(
+                priority=priority,
+                delay=start.delay,
+                deadline=until,
+                after=after,
+                preemptible=preemptible,
+                preemptive=preemptive,
+                at=start.at,
+            )
+    _done(common, "modify", f"task {task_id} is changed", task=task_id)
+
+
+@command
+async def release(
+    common: Common,
+    wish: Annotated[
+        list[str],
+        typer.Argument(metavar="[ID] again|remainder|skip", help="Without an ID: the held one."),
+    ],
+) -> None:
+    """Decide about a held task.
+
+    Drive all of it again from here, or the remainder, or skip it.
+    """
+    from mav_tasks.client.handle import Release  # noqa: PLC0415
+
+    *named, how = wish
+    choices: tuple[Release, ...] = get_args(Release)
+    if how not in choices or len(named) > 1:
+        raise UsageError(f"release {' '.join(wish)}: expected [ID] again, remainder or skip")
+    if named and not (named[0].isascii() and named[0].isdigit()):
+        raise UsageError(f"release {named[0]}: expected the number of a task")
+    chosen = choices[choices.index(how)]
+    from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        if named:
+            task = await find_task(client, common, int(named[0]))
+            await task.release(chosen)
+            task_id = task.id
+        else:
+            task_id = await client.release(None, chosen)
+    _done(common, "release", f"task {task_id}: {how}", task=task_id, how=how)
+
+
+def _confirm(question: str) -> None:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise UsageError("--all calls off the running task, too: say --yes")
+    if not typer.confirm(question):
+        raise UsageError("nothing was called off")
+
+
+def _done(common: Common, action: str, words: str, **fields: object) -> None:
+    if common.json:
+        output.say_json({"done": action, **fields})
+    else:
+        output.say(words)

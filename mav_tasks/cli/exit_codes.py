@@ -1,0 +1,69 @@
+"""What the exit status of a command says, and what is said along with it; the README has the table.
+
+The one place where an error becomes words for the operator: one line on standard error.
+"""
+
+import os
+import sys
+
+from mav_tasks.errors import (
+    ClientError,
+    NoAnswer,
+    NoSuchVehicle,
+    Refused,
+    TaskFailed,
+    UsageError,
+)
+
+DONE = 0
+FAILED = 1  # a task ended in another way than completed, or a request was refused
+USAGE = 2  # what was asked for cannot be done as it stands: the one line says what to change
+NO_ANSWER = 3  # nobody answered in time
+INTERRUPTED = 130  # by Ctrl-C, as a shell reports SIGINT
+READER_GONE = 141  # who read the output has ended, as a shell reports SIGPIPE
+
+TABLE = """\b
+Exit status:
+  0  done
+  1  a task ended otherwise than completed, or a request was refused
+  2  wrong usage: what is said tells what to change
+  3  no answer in time
+  130  Ctrl-C"""
+
+#: what may come out of a command; anything else is our own mistake, and its traceback is wanted
+TOLD = (UsageError, ClientError, KeyboardInterrupt)
+
+
+def tell(error: BaseException) -> int:
+    """Say on standard error what went wrong; gives the exit status."""
+    match error:
+        case KeyboardInterrupt():
+            return INTERRUPTED
+        case BrokenPipeError():
+            _let_go_of_output()
+            return READER_GONE
+        case NoAnswer(nonce=nonce) if nonce:
+            _say(f"{error}; it may be there all the same: --nonce {nonce} has it there only once")
+        case NoSuchVehicle():
+            _say(f"{error} (--vehicle N)")
+        case _:
+            _say(f"{error}")
+    match error:
+        case NoAnswer():
+            return NO_ANSWER
+        case Refused() | TaskFailed():
+            return FAILED
+        case _:
+            return USAGE
+
+
+def _say(text: str) -> None:
+    for line in text.splitlines():  # a file may have many faults
+        sys.stderr.write(f"mav-tasks: {line}\n")
+
+
+def _let_go_of_output() -> None:
+    """Have what is still to be written go nowhere, so that Python does not stumble at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)

@@ -1,0 +1,154 @@
+"""A task while it is waited for: a line that changes on a terminal, lines or JSON elsewhere."""
+
+import asyncio
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from rich.console import Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from mav_tasks.cli import output, words
+from mav_tasks.client.aio import Client
+from mav_tasks.client.handle import Task
+from mav_tasks.client.values import TaskStatus
+
+LOOK = 0.5  # s between two looks at whether anything is heard
+BAR_WIDTH = 30  # columns at the most
+BAR_FROM = 60  # columns of a window in which there is room for a bar
+
+
+class View(Protocol):
+    """Where a task is shown."""
+
+    def show(self, status: TaskStatus) -> None:
+        """There is news."""
+
+    def silence(self, *, is_silent: bool) -> None:
+        """Whether nothing is heard of the rover and its server."""
+
+
+async def follow(client: Client, task: Task, *, as_json: bool) -> None:
+    """Show a task until it is over; TaskFailed unless it has completed."""
+    try:
+        with _view(as_json=as_json) as view:
+            looking = asyncio.create_task(_look(client, task, view))
+            try:
+                async for status in task.updates():
+                    view.show(status)
+            finally:
+                looking.cancel()
+    except asyncio.CancelledError:
+        goes_on = f"task {task.id} goes on; to call it off: mav-tasks cancel {task.id}"
+        sys.stderr.write(f"mav-tasks: {goes_on}\n")
+        raise
+    await task.done()
+
+
+async def _look(client: Client, task: Task, view: View) -> None:
+    while True:
+        heard = [each.is_heard for each in client.vehicles() if each.id == task.vehicle]
+        view.silence(is_silent=heard != [True])
+        await asyncio.sleep(LOOK)
+
+
+@contextmanager
+def _view(*, as_json: bool) -> Iterator[View]:
+    if as_json:
+        yield Objects()
+    elif not output.is_drawn_on():
+        yield Lines()
+    else:
+        bar = Bar()
+        with Live(
+            console=output.console(), auto_refresh=False, transient=True, get_renderable=bar.drawn
+        ) as live:
+            bar.live = live
+            yield bar
+        if bar.status is not None and bar.status.is_over:
+            output.say(words.line_of(bar.status))
+
+
+class Lines:
+    """A line for each change of state, and for a silence."""
+
+    def __init__(self) -> None:
+        self._told = ""
+        self._is_silent = False
+
+    def show(self, status: TaskStatus) -> None:
+        """There is news."""
+        line = words.line_of(status)
+        if line != self._told:
+            self._told = line
+            output.say(line)
+
+    def silence(self, *, is_silent: bool) -> None:
+        """Whether nothing is heard."""
+        if is_silent != self._is_silent:
+            self._is_silent = is_silent
+            output.say("nothing is heard of the rover" if is_silent else "the rover is heard again")
+
+
+class Objects:
+    """A JSON object for each change, of progress, too."""
+
+    def __init__(self) -> None:
+        self._told: tuple[object, ...] = ()
+
+    def show(self, status: TaskStatus) -> None:
+        """There is news."""
+        told = (status.state, status.reason, status.progress, status.step)
+        if told != self._told:
+            self._told = told
+            output.say_json(words.task_json(status))
+
+    def silence(self, *, is_silent: bool) -> None:
+        """A program sees that for itself."""
+
+
+class Bar:
+    """One line of a terminal, written over again and again."""
+
+    def __init__(self) -> None:
+        self.status: TaskStatus | None = None
+        self.live: Live | None = None
+        self._is_silent = False
+
+    def show(self, status: TaskStatus) -> None:
+        """There is news."""
+        self.status = status
+        self._draw()
+
+    def silence(self, *, is_silent: bool) -> None:
+        """Whether nothing is heard; also the moment at which a changed window is seen."""
+        self._is_silent = is_silent
+        self._draw()
+
+    def drawn(self) -> Table | Group:
+        """Give the line, as wide as the window at this moment, and below it what to do."""
+        width = 80 if self.live is None else self.live.console.width
+        grid = Table.grid(padding=(0, 1), expand=False)
+        if self.status is None:
+            grid.add_row("")
+            return grid
+        status = self.status
+        state = words.state_of(status)
+        why = "nothing is heard" if self._is_silent else words.why_of(status)
+        cells: list[str | ProgressBar] = [f"task {status.id}", state]
+        if width >= BAR_FROM:
+            done = status.progress or 0.0
+            cells.append(ProgressBar(total=1.0, completed=done, width=min(BAR_WIDTH, width // 3)))
+        cells += [words.percent_of(status), words.left_of(status), why]
+        for _ in cells:
+            grid.add_column(no_wrap=True, overflow="ellipsis")
+        grid.add_row(*cells)
+        return Group(grid, Text(words.way_on_of(status))) if words.way_on_of(status) else grid
+
+    def _draw(self) -> None:
+        if self.live is not None:
+            self.live.refresh()

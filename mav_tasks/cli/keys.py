@@ -1,0 +1,178 @@
+"""``mav-tasks keys``: the key ring. A secret is read without echo or from a pipe, never an option.
+
+What is on a command line everybody on the machine can read.
+"""
+
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mav_tasks.cli import output
+from mav_tasks.errors import KeyRingError, UsageError
+
+if TYPE_CHECKING:
+    from mav_tasks.key_ring.ring import Entry
+
+app = typer.Typer(
+    help="Add, list and revoke the keys that packets are signed with.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+LONGEST = 4096  # characters of a passphrase that are read
+
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Of the key.")]
+File = Annotated[
+    str,
+    typer.Option(
+        "--keys", metavar="FILE", help="The key ring; default: as the configuration says."
+    ),
+]
+
+
+@app.command()
+def add(
+    name: Name,
+    role: Annotated[
+        str,
+        typer.Option(
+            metavar="ROLE",
+            help="What its holder may do: observer, submitter, operator or safety; "
+            "or vehicle: it is for the link to a rover.",
+        ),
+    ],
+    passphrase: Annotated[
+        bool, typer.Option("--passphrase", help="Ask for a passphrase, as ground stations do.")
+    ] = False,
+    hex_: Annotated[bool, typer.Option("--hex", help="Ask for 64 hexadecimal digits.")] = False,
+    generate: Annotated[
+        bool, typer.Option("--generate", help="Make a new one, and print it once; the default.")
+    ] = False,
+    derivation: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="What a passphrase becomes a key by: sha256 (QGroundControl 5.0, MAVProxy; "
+            "the default) or pbkdf2 (later QGroundControl).",
+        ),
+    ] = None,
+    keys: File = "",
+) -> None:
+    """Add a key; a running server takes it at once.
+
+    Where standard input is no terminal, the passphrase or the digits are its first line.
+    """
+    from datetime import UTC, datetime  # noqa: PLC0415
+
+    from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
+    from mav_tasks.key_ring import derivation as how  # noqa: PLC0415
+    from mav_tasks.key_ring.ring import Entry, KeyRing, key_of  # noqa: PLC0415
+    from mav_tasks.key_ring.ring_file import change  # noqa: PLC0415
+
+    if passphrase + hex_ + generate > 1:
+        raise UsageError("--passphrase, --hex and --generate: choose one of them")
+    if derivation is not None and (not passphrase or derivation not in how.PASSPHRASES):
+        words = " or ".join(how.PASSPHRASES)
+        raise UsageError(f"--derivation: expected {words}, and --passphrase")
+    key_of(name, role, b"")  # before anybody types a passphrase for nothing
+    if passphrase:
+        derivation = derivation or how.SHA256
+        secret = how.from_passphrase(_asked("Passphrase", is_new=True), derivation)
+    elif hex_:
+        derivation, secret = how.HEX, how.from_hex(_asked("64 hexadecimal digits"))
+    else:
+        derivation, secret = how.GENERATED, how.generated()
+    key = key_of(name, role, secret)
+    path = ring_path(keys)
+
+    def with_it(ring: KeyRing) -> KeyRing:
+        return ring.with_added(Entry(name, role, key, derivation, datetime.now(UTC)))
+
+    change(path, with_it)
+    if derivation == how.GENERATED:
+        output.say(secret.hex())
+        sys.stderr.write(
+            "mav-tasks: this is the secret, for the other end; it is not shown again\n"
+        )
+    sys.stderr.write(f"mav-tasks: key {name} ({key.fingerprint}), {role}, is in {path}\n")
+
+
+@app.command("list")
+def list_(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, one object a line.")] = False,
+    keys: File = "",
+) -> None:
+    """Show the keys by their fingerprints; never a secret."""
+    from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
+    from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
+
+    path = ring_path(keys)
+    entries = load(path).ring.entries
+    if as_json:
+        for entry in entries:
+            output.say_json({"file": str(path), **_as_json(entry)})
+        return
+    output.say(f"key ring {path}, {sum(entry.is_usable for entry in entries)} keys")
+    if entries:
+        _show(entries)
+
+
+@app.command()
+def revoke(name: Name, keys: File = "") -> None:
+    """Have nobody sign with a key any more; a running server refuses it at once."""
+    from datetime import UTC, datetime  # noqa: PLC0415
+
+    from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
+    from mav_tasks.key_ring.ring_file import change, load  # noqa: PLC0415
+
+    path = ring_path(keys)
+    load(path)  # one that is not there is not to be made now
+    change(path, lambda ring: ring.with_revoked(name, at=datetime.now(UTC)))
+    output.say(f"key {name} is revoked in {path}")
+
+
+def _asked(what: str, *, is_new: bool = False) -> str:
+    """Give a secret text: asked for without echo, or the first line of standard input."""
+    if sys.stdin is None:
+        raise UsageError(f"{what.lower()}: standard input is closed")
+    if not sys.stdin.isatty():
+        return sys.stdin.readline(LONGEST).removesuffix("\n").removesuffix("\r")
+    from getpass import getpass  # noqa: PLC0415
+
+    try:
+        text = getpass(f"{what}: ")
+        if is_new and getpass("The same again: ") != text:
+            raise KeyRingError("the two are not the same")
+    except EOFError:
+        raise UsageError(f"{what.lower()}: nothing was given") from None
+    return text
+
+
+def _as_json(entry: "Entry") -> dict[str, Any]:
+    dates = {"created": entry.created, "revoked": entry.revoked}
+    return {
+        "name": entry.name,
+        "role": entry.kind,
+        "fingerprint": entry.key.fingerprint,
+        "derivation": entry.derivation,
+        "usable": entry.is_usable,
+        **{name: None if at is None else at.isoformat() for name, at in dates.items()},
+    }
+
+
+def _show(entries: "tuple[Entry, ...]") -> None:
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    for name in ("key", "role", "fingerprint", "from", "made", "revoked"):
+        table.add_column(name)
+    for entry in entries:
+        made, revoked = (
+            "" if at is None else f"{at:%Y-%m-%d}" for at in (entry.created, entry.revoked)
+        )
+        table.add_row(
+            *(entry.name, entry.kind, entry.key.fingerprint, entry.derivation, made),
+            Text(revoked, style="red"),
+        )
+    output.show(table)

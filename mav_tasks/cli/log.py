@@ -1,0 +1,103 @@
+"""``mav-tasks log``: what happened, out of the store's journal."""
+
+import os
+import select
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.errors import StoreError, UsageError
+
+if TYPE_CHECKING:
+    from mav_tasks.logs.export import EntryOf
+    from mav_tasks.store.journal import Journal
+
+MOST = 1 << 63  # SQLite has no such number
+LOOK = 0.5  # s, between two looks at whether the store was written to
+
+
+def log(
+    store: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PATH",
+            help="The store's file; default: as the configuration says.",
+        ),
+    ] = None,
+    task: Annotated[int | None, typer.Option(metavar="ID", help="Of this task only.")] = None,
+    vehicle: Annotated[
+        int | None, typer.Option(metavar="N", help="Of this vehicle only, by its system id.")
+    ] = None,
+    since: Annotated[
+        str | None,
+        typer.Option(
+            metavar="2h|2026-11-20T10:00", help="Not older than this, or since then, UTC."
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="A table, comma separated.")] = False,
+    follow: Annotated[
+        bool, typer.Option("--follow", "-f", help="Go on with what happens, until Ctrl-C.")
+    ] = False,
+) -> None:
+    """Print what happened, one line an event.
+
+    It is read from the store; the server may be running.
+    """
+    import time  # noqa: PLC0415
+    from contextlib import closing  # noqa: PLC0415
+
+    from mav_tasks.logs import export  # noqa: PLC0415
+    from mav_tasks.store.journal import Journal, Which  # noqa: PLC0415
+    from mav_tasks.store.place import path_of_store  # noqa: PLC0415
+
+    if as_json and as_csv:
+        raise UsageError("--json and --csv: choose one of them")
+    for flag, number in (("--task", task), ("--vehicle", vehicle)):
+        if number is not None and not 0 <= number < MOST:
+            raise UsageError(f"{flag} {number}: there is no such number")
+    path = path_of_store(_configured() if store is None else store)
+    if path is None or store == "":
+        raise StoreError("--store: expected the path of a store that is kept")
+    begin = None if since is None else export.parse_since(since, now=time.time())
+    which = Which(task=task, vehicle=vehicle, since=begin)
+    entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
+    with closing(Journal(path, which)) as journal:
+        try:
+            if as_csv:
+                sys.stdout.write(export.csv_row(export.COLUMNS))
+            seen = journal.version()
+            _print(journal, entry_of)
+            while follow and _is_written_to(journal, seen):
+                seen = journal.version()
+                _print(journal, entry_of)
+        except BrokenPipeError:  # whoever read it has enough, as ``head``; there is nobody to tell
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        except KeyboardInterrupt:
+            pass  # the way in which --follow ends
+        except OSError as error:
+            raise UsageError(f"standard output: {error.strerror}") from error
+
+
+def _print(journal: "Journal", entry_of: "EntryOf") -> None:
+    for number, event in journal.take(offset=0.0):
+        sys.stdout.write(entry_of(number, event))
+    sys.stdout.flush()
+
+
+def _is_written_to(journal: "Journal", seen: int) -> bool:
+    """Wait until the store is; False: before that, who reads what we print went away."""
+    poller = select.poll()
+    poller.register(sys.stdout.fileno(), 0)  # of errors only: the other end is closed
+    while journal.version() == seen:
+        if poller.poll(LOOK * 1000):
+            return False
+    return True
+
+
+def _configured() -> str:
+    """Give the store that the server's configuration names."""
+    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
+
+    return Sources(None, dict(os.environ)).load().settings.store

@@ -1,0 +1,61 @@
+"""Standard output: whether it is a terminal that can be drawn on, JSON, and plain lines."""
+
+import os
+import shutil
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+DUMB = ("dumb", "unknown", "")
+PIPE_WIDTH = 1000  # columns: nothing is cut where a program reads
+
+
+def is_drawn_on() -> bool:
+    """Whether lines that were written can be written over: a terminal, and not a dumb one."""
+    return sys.stdout.isatty() and os.environ.get("TERM", "").lower() not in DUMB
+
+
+def console() -> "Console":
+    """Give what tables are printed on; without NO_COLOR and on a terminal, in colours."""
+    from rich.console import Console  # noqa: PLC0415
+
+    is_drawn = is_drawn_on()
+    has_colour = is_drawn and not os.environ.get("NO_COLOR")
+    return Console(
+        force_terminal=is_drawn,
+        color_system="auto" if has_colour else None,
+        highlight=False,
+        markup=False,
+        emoji=False,
+        width=None if is_drawn else _plain_width(),
+    )
+
+
+def say(text: str) -> None:
+    """Write a line, now."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def say_json(value: dict[str, Any]) -> None:
+    """Write an object as a line, now."""
+    import json  # noqa: PLC0415
+
+    say(json.dumps(value))
+
+
+def show(what: "RenderableType") -> None:
+    """Print a table; no blanks at the ends of its lines where a program reads them."""
+    target = console()
+    if target.is_terminal:
+        target.print(what)
+        return
+    with target.capture() as captured:
+        target.print(what)
+    say("\n".join(line.rstrip() for line in captured.get().rstrip("\n").split("\n")))
+
+
+def _plain_width() -> int:
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH

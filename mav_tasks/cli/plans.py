@@ -1,0 +1,166 @@
+"""``mav-tasks mission``, ``fence`` and ``rally``: plans to and from files."""
+
+import sys
+from collections.abc import Sized
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli import output
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common, Terms, Wait
+from mav_tasks.cli.submit import tell_submitted
+from mav_tasks.errors import UsageError
+
+if TYPE_CHECKING:
+    from mav_tasks.plan_files import PlanFile
+
+STANDARD_OUTPUT = "-"
+
+FileIn = Annotated[
+    Path, typer.Argument(metavar="FILE", help="A .plan, or QGC WPL 110 (.waypoints).")
+]
+PlanIn = Annotated[Path, typer.Argument(metavar="FILE", help="A .plan of QGroundControl.")]
+FileOut = Annotated[
+    str, typer.Argument(metavar="FILE", help="A .plan, or .waypoints for QGC WPL 110; - prints.")
+]
+PlanOut = Annotated[str, typer.Argument(metavar="FILE", help="A .plan; - prints.")]
+Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
+Empty = Annotated[bool, typer.Option("--empty", help="Also where the file has none: remove it.")]
+
+mission = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="Missions to and from files."
+)
+fence = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help="The fence to and from files."
+)
+rally = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Rally points from files.")
+
+
+@mission.command("upload")
+@command
+async def upload_mission(
+    file: FileIn,
+    terms: Terms,
+    common: Common,
+    stage: Annotated[
+        bool, typer.Option("--stage", help="Do not queue it: it waits for 'mission start'.")
+    ] = False,
+) -> None:
+    """Queue a mission as one task."""
+    from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
+    from mav_tasks.plan_files import read_plan  # noqa: PLC0415
+
+    wished = read(terms)
+    if stage and terms != Terms(wait=terms.wait):
+        raise UsageError("--stage: a mission that waits for its start has no terms")
+    plan = read_plan(file)
+    async with opened(common) as client:
+        with values_checked():
+            if stage:
+                task = await client.stage_mission(plan)
+            else:
+                task = await client.submit_mission(plan, **wished._asdict())
+        hint = " waits: mav-tasks mission start" if stage else ""
+        await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
+
+
+@mission.command("start")
+@command
+async def start_mission(common: Common, wait: Wait = False) -> None:
+    """Start the mission that waits for it, or the last one again."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        task = await client.start_mission()
+        await tell_submitted(client, task, common, is_awaited=wait)
+
+
+@mission.command("download")
+@command
+async def download_mission(file: FileOut, common: Common, force: Force = False) -> None:
+    """Write the mission at the rover's own place into a file."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    _check_place(file, force=force)
+    async with opened(common) as client:
+        plan = await client.mission_file()
+    _check_there(plan.items, "mission")
+    _write(plan, file, f"{len(plan.items)} items", common)
+
+
+@fence.command("upload")
+@command
+async def upload_fence(file: PlanIn, common: Common, empty: Empty = False) -> None:
+    """Give the rover the fence of a file."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.plan_files import read_plan  # noqa: PLC0415
+
+    plan = read_plan(file)
+    if not plan.fence and not empty:
+        raise UsageError(f"{file} has no fence: --empty takes the rover's away")
+    async with opened(common) as client:
+        count = await client.set_fence(plan)
+    _uploaded(common, "fence", count)
+
+
+@fence.command("download")
+@command
+async def download_fence(file: PlanOut, common: Common, force: Force = False) -> None:
+    """Write the rover's fence into a file."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    _check_place(file, force=force)
+    async with opened(common) as client:
+        plan = await client.fence_file()
+    _check_there(plan.fence, "fence")
+    _write(plan, file, f"{len(plan.fence)} polygons and circles", common)
+
+
+@rally.command("upload")
+@command
+async def upload_rally_points(file: PlanIn, common: Common, empty: Empty = False) -> None:
+    """Give the rover the rally points of a file."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.plan_files import read_plan  # noqa: PLC0415
+
+    plan = read_plan(file)
+    if not plan.rally and not empty:
+        raise UsageError(f"{file} has no rally points: --empty takes the rover's away")
+    async with opened(common) as client:
+        count = await client.set_rally_points(plan)
+    _uploaded(common, "rally", count)
+
+
+def _check_place(file: str, *, force: bool) -> None:
+    if file != STANDARD_OUTPUT and not force and Path(file).exists():
+        raise UsageError(f"{file} is there: --force writes over it")
+
+
+def _check_there(parts: Sized, kind: str) -> None:
+    """An empty file would look as if there had been something to save."""
+    if not parts:
+        from mav_tasks.errors import Refused  # noqa: PLC0415
+
+        raise Refused(f"the rover has no {kind}: nothing is written", result=0, reason=0)
+
+
+def _write(plan: "PlanFile", file: str, what: str, common: Common) -> None:
+    from mav_tasks.plan_files import format_plan, write_plan  # noqa: PLC0415
+
+    if file == STANDARD_OUTPUT:
+        sys.stdout.write(format_plan(plan))
+        return
+    write_plan(plan, Path(file))
+    if common.json:
+        output.say_json({"file": file, "items": len(plan.items) or len(plan.fence)})
+    else:
+        output.say(f"{file}: {what}")
+
+
+def _uploaded(common: Common, kind: str, count: int) -> None:
+    if common.json:
+        output.say_json({"done": f"{kind} upload", "items": count})
+    else:
+        output.say(f"{kind}: {count} items")

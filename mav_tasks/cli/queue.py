@@ -1,0 +1,58 @@
+"""``mav-tasks queue``: what runs, what waits, and why."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common
+
+if TYPE_CHECKING:
+    from mav_tasks.client.aio import Client
+    from mav_tasks.client.values import QueueStatus
+
+
+@command
+async def queue(
+    common: Common,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Keep it up to date, until Ctrl-C.")
+    ] = False,
+    limit: Annotated[
+        int, typer.Option(min=1, metavar="NUMBER", help="Show so many waiting tasks.")
+    ] = 100,
+) -> None:
+    """Show what runs, what waits, and why.
+
+    Of every rover, unless one is named.
+    """
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        if watch:
+            from mav_tasks.cli.watch import watch_queues  # noqa: PLC0415
+
+            await watch_queues(client, common, limit=limit)
+            return
+        show(await fetch(client, common, limit=limit), common)
+
+
+async def fetch(client: "Client", common: Common, *, limit: int) -> list["QueueStatus"]:
+    """Give the queues that are meant."""
+    meant = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
+    return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]
+
+
+def show(queues: list["QueueStatus"], common: Common) -> None:
+    """Print them."""
+    from mav_tasks.cli import output, words  # noqa: PLC0415
+
+    if common.json:
+        for each in queues:
+            output.say_json(words.queue_json(each))
+        return
+    from mav_tasks.cli.tables import queue_table  # noqa: PLC0415
+
+    width = output.console().width
+    for each in queues:
+        output.show(queue_table(each, width=width))

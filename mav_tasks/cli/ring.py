@@ -1,0 +1,30 @@
+"""Which key ring a command means, and the key that it is to sign with."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mav_tasks.errors import KeyRingError
+
+if TYPE_CHECKING:
+    from mav_tasks.mavlink.signing import Key
+
+
+def ring_path(asked: str) -> Path:
+    """Give the file of ``--keys``; "": that of the configuration, or the user's own."""
+    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
+    from mav_tasks.key_ring.ring_file import path_of_ring  # noqa: PLC0415
+
+    return path_of_ring(asked or Sources(None, dict(os.environ)).load().settings.links.keys)
+
+
+def key_to_sign_with(name: str, asked: str) -> "Key":
+    """Give a key by its name; KeyRingError."""
+    from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
+
+    path = ring_path(asked)
+    ring = load(path).ring
+    try:
+        return ring.usable_key(name)
+    except KeyRingError as error:
+        raise KeyRingError(f"--sign: {error}, in {path}") from None

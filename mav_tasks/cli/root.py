@@ -1,0 +1,39 @@
+"""What all commands are in: how each of them ends that is cut short."""
+
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mav_tasks.cli import exit_codes
+
+
+class Root(TyperGroup):
+    """The group of all commands."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command."""
+        try:
+            result = super().invoke(ctx)
+            sys.stdout.flush()  # here, where a reader that has gone is no mishap
+        except (KeyboardInterrupt, BrokenPipeError) as error:  # Typer has its own ends for them
+            raise typer.Exit(exit_codes.tell(error)) from None
+        return result
+
+
+def _show_version(is_asked: bool) -> None:
+    if is_asked:
+        from importlib.metadata import version  # noqa: PLC0415
+
+        sys.stdout.write(f"mav-tasks {version('mav-tasks')}\n")
+        raise typer.Exit
+
+
+def root(
+    version: Annotated[  # its callback has it
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Say which this is."),
+    ] = False,
+) -> None:
+    """A MAVLink task server: commands become queued tasks that a rover drives."""

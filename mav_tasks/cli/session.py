@@ -1,0 +1,80 @@
+"""A client for one command: opened as its options say, and told what is wrong with them."""
+
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from datetime import datetime
+from typing import NamedTuple
+
+from mav_tasks.cli.options import Common, Terms, seconds_of, start_of
+from mav_tasks.cli.ring import key_to_sign_with
+from mav_tasks.client.aio import Client
+from mav_tasks.client.handle import Task
+from mav_tasks.errors import NoAnswer, UsageError
+
+
+class Read(NamedTuple):
+    """Terms as the library has them."""
+
+    priority: int
+    after: int
+    delay: float
+    at: datetime | None
+    deadline: float
+    nonce: int
+
+
+def read(terms: Terms) -> Read:
+    """Read the terms of a task; UsageError."""
+    start = start_of(terms.start_in, terms.start_at)
+    deadline = seconds_of("--deadline", terms.deadline) or 0.0
+    return Read(terms.priority, terms.after, start.delay or 0.0, start.at, deadline, terms.nonce)
+
+
+@asynccontextmanager
+async def opened(common: Common) -> AsyncIterator[Client]:
+    """Give a client that has found the server and the rovers."""
+    async with unfound(common) as client:
+        await client.found()
+        yield client
+
+
+@asynccontextmanager
+async def unfound(common: Common) -> AsyncIterator[Client]:
+    """Give a client whose link is open, and that has heard nobody yet."""
+    if common.keys and not common.sign:
+        raise UsageError("--keys: say with which key, --sign NAME")
+    client = Client(
+        common.server,
+        vehicle=common.vehicle,
+        timeout=common.timeout,
+        key=key_to_sign_with(common.sign, common.keys) if common.sign else None,
+    )
+    client.open()
+    try:
+        yield client
+    except NoAnswer as error:
+        if common.sign or client.vehicles():  # else: perhaps it answers those only who sign
+            raise
+        raise NoAnswer(
+            f"{error} (does it want a signature? --sign NAME)", nonce=error.nonce
+        ) from None
+    finally:
+        await client.close()
+
+
+@contextmanager
+def values_checked() -> Iterator[None]:
+    """Take a value that the library does not have for what it is: a mistake on the command line."""
+    try:
+        yield
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+async def find_task(client: Client, common: Common, task_id: int) -> Task:
+    """Give a task by its number alone: a server tells of a task whichever rover it is asked of."""
+    vehicle = common.vehicle
+    if vehicle is None:
+        anyone = client.vehicles()[0].id
+        vehicle = (await client.status(task_id, vehicle=anyone)).vehicle
+    return await client.task(task_id, vehicle=vehicle)

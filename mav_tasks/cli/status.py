@@ -1,0 +1,69 @@
+"""``mav-tasks status``: how one task is."""
+
+from typing import TYPE_CHECKING
+
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common, TaskId, Wait
+
+if TYPE_CHECKING:
+    from mav_tasks.client.handle import Task
+    from mav_tasks.client.values import TaskStatus, TaskTiming
+
+
+@command
+async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
+    """Show how a task is."""
+    from mav_tasks.cli import output, words  # noqa: PLC0415
+    from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        task = await find_task(client, common, task_id)
+        if wait:
+            from mav_tasks.cli.follow import follow  # noqa: PLC0415
+
+            await follow(client, task, as_json=common.json)
+            return
+        answer, timing = await task.refresh(), await _timing_of(task)
+        if common.json:
+            output.say_json(words.task_json(answer) | {"setpoints": words.timing_json(timing)})
+            return
+        for name, value in _fields(answer, timing):
+            if value:
+                output.say(f"{name:<12}{value}")
+
+
+async def _timing_of(task: "Task") -> "TaskTiming | None":
+    from mav_tasks.errors import Refused  # noqa: PLC0415
+
+    try:
+        return await task.timing()
+    except Refused:  # an older server does not know the question
+        return None
+
+
+def _fields(status: "TaskStatus", timing: "TaskTiming | None") -> list[tuple[str, str]]:
+    from mav_tasks.cli import words  # noqa: PLC0415
+    from mav_tasks.cli.times import format_duration  # noqa: PLC0415
+
+    def lasting(seconds: float | None) -> str:
+        return "" if not seconds else format_duration(seconds)
+
+    ahead = "" if not status.is_waiting or status.position is None else str(status.position)
+    return [
+        ("task", str(status.id)),
+        ("rover", str(status.vehicle)),
+        ("what", words.what_of(status)),
+        ("state", words.state_of(status)),
+        ("why", words.why_of(status)),
+        ("priority", str(status.priority)),
+        ("after task", str(status.after or "")),
+        ("ahead of it", ahead),
+        ("done", words.percent_of(status)),
+        ("left", words.left_of(status)),
+        ("item", f"{status.step + 1} of {status.steps}" if status.steps > 1 else ""),
+        ("starts in", lasting(status.time_to_start)),
+        ("ends in", lasting(status.time_to_finish)),
+        ("has run for", lasting(status.execution_time)),
+        ("setpoints", words.timing_of(timing)),
+        ("from", status.submitter),
+    ]

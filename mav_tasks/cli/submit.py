@@ -1,0 +1,190 @@
+"""``mav-tasks submit``: a goal becomes a task."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli.command import NUMBERS, command
+from mav_tasks.cli.options import Common, Terms
+
+if TYPE_CHECKING:
+    from mav_tasks.client.aio import Client
+    from mav_tasks.client.handle import Task
+    from mav_tasks.client.wire import Goal
+
+EPILOG = """\b
+Examples:
+  mav-tasks submit move 2 --speed 0.5 --priority 8 --wait
+  mav-tasks submit rotate -90 --after 12
+  mav-tasks submit goto 47.3977 8.5456 --global --at 14:30"""
+
+Speed = Annotated[float | None, typer.Option(metavar="M/S", help="Default: the server's.")]
+Rate = Annotated[float | None, typer.Option(metavar="DEG/S", help="Default: the server's.")]
+
+app = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, epilog=EPILOG, help="Give a rover something to do."
+)
+
+
+@app.command(context_settings=NUMBERS)
+@command
+async def move(
+    distance: Annotated[float, typer.Argument(metavar="METRES", help="Negative: backwards.")],
+    terms: Terms,
+    common: Common,
+    speed: Speed = None,
+) -> None:
+    """Drive straight along the heading."""
+    from mav_tasks.tasks.goal import Move  # noqa: PLC0415
+
+    await _submit([Move(distance, speed)], terms, common)
+
+
+@app.command(context_settings=NUMBERS)
+@command
+async def rotate(
+    angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise.")],
+    terms: Terms,
+    common: Common,
+    rate: Rate = None,
+) -> None:
+    """Turn on the spot by an angle."""
+    from mav_tasks.tasks.goal import Rotate  # noqa: PLC0415
+
+    await _submit([Rotate(_radians(angle), _maybe_radians(rate))], terms, common)
+
+
+@app.command(context_settings=NUMBERS)
+@command
+async def drive(
+    forward: Annotated[float, typer.Argument(metavar="M/S", help="Negative: backwards.")],
+    yaw_rate: Annotated[float, typer.Argument(metavar="DEG/S", help="Clockwise.")],
+    duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 5s.")],
+    terms: Terms,
+    common: Common,
+) -> None:
+    """Keep a velocity for a time."""
+    from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
+    from mav_tasks.tasks.goal import Drive  # noqa: PLC0415
+
+    seconds = parse_duration("DURATION", duration)
+    await _submit([Drive(forward, _radians(yaw_rate), seconds)], terms, common)
+
+
+@app.command(context_settings=NUMBERS)
+@command
+async def goto(
+    north: Annotated[
+        float, typer.Argument(metavar="NORTH|LAT", help="Metres, or degrees with --global.")
+    ],
+    east: Annotated[float, typer.Argument(metavar="EAST|LON", help="The same.")],
+    terms: Terms,
+    common: Common,
+    is_global: Annotated[
+        bool, typer.Option("--global", help="Latitude and longitude, not metres.")
+    ] = False,
+    speed: Speed = None,
+    radius: Annotated[
+        float | None,
+        typer.Option(metavar="METRES", help="Near enough; default: as near as can be."),
+    ] = None,
+    heading: Annotated[
+        float | None, typer.Option(metavar="DEGREES", help="Turn to it in the end.")
+    ] = None,
+) -> None:
+    """Drive to a place: metres from the rover's origin, or latitude and longitude."""
+    from mav_tasks.cli.session import values_checked  # noqa: PLC0415
+    from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place  # noqa: PLC0415
+
+    place: Place = LocalPlace(north, east)
+    if is_global:
+        with values_checked():
+            place = GlobalPlace(_degE7("latitude", north, 90), _degE7("longitude", east, 180))
+    way = GoTo(place, speed=speed, radius=radius, yaw=_maybe_radians(heading))
+    await _submit([way], terms, common)
+
+
+@app.command(context_settings=NUMBERS)
+@command
+async def face(
+    heading: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise from north.")],
+    terms: Terms,
+    common: Common,
+    rate: Rate = None,
+) -> None:
+    """Turn on the spot to a heading."""
+    from mav_tasks.tasks.goal import Face  # noqa: PLC0415
+
+    await _submit([Face(_radians(heading), rate=_maybe_radians(rate))], terms, common)
+
+
+@app.command(context_settings=NUMBERS)
+@command
+async def wait(
+    duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 30s or 5m.")],
+    terms: Terms,
+    common: Common,
+) -> None:
+    """Stand for a while."""
+    from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
+    from mav_tasks.tasks.goal import Wait  # noqa: PLC0415
+
+    await _submit([Wait(parse_duration("DURATION", duration))], terms, common)
+
+
+@app.command()
+@command
+async def home(terms: Terms, common: Common, speed: Speed = None) -> None:
+    """Return to the rover's home."""
+    from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
+
+    await _submit([GoTo(None, speed=speed)], terms, common)
+
+
+async def _submit(goals: "Sequence[Goal]", terms: Terms, common: Common) -> None:
+    from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
+
+    wished = read(terms)
+    async with opened(common) as client:
+        with values_checked():
+            task = await client.submit(goals, **wished._asdict())
+        await tell_submitted(client, task, common, is_awaited=terms.wait)
+
+
+async def tell_submitted(
+    client: "Client", task: "Task", common: Common, *, is_awaited: bool, hint: str = ""
+) -> None:
+    """Say which task it is, and wait for it if that is wished."""
+    from mav_tasks.cli import output  # noqa: PLC0415
+
+    if not common.json:
+        output.say(f"task {task.id}{hint}")
+    if is_awaited:
+        from mav_tasks.cli.follow import follow  # noqa: PLC0415
+
+        await follow(client, task, as_json=common.json)
+    elif common.json:
+        from mav_tasks.cli.words import task_json  # noqa: PLC0415
+        from mav_tasks.errors import ClientError  # noqa: PLC0415
+
+        try:
+            output.say_json(task_json(await task.refresh()))
+        except ClientError:  # it is there all the same, and its number must not get lost
+            output.say_json({"id": task.id, "vehicle": task.vehicle})
+
+
+def _radians(angle: float) -> float:
+    from math import radians  # noqa: PLC0415
+
+    return radians(angle)
+
+
+def _maybe_radians(angle: float | None) -> float | None:
+    return None if angle is None else _radians(angle)
+
+
+def _degE7(name: str, value: float, limit: int) -> int:
+    if not abs(value) <= limit:
+        raise ValueError(f"{name} {value:g}: expected degrees, -{limit} to {limit}")
+    return round(value * 1e7)

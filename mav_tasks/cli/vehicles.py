@@ -1,0 +1,30 @@
+"""``mav-tasks vehicles``: the rovers of the server."""
+
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common
+
+LOOK = 0.05  # s
+LOOKS = 30  # telemetry is asked for once a second
+
+
+@command
+async def vehicles(common: Common) -> None:
+    """Show the rovers of the server."""
+    import asyncio  # noqa: PLC0415
+
+    from mav_tasks.cli import output, words  # noqa: PLC0415
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        for _ in range(LOOKS):
+            if all(each.north is not None and each.yaw is not None for each in client.vehicles()):
+                break
+            await asyncio.sleep(LOOK)
+        found = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
+    if common.json:
+        for each in found:
+            output.say_json(words.vehicle_json(each))
+        return
+    from mav_tasks.cli.tables import vehicle_table  # noqa: PLC0415
+
+    output.show(vehicle_table(found))

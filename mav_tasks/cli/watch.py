@@ -1,0 +1,121 @@
+"""Queues kept up to date: a window on a terminal, a new block for each change elsewhere."""
+
+import asyncio
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from rich.console import Group
+from rich.live import Live
+from rich.text import Text
+
+from mav_tasks.cli import output, words
+from mav_tasks.cli.options import Common
+from mav_tasks.cli.queue import fetch, show
+from mav_tasks.cli.tables import queue_table
+from mav_tasks.client.aio import Client
+from mav_tasks.client.values import QueueStatus
+from mav_tasks.errors import NoAnswer
+
+PERIOD = 1.0  # s between two looks
+OLD = 2.5  # s; what is older is said to be
+
+
+async def watch_queues(client: Client, common: Common, *, limit: int) -> None:
+    """Show them until the task is cancelled, also over an absence of the server."""
+    if common.json or not output.is_drawn_on():
+        await _print_changes(client, common, limit=limit)
+    else:
+        await _draw(client, common, limit=limit)
+
+
+async def _print_changes(client: Client, common: Common, *, limit: int) -> None:
+    told: list[object] = []
+    while True:
+        with suppress(NoAnswer):
+            queues = await fetch(client, common, limit=limit)
+            if (seen := [_essence(queue) for queue in queues]) != told:
+                told = seen
+                show(queues, common)
+        await asyncio.sleep(PERIOD)
+
+
+async def _draw(client: Client, common: Common, *, limit: int) -> None:
+    window = Window()
+    with (
+        Live(
+            console=output.console(), screen=True, auto_refresh=False, get_renderable=window.drawn
+        ) as live,
+        _on_resize(live.refresh),
+    ):
+        window.live = live
+        refreshing = asyncio.create_task(_refresh(window))
+        try:
+            while True:
+                with suppress(NoAnswer):
+                    most = min(limit, live.console.height)
+                    window.take(await fetch(client, common, limit=most))
+                live.refresh()
+                await asyncio.sleep(PERIOD)
+        finally:
+            refreshing.cancel()
+
+
+async def _refresh(window: "Window") -> None:
+    """See to it that an answer's age is told while the next one does not come."""
+    while True:
+        await asyncio.sleep(PERIOD)
+        if window.age > OLD and window.live is not None:
+            window.live.refresh()
+
+
+class Window:
+    """What is on the screen: the latest queues, cut to the size that it has at that moment."""
+
+    def __init__(self) -> None:
+        self.live: Live | None = None
+        self._queues: list[QueueStatus] = []
+        self._loop = asyncio.get_running_loop()
+        self._at = self._loop.time()
+
+    @property
+    def age(self) -> float:
+        """Seconds since the last answer."""
+        return self._loop.time() - self._at
+
+    def take(self, queues: list[QueueStatus]) -> None:
+        """Take an answer."""
+        self._queues = queues
+        self._at = self._loop.time()
+
+    def drawn(self) -> Group:
+        """Give the window's lines."""
+        if self.live is None:
+            return Group()
+        width, height = self.live.console.size
+        parts = [] if self.age <= OLD else [_line(f"no answer for {self.age:.0f} s")]
+        rows = (height - len(parts)) // max(len(self._queues), 1)
+        tables = [queue_table(queue, width=width, rows=rows) for queue in self._queues]
+        return Group(*parts, *tables)
+
+
+def _line(text: str) -> Text:
+    return Text(text, style="red", no_wrap=True, overflow="ellipsis")
+
+
+def _essence(queue: QueueStatus) -> object:
+    """What makes a queue another one: no times, and nothing that drives on."""
+    current = queue.current and (queue.current.id, words.state_of(queue.current))
+    tasks = [(t.id, t.state, t.reason, t.priority, t.after) for t in queue.waiting]
+    return current, queue.running, queue.paused, dict(queue.counts), tasks
+
+
+@contextmanager
+def _on_resize(redraw: "object") -> Iterator[None]:
+    assert callable(redraw)
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGWINCH, redraw)
+    try:
+        yield
+    finally:
+        loop.remove_signal_handler(signal.SIGWINCH)

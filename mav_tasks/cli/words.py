@@ -1,0 +1,175 @@
+"""What a client learns, in words and as JSON. Pure. Angles are degrees here."""
+
+from math import degrees
+from typing import Any
+
+from mav_tasks.cli.times import format_duration
+from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Unit, VehicleStatus
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+
+UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}
+#: a task with one of these waits until the queue is continued
+UNTIL_RESUMED = (TaskReason.QUEUE_PAUSED, TaskReason.OPERATOR, TaskReason.TAKEOVER)
+
+
+def state_of(status: TaskStatus) -> str:
+    """Give the name of its state."""
+    return status.state.name.lower()
+
+
+def what_of(status: TaskStatus) -> str:
+    """Give what it is about: "move 2 m"."""
+    what, colon, _ = status.words.partition(": ")
+    return what if colon else f"command {status.command}"
+
+
+def why_of(status: TaskStatus) -> str:
+    """Give the reason of its state, nothing if there is none."""
+    return words_of(status.reason) if status.reason else ""
+
+
+def way_on_of(status: TaskStatus) -> str:
+    """Give what lets it go on, nothing if that is not for the operator to say."""
+    if status.state is TaskState.HELD:
+        return f"decide: mav-tasks release {status.id} again|remainder|skip"
+    return "to go on: mav-tasks resume" if status.reason in UNTIL_RESUMED else ""
+
+
+def line_of(status: TaskStatus) -> str:
+    """Give it in one line."""
+    why = f" ({why_of(status)})" if status.reason else ""
+    took = status.execution_time if status.is_over else None
+    took_words = f", in {format_duration(took)}" if took else ""
+    way_on = f"; {way_on_of(status)}" if way_on_of(status) and not status.is_over else ""
+    return f"task {status.id}: {what_of(status)}: {state_of(status)}{why}{took_words}{way_on}"
+
+
+def percent_of(status: TaskStatus) -> str:
+    """Give how much of it is done."""
+    return "" if status.progress is None else f"{status.progress * 100:.0f} %"
+
+
+def left_of(status: TaskStatus) -> str:
+    """Give what is left of it: "1.10 m"."""
+    amount, unit = left(status)
+    if amount is None or unit is None or status.is_over:
+        return ""
+    digits = {"m": 2, "items": 0}.get(unit, 1)
+    return f"{amount:.{digits}f} {unit}"
+
+
+def left(status: TaskStatus) -> tuple[float | None, str | None]:
+    """Give what is left of it as a number and its unit."""
+    if status.remaining is None or status.unit is Unit.NONE:
+        return None, None
+    is_angle = status.unit is Unit.RADIANS
+    return degrees(status.remaining) if is_angle else status.remaining, UNITS[status.unit]
+
+
+def headline_of(queue: QueueStatus) -> str:
+    """Give what a rover does, and what is in the way."""
+    if queue.current is not None:
+        does = f"task {queue.current.id} {state_of(queue.current)}"
+        does += f" ({why_of(queue.current)})" if queue.current.reason else ""
+    elif queue.running is not None:
+        does = f"task {queue.running}"
+    else:
+        does = "nothing runs"
+    if queue.current is not None and queue.current.state is TaskState.HELD:
+        does += f"; {way_on_of(queue.current)}"
+    if queue.paused is not None:
+        does += f"; paused: {words_of(queue.paused)}, to go on: mav-tasks resume"
+    return f"rover {queue.vehicle}: {does}; {queue.waiting_count} waiting"
+
+
+def counts_of(queue: QueueStatus) -> str:
+    """Give how many tasks are in which state."""
+    return ", ".join(f"{count} {state.name.lower()}" for state, count in queue.counts.items())
+
+
+def task_json(status: TaskStatus) -> dict[str, Any]:
+    """Give a task as JSON has it; what is not known is null."""
+    amount, unit = left(status)
+    return {
+        "id": status.id,
+        "vehicle": status.vehicle,
+        "what": what_of(status),
+        "command": status.command,
+        "state": state_of(status),
+        "reason": status.reason.name.lower() if status.reason else None,
+        "priority": status.priority,
+        "after": status.after or None,
+        "position": status.position,
+        "progress": status.progress,
+        "left": _rounded(amount),
+        "left_unit": unit,
+        "step": status.step,
+        "steps": status.steps,
+        "time_to_start": _rounded(status.time_to_start),
+        "time_to_finish": _rounded(status.time_to_finish),
+        "execution_time": _rounded(status.execution_time),
+        "nonce": status.nonce or None,
+        "submitter": status.submitter,
+        "version": status.version,
+    }
+
+
+def timing_of(timing: TaskTiming | None) -> str:
+    """Give how evenly its setpoints left, nothing if there were none."""
+    if timing is None or timing.p50 is None or timing.p99 is None or timing.max is None:
+        return ""
+    return (
+        f"{timing.count} at {timing.rate:g} Hz: p50 {timing.p50 * 1e3:.1f},"
+        f" p99 {timing.p99 * 1e3:.1f}, max {timing.max * 1e3:.1f} ms, {timing.late} late"
+    )
+
+
+def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
+    """Give it as JSON has it, in seconds; null: nothing is known of it."""
+    if timing is None:
+        return None
+    return {
+        "rate": _rounded(timing.rate),
+        "count": timing.count,
+        "p50": _rounded(timing.p50),
+        "p99": _rounded(timing.p99),
+        "max": _rounded(timing.max),
+        "late": timing.late,
+    }
+
+
+def queue_json(queue: QueueStatus) -> dict[str, Any]:
+    """Give a queue as JSON has it."""
+    return {
+        "vehicle": queue.vehicle,
+        "running": queue.running,
+        "next": queue.next,
+        "paused": None if queue.paused is None else queue.paused.name.lower(),
+        "waiting_count": queue.waiting_count,
+        "capacity": queue.capacity,
+        "counts": {state.name.lower(): count for state, count in queue.counts.items()},
+        "current": None if queue.current is None else task_json(queue.current),
+        "waiting": [task_json(status) for status in queue.waiting],
+    }
+
+
+def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
+    """Give a rover as JSON has it."""
+    heading = None if vehicle.yaw is None else degrees(vehicle.yaw) % 360.0
+    return {
+        "vehicle": vehicle.id,
+        "kind": vehicle.kind,
+        "mode": vehicle.mode,
+        "armed": vehicle.armed,
+        "heard": vehicle.is_heard,
+        "north": _rounded(vehicle.north),
+        "east": _rounded(vehicle.east),
+        "heading": _rounded(heading),
+        "speed": _rounded(vehicle.speed),
+        "server_component": vehicle.server_component,
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    """Give a number without the digits that a float of 32 bits only seems to have."""
+    return None if value is None else round(value, 4)

@@ -1,0 +1,396 @@
+"""Every command in a pipe, as a script runs it: what is printed, JSON, exit status."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from mav_tasks import Refused, SyncClient, TaskState, read_plan
+from mav_tasks.plan_files import PlanFile, parse_plan
+from tests.kit.commands import Done, called, mav_tasks, surroundings
+from tests.kit.processes import Stand, stand, wait_until
+
+NOBODY = "udpout:127.0.0.1:9"
+WAY = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t0\t0\t0\t1
+1\t0\t2\t54000\t0.1\t0.5\t0\t0\t0\t0\t0\t1
+2\t0\t2\t177\t1\t1\t0\t0\t0\t0\t0\t1
+"""
+PLAN = """{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []},
+"geoFence": {"version": 2, "polygons": [{"version": 1, "inclusion": true, "polygon":
+[[-35.362, 149.164], [-35.362, 149.167], [-35.365, 149.167], [-35.365, 149.164]]}],
+"circles": []}, "rallyPoints": {"version": 2, "points": [[-35.3632, 149.1652, 0]]}}"""
+NO_FENCE = """{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []}}"""
+
+
+@pytest.fixture(scope="module")
+def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
+    with stand(tmp_path_factory.mktemp("stand")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def client(there: Stand) -> Iterator[SyncClient]:
+    with SyncClient(f"udpout:127.0.0.1:{there.client_port}", component_id=99) as opened:
+        yield opened
+
+
+@pytest.fixture
+def server(there: Stand, client: SyncClient) -> Iterator[str]:
+    """The link to the server; nothing of a test is left behind."""
+    yield f"udpout:127.0.0.1:{there.client_port}"
+    client.clear(running_too=True)
+    wait_until(lambda: client.queue().running is None, within=10, what="nothing that runs")
+    with suppress(Refused):
+        client.resume()
+
+
+def assert_one_line(done: Done, status: int, *words: str) -> None:
+    assert done.status == status, done
+    assert done.output == ""
+    assert len(done.error.splitlines()) == 1, done.error
+    assert done.error.startswith("mav-tasks: ")
+    for word in words:
+        assert word in done.error
+
+
+def test_help_names_every_command_and_the_exit_statuses_and_is_quick() -> None:
+    done = mav_tasks("--help")
+    assert done.status == 0
+    commands = re.findall(r"^  ([a-z-]+) {2,}[A-Z]", done.output, re.MULTILINE)
+    named = {"submit", "status", "queue", "cancel", "clear", "stop", "pause", "resume", "modify"}
+    named |= {"release", "vehicles", "mission", "fence", "rally", "serve", "sim", "demo"}
+    assert named <= set(commands)
+    for line in ("0  done", "1  a task", "2  wrong usage", "3  no answer"):
+        assert line in done.output
+    assert "--install-completion" in done.output
+
+
+def test_help_loads_nothing_that_it_does_not_need() -> None:
+    """How long it takes is the machine's affair; what it loads is ours."""
+    code = "import sys; from mav_tasks.cli.app import app\n"
+    code += "try: app(['--help'])\nexcept SystemExit: print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=30
+    )
+    loaded = set(done.stdout.splitlines()[-1].split())
+    heavy = {"asyncio", "rich", "pymavlink", "sqlite3", "mav_tasks.client.aio", "json"}
+    assert loaded & heavy == set()
+    ours = {name for name in loaded if name.startswith("mav_tasks.")}
+    assert {name for name in ours if not name.startswith("mav_tasks.cli")} == {"mav_tasks.errors"}
+
+
+def test_it_says_which_version_it_is() -> None:
+    assert re.fullmatch(r"mav-tasks \d+\.\d+\.\d+\n", mav_tasks("--version").output)
+
+
+def test_a_shell_can_complete_commands() -> None:
+    script = mav_tasks("--show-completion", "bash")
+    assert "_MAV_TASKS_COMPLETE=complete_bash" in script.output
+    words = mav_tasks(
+        _MAV_TASKS_COMPLETE="complete_bash", COMP_WORDS="mav-tasks submit ", COMP_CWORD="2"
+    )
+    assert set(words.lines) == {"move", "rotate", "drive", "goto", "face", "wait", "home"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("queue", "-s", "pigeon:1"), ("pigeon:1", "udpout:host:port")),
+        (("submit", "move", "1", "--in", "soon"), ("--in soon", "1h30m")),
+        (("submit", "move", "1", "--in", "5s", "--at", "14:30"), ("--in and --at",)),
+        (("submit", "move", "1", "--at", "2020-01-01T10:00"), ("over",)),
+        (("submit", "wait", "-5"), ("DURATION -5",)),
+        (("modify", "3"), ("modify 3", "--priority")),
+        (("release", "perhaps"), ("release perhaps", "again, remainder or skip")),
+        (("release", "x", "again"), ("release x", "number")),
+        (("clear", "--all"), ("--all", "--yes")),
+        (("mission", "upload", "no/such/file"), ("no/such/file", "No such file")),
+    ],
+)
+def test_wrong_usage_is_one_line_and_status_2(
+    arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    assert_one_line(called(*arguments), 2, *words)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("nonsense",), ("submit", "move"), ("submit", "move", "far"), ("submit", "move", "1", "--no")],
+)
+def test_what_is_no_command_is_status_2(arguments: tuple[str, ...]) -> None:
+    done = called(*arguments)
+    assert (done.status, done.output) == (2, "")
+    assert "Traceback" not in done.error
+
+
+@pytest.mark.parametrize(
+    "arguments", [("queue",), ("stop",), ("submit", "move", "1"), ("vehicles", "--json")]
+)
+def test_without_an_answer_the_status_is_3(arguments: tuple[str, ...]) -> None:
+    done = called(*arguments, "--timeout", "0.5", server=NOBODY)
+    assert_one_line(done, 3, "within 0.5 s")
+
+
+def test_a_process_ends_with_the_same_status() -> None:
+    """Most commands here are called within this process; these are processes of their own."""
+    for arguments in (("stop", "--timeout", "0.5"), ("modify", "3")):
+        own = mav_tasks(*arguments, server=NOBODY)
+        assert own == called(*arguments, server=NOBODY)
+        assert own.status in (2, 3)
+
+
+def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> None:
+    began = mav_tasks("submit", "wait", "60s", "--priority", "8", server=server)
+    assert (began.status, began.error) == (0, "")
+    first = int(began.output.removeprefix("task "))
+
+    (waiting,) = called("submit", "move", "-2", "--in", "1h", "--json", server=server).objects
+    assert waiting["id"] > first
+    assert (waiting["what"], waiting["state"]) == ("move -2 m", "scheduled")
+    assert (waiting["left"], waiting["left_unit"], waiting["vehicle"]) == (2.0, "m", 1)
+    assert 3500 < waiting["time_to_start"] <= 3600
+
+    changed = called("modify", str(waiting["id"]), "--priority", "9", server=server)
+    assert changed.lines == [f"task {waiting['id']} is changed"]
+
+    (queue,) = called("queue", "--json", server=server).objects
+    assert (queue["running"], queue["paused"], queue["waiting_count"]) == (first, None, 1)
+    assert (queue["current"]["priority"], queue["current"]["left_unit"]) == (8, "s")
+    assert [(task["id"], task["priority"]) for task in queue["waiting"]] == [(waiting["id"], 9)]
+
+    table = mav_tasks("queue", server=server)
+    assert table.lines[0].startswith(f"rover 1: task {first} ")
+    assert "\x1b" not in table.output
+    assert all(line == line.rstrip() for line in table.lines)
+    assert table.lines[2].split()[:4] == ["id", "prio", "state", "what"]
+    assert [line.split()[0] for line in table.lines[3:]] == [str(first), str(waiting["id"])]
+
+    shown = called("status", str(waiting["id"]), server=server)
+    assert "what        move -2 m" in shown.lines
+    assert "why         start time" in shown.lines
+
+    assert called("cancel", "--json", server=server).objects == [{"done": "cancel", "task": first}]
+    (gone,) = called("status", str(first), "--json", server=server).objects
+    assert gone["state"] in ("cancelling", "cancelled")
+    assert called("clear", server=server).lines == ["all tasks that waited are called off"]
+    assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "over")
+
+
+def test_each_goal_becomes_what_it_says(server: str, client: SyncClient) -> None:
+    client.pause()
+    goals = {
+        ("move", "1.5", "--speed", "0.5"): "move 1.5 m",
+        ("rotate", "-90", "--rate", "30"): "rotate -90 deg",
+        ("drive", "-0.2", "10", "2s"): "drive -0.2 m/s for 2 s",
+        ("goto", "-1", "2", "--speed", "0.7"): "go to -1.00 m N, 2.00 m E",
+        ("goto", "--global", "-35.36326", "149.16524"): "go to -35.363260, 149.165240",
+        ("face", "270"): "face 270 deg",
+        ("home",): "return home",
+    }
+    for goal, what in goals.items():
+        (task,) = called("submit", *goal, "--json", server=server).objects
+        assert task["what"] == what
+    assert client.queue().waiting_count == len(goals)
+
+
+def test_what_is_out_of_range_is_no_task(server: str, client: SyncClient) -> None:
+    too_far = called("submit", "move", "1000000", server=server)
+    assert_one_line(too_far, 1, "1e+06" if "e+" in too_far.error else "1000000")
+    assert_one_line(called("submit", "move", "nan", server=server), 2, "no number")
+    assert_one_line(called("submit", "move", "1", "--priority", "11", server=server), 2, "11")
+    assert_one_line(called("submit", "goto", "91", "0", "--global", server=server), 2, "91")
+    assert client.queue().waiting_count == 0
+
+
+def test_waiting_tells_each_change_and_ends_as_the_task_does(server: str) -> None:
+    done = called("submit", "wait", "0.2s", "--wait", server=server)
+    assert done.status == 0
+    task = done.lines[0]
+    told = [line.removeprefix(f"{task}: wait 0.2 s: ") for line in done.lines[1:]]
+    assert told[-1].startswith("completed")
+    assert "executing" in told
+
+    objects = called("submit", "wait", "0.2s", "-w", "--json", server=server).objects
+    assert {each["id"] for each in objects} == {int(task.removeprefix("task ")) + 1}
+    assert objects[-1]["state"] == "completed"
+    assert objects[-1]["progress"] == 1.0
+
+    late = called("status", task.removeprefix("task "), "--wait", server=server)
+    assert (late.status, late.lines[-1].split(": ")[2].split(",")[0]) == (0, "completed")
+
+
+def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
+    client.pause()
+    first = client.submit_mission(read_way())
+    waiting = subprocess.Popen(
+        [sys.executable, "-m", "mav_tasks.cli", "status", str(first.id), "--wait"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=surroundings(server),
+    )
+    assert waiting.stdout is not None
+    assert (
+        waiting.stdout.readline()
+        == f"task {first.id}: plan of 3 items: queued (queue paused); to go on: mav-tasks resume\n"
+    )
+    client.cancel(first.id)
+    output, error = waiting.communicate(timeout=20)
+    assert waiting.returncode == 1
+    assert output.startswith(f"task {first.id}: plan of 3 items: cancelled")
+    assert error.startswith(f"mav-tasks: task {first.id} cancelled")
+
+
+def read_way() -> PlanFile:
+    return parse_plan(WAY)
+
+
+def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) -> None:
+    assert called("pause", server=server).lines == ["paused; to go on: mav-tasks resume"]
+    (queue,) = called("queue", "--json", server=server).objects
+    assert queue["paused"] == "operator"
+    assert called("resume", server=server).lines == ["goes on"]
+    stopped = called("stop", "--clear", server=server)
+    assert stopped.status == 0
+    (line,) = stopped.lines
+    assert line.startswith("STOP holds for every rover")
+    assert "mav-tasks resume" in line
+    assert client.queue().paused is not None
+    assert called("stop", "--vehicle", "1", "--json", server=server).objects == [
+        {"done": "stop", "vehicle": 1, "cleared": False}
+    ]
+    assert called("resume", "--json", server=server).objects == [{"done": "resume"}]
+    assert client.queue().paused is None
+
+
+def test_rovers_are_shown(server: str) -> None:
+    (rover,) = called("vehicles", "--json", server=server).objects
+    assert (rover["vehicle"], rover["kind"], rover["heard"]) == (1, "ardupilot", True)
+    assert isinstance(rover["north"], float)
+    assert 0.0 <= rover["heading"] < 360.0
+    names, row = called("vehicles", server=server).lines
+    assert names.split()[:3] == ["rover", "kind", "mode"]
+    assert row.split()[:2] == ["1", "ardupilot"]
+
+
+def test_what_is_not_there_is_refused(server: str) -> None:
+    assert_one_line(called("status", "9999", server=server), 1, "9999")
+    assert_one_line(called("cancel", server=server), 1, "no task is running")
+    assert_one_line(called("release", "again", server=server), 1, "no task is held")
+    other = called("queue", "--vehicle", "7", "--timeout", "1.5", server=server)
+    assert_one_line(other, 3, "rover 7", "rover 1")
+
+
+def test_a_mission_goes_up_waits_is_driven_and_comes_back(server: str, tmp_path: Path) -> None:
+    way = tmp_path / "way.waypoints"
+    way.write_text(WAY, encoding="utf-8")
+    staged = called("mission", "upload", str(way), "--stage", server=server)
+    assert re.fullmatch(r"task \d+ waits: mav-tasks mission start\n", staged.output)
+
+    for name in ("back.waypoints", "back.plan"):
+        back = tmp_path / name
+        done = called("mission", "download", str(back), server=server)
+        assert done.lines == [f"{back}: 2 items"]
+        assert read_plan(back).items == read_plan(way).items
+    again = called("mission", "download", str(back), server=server)
+    assert_one_line(again, 2, str(back), "--force")
+    forced = called("mission", "download", str(back), "--force", "--json", server=server)
+    assert forced.objects == [{"file": str(back), "items": 2}]
+    printed = called("mission", "download", "-", server=server)
+    assert printed.output == back.read_text(encoding="utf-8")
+
+    driven = called("mission", "start", "--wait", "--json", server=server).objects
+    assert driven[-1]["state"] == "completed"
+    assert f"task {driven[-1]['id']}" in staged.output
+    refused = called("mission", "upload", str(way), "--stage", "--after", "3", server=server)
+    assert_one_line(refused, 2, "--stage")
+
+
+def test_a_mission_is_a_task_with_terms(server: str, client: SyncClient, tmp_path: Path) -> None:
+    way = tmp_path / "way.waypoints"
+    way.write_text(WAY, encoding="utf-8")
+    upload = ("mission", "upload", str(way), "--priority", "7", "--json")
+    in_an_hour = datetime.now(UTC) + timedelta(hours=1)
+    for start in (("--in", "1h"), ("--at", in_an_hour.isoformat())):
+        (task,) = called(*upload, *start, server=server).objects
+        assert (task["state"], task["priority"], task["steps"]) == ("scheduled", 7, 3)
+        assert 3590 < task["time_to_start"] <= 3601
+        assert client.status(task["id"]).state is TaskState.SCHEDULED
+    moment = in_an_hour.astimezone().replace(tzinfo=None).isoformat(timespec="minutes")
+    late = ("submit", "rotate", "-90", "--at", moment, "--deadline", "2h", "--after")
+    (later,) = called(*late, str(task["id"]), "--json", server=server).objects
+    assert (later["what"], later["after"]) == ("rotate -90 deg", task["id"])
+    assert 3500 < later["time_to_start"] <= 3601
+
+
+def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(
+    server: str, tmp_path: Path
+) -> None:
+    plan, none, back = tmp_path / "fence.plan", tmp_path / "none.plan", tmp_path / "back.plan"
+    plan.write_text(PLAN, encoding="utf-8")
+    none.write_text(NO_FENCE, encoding="utf-8")
+    assert called("fence", "upload", str(plan), server=server).lines == ["fence: 4 items"]
+    called("fence", "download", str(back), server=server)
+    assert read_plan(back).fence == read_plan(plan).fence
+    assert called("rally", "upload", str(plan), "--json", server=server).objects == [
+        {"done": "rally upload", "items": 1}
+    ]
+    away = tmp_path / "away.plan"
+    for kind in ("fence", "rally"):
+        assert_one_line(called(kind, "upload", str(none), server=server), 2, "--empty")
+        taken = called(kind, "upload", str(none), "--empty", server=server)
+        assert taken.lines == [f"{kind}: 0 items"]
+    assert_one_line(called("fence", "download", str(away), server=server), 1, "no fence")
+    assert not away.exists()
+
+
+def test_a_watched_queue_in_a_pipe_tells_changes_only(server: str, client: SyncClient) -> None:
+    with command("queue", "--watch", "--json", server=server) as watching:
+        assert watching.stdout is not None
+        assert '"waiting_count": 0' in watching.stdout.readline()
+        client.submit_mission(read_way(), delay=3600)
+        assert '"waiting_count": 1' in watching.stdout.readline()
+        client.clear()
+        assert '"waiting_count": 0' in watching.stdout.readline()
+        watching.send_signal(2)
+        assert watching.wait(10) == 130
+        assert watching.stderr is not None
+        assert watching.stderr.read() == ""
+
+
+def test_a_reader_that_goes_is_no_mishap(server: str, client: SyncClient) -> None:
+    with command("queue", "--watch", server=server) as watching:
+        assert watching.stdout is not None
+        watching.stdout.readline()
+        watching.stdout.close()
+        client.submit_mission(read_way(), delay=3600)  # and it writes again
+        assert watching.wait(20) == 141
+        assert watching.stderr is not None
+        assert watching.stderr.read() == ""
+
+
+@contextmanager
+def command(*arguments: str, server: str) -> Iterator[subprocess.Popen[str]]:
+    running = subprocess.Popen(
+        [sys.executable, "-m", "mav_tasks.cli", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**surroundings(server), "PYTHONUNBUFFERED": os.environ.get("PYTHONUNBUFFERED", "")},
+    )
+    try:
+        yield running
+    finally:
+        if running.poll() is None:
+            running.kill()
+        running.wait(10)
+        for stream in (running.stdout, running.stderr):
+            if stream is not None:
+                stream.close()

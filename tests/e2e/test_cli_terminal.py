@@ -1,0 +1,210 @@
+"""The command line at a terminal: what it looks like, whatever the terminal is, and Ctrl-C."""
+
+import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from mav_tasks import Move, Refused, SyncClient, TaskState, Wait
+from tests.kit.commands import called
+from tests.kit.processes import Process, Stand, stand, wait_until
+from tests.kit.terminal import CTRL_C, Terminal, terminal
+
+ESCAPE = b"\x1b"
+COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
+SHOWN_CURSOR, OLD_SCREEN = b"\x1b[?25h", b"\x1b[?1049l"
+
+
+@pytest.fixture(scope="module")
+def there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
+    with stand(tmp_path_factory.mktemp("stand")) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def opened(there: Stand) -> Iterator[SyncClient]:
+    with SyncClient(url_of(there), component_id=99) as client:
+        yield client
+
+
+@pytest.fixture
+def client(opened: SyncClient) -> Iterator[SyncClient]:
+    """A client besides the command line; nothing of a test is left behind."""
+    yield opened
+    opened.clear(running_too=True)
+    wait_until(lambda: opened.queue().running is None, within=10, what="nothing that runs")
+    with suppress(Refused):
+        opened.resume()
+
+
+def url_of(there: Stand) -> str:
+    return f"udpout:127.0.0.1:{there.client_port}"
+
+
+@contextmanager
+def at(
+    there: Stand, *arguments: str, size: tuple[int, int] = (24, 80), **environment: str
+) -> Iterator[Terminal]:
+    surroundings = {"MAV_TASKS_SERVER": url_of(there), **environment}
+    command = ("-m", "mav_tasks.cli", *arguments)
+    with terminal(*command, size=size, environment=surroundings) as running:
+        yield running
+
+
+@contextmanager
+def frozen(process: Process) -> Iterator[None]:
+    """Have a process do nothing for a while."""
+    process.popen.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        process.popen.send_signal(signal.SIGCONT)
+
+
+def test_a_task_that_is_waited_for_is_one_line_that_moves(there: Stand, client: SyncClient) -> None:
+    with at(there, "submit", "wait", "2s", "--wait") as screen:
+        percents = set[str]()
+
+        def is_over(text: str) -> bool:
+            percents.update(re.findall(r"executing .*━.* (\d+) % +\d\.\d s", text))
+            return "completed" in text
+
+        screen.wait_for(is_over)
+        assert screen.end() == 0
+    assert len(percents) >= 3
+    task, over = screen.lines
+    assert over.startswith(f"{task}: wait 2 s: completed, in 2")
+    assert COLOUR.search(screen.written)
+    assert screen.written.count(SHOWN_CURSOR) >= 1
+
+
+def test_no_color_is_no_colour_and_a_narrow_window_no_trouble(
+    there: Stand, client: SyncClient
+) -> None:
+    with at(there, "submit", "wait", "1s", "--wait", size=(5, 40), NO_COLOR="1") as screen:
+        screen.wait_for(lambda text: re.search(r"executing +\d+ %", text))
+        assert len(screen.lines) == 2  # the task's number, and the line
+        assert screen.end() == 0
+    assert not COLOUR.search(screen.written)
+
+
+@pytest.mark.parametrize("command", [("status", "{}", "--wait"), ("queue", "--watch")])
+def test_a_dumb_terminal_gets_plain_lines(
+    there: Stand, client: SyncClient, command: tuple[str, ...]
+) -> None:
+    client.pause()
+    task = client.submit(Move(1.0))
+    command = tuple(word.format(task.id) for word in command)
+    with at(there, *command, TERM="dumb") as screen:
+        screen.wait_for(lambda text: "queue paused" in text)
+        task.cancel()
+        screen.wait_for(lambda text: "cancelled" in text)
+        if "--watch" in command:
+            screen.type(CTRL_C)
+        assert screen.end() == (130 if "--watch" in command else 1)
+    assert ESCAPE not in screen.written
+
+
+def test_ctrl_c_leaves_the_task_and_says_how_to_call_it_off(
+    there: Stand, client: SyncClient
+) -> None:
+    with at(there, "submit", "wait", "60s", "--wait") as screen:
+        screen.wait_for(lambda text: "executing" in text)
+        screen.type(CTRL_C)
+        assert screen.end() == 130
+    number = int(screen.lines[0].removeprefix("task "))
+    assert screen.lines[-1] == (
+        f"mav-tasks: task {number} goes on; to call it off: mav-tasks cancel {number}"
+    )
+    assert "Traceback" not in screen.text
+    assert screen.written.rstrip().endswith(str(number).encode())
+    assert client.status(number).state is TaskState.EXECUTING
+
+
+def test_a_watched_queue_fits_its_window_and_follows_it(there: Stand, client: SyncClient) -> None:
+    client.pause()
+    tasks = [client.submit(Move(1.0), delay=600.0 + number) for number in range(30)]
+    with at(there, "queue", "--watch", size=(12, 80)) as screen:
+        screen.wait_for(lambda text: "and 22 more" in text)
+        assert len(screen.lines) == 12
+        assert screen.lines[0].startswith("rover 1: nothing runs; paused: operator, to go on:")
+        assert screen.lines[1].startswith("30 scheduled")
+        screen.resize(8, 40)
+        screen.wait_for(lambda text: "and 26 more" in text)
+        assert len(screen.lines) == 8
+        assert screen.lines[2].split()[:3] == ["id", "state", "what"]
+        tasks[0].cancel()
+        screen.wait_for(lambda text: "and 25 more" in text)
+        screen.resize(40, 120)
+        screen.wait_for(lambda text: str(tasks[-1].id) in text and "more" not in text)
+        screen.type(CTRL_C)
+        assert screen.end() == 130
+    assert screen.written.rstrip().endswith(OLD_SCREEN)
+    assert SHOWN_CURSOR in screen.written
+    assert b"Traceback" not in screen.written
+
+
+def test_a_watched_queue_outlives_a_silence_of_the_server(there: Stand, client: SyncClient) -> None:
+    with at(there, "queue", "--watch", size=(10, 60)) as screen:
+        screen.wait_for(lambda text: "nothing runs; 0 waiting" in text)
+        with frozen(there.server):
+            screen.wait_for(lambda text: re.match(r"no answer for \d s\nrover 1: nothing", text))
+        screen.wait_for(lambda text: text.startswith("rover 1: nothing runs"))
+        screen.type(CTRL_C)
+        assert screen.end() == 130
+
+
+def test_who_waits_is_told_of_a_silence(there: Stand, client: SyncClient) -> None:
+    client.pause()
+    task = client.submit(Wait(0.1))
+    with at(there, "status", str(task.id), "--wait") as screen:
+        screen.wait_for(lambda text: "queue paused" in text)
+        with frozen(there.server):
+            screen.wait_for(lambda text: "nothing is heard" in text)
+        screen.wait_for(lambda text: "queue paused" in text)
+        client.resume()
+        assert screen.end() == 0
+
+
+def test_to_call_off_everything_is_asked_about(there: Stand, client: SyncClient) -> None:
+    task = client.submit(Wait(60.0))
+    with at(there, "clear", "--all") as screen:
+        screen.wait_for(lambda text: "the running one, too? [y/N]:" in text)
+        screen.type(b"n\n")
+        assert screen.end() == 2
+    assert screen.lines[-1].strip() == "mav-tasks: nothing was called off"
+    assert not client.status(task.id).is_over
+    with at(there, "clear", "--all") as screen:
+        screen.wait_for(lambda text: "[y/N]:" in text)
+        screen.type(b"y\n")
+        assert screen.end() == 0
+    wait_until(lambda: client.status(task.id).is_over, within=10)
+
+
+def test_a_terminal_that_knows_ascii_only_is_none_the_worse(
+    there: Stand, client: SyncClient
+) -> None:
+    client.pause()
+    client.submit(Wait(1.0), delay=600.0)
+    with at(there, "queue", size=(24, 30), PYTHONIOENCODING="ascii") as screen:
+        assert screen.end() == 0
+    assert screen.lines[0].startswith("rover 1: nothing runs; paused")
+    client.resume()
+    submit = ("submit", "wait", "0.5s", "--wait")
+    with at(there, *submit, PYTHONIOENCODING="ascii") as screen:
+        assert screen.end() == 0
+    assert "completed" in screen.text
+    assert screen.written.isascii()
+
+
+def test_a_stop_that_does_not_reach_the_rover_stays(there: Stand, client: SyncClient) -> None:
+    with frozen(there.rover):
+        wait_until(lambda: not client.vehicles()[0].is_heard, within=10, what="a silent rover")
+        done = called("stop", "--vehicle", "1", server=url_of(there))
+        assert done.status == 1
+        assert "STOP stays in force" in done.error
+        assert len(done.error.splitlines()) == 1
+    wait_until(lambda: client.vehicles()[0].is_heard, within=10, what="the rover again")
+    assert client.queue().paused is not None

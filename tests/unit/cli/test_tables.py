@@ -1,0 +1,209 @@
+"""Queues as tables of any width and height, and tasks in words."""
+
+import io
+from dataclasses import replace
+from math import pi
+
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+
+from mav_tasks.cli import words
+from mav_tasks.cli.tables import queue_table, vehicle_table
+from mav_tasks.client.values import QueueStatus, TaskStatus, Unit, VehicleStatus
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+
+RUNNING = TaskStatus(
+    id=12,
+    vehicle=1,
+    state=TaskState.EXECUTING,
+    reason=TaskReason.NONE,
+    words="rotate 90 deg: executing",
+    priority=8,
+    after=0,
+    nonce=5,
+    command=54001,
+    progress=0.45,
+    remaining=pi / 4,
+    unit=Unit.RADIANS,
+    position=None,
+    time_to_start=0.0,
+    time_to_finish=2.0,
+    execution_time=1.5,
+    step=0,
+    steps=1,
+    submitter="244/190",
+    version=3,
+)
+HELD = replace(RUNNING, state=TaskState.HELD, reason=TaskReason.OFF_LINE)
+WAITING = replace(
+    RUNNING,
+    id=13,
+    state=TaskState.QUEUED,
+    reason=TaskReason.BEHIND_OTHERS,
+    words="move 2 m: queued (behind others)",
+    progress=0.0,
+    remaining=1.2000000476837158,
+    unit=Unit.METRES,
+    position=0,
+    time_to_start=75.0,
+    after=12,
+)
+QUEUE = QueueStatus(
+    vehicle=1,
+    running=12,
+    next=13,
+    capacity=1000,
+    counts={TaskState.QUEUED: 1, TaskState.EXECUTING: 1},
+    paused=None,
+    waiting=(WAITING,),
+    current=RUNNING,
+    version=9,
+)
+LONG = replace(
+    QUEUE,
+    counts={TaskState.QUEUED: 300, TaskState.EXECUTING: 1},
+    waiting=tuple(replace(WAITING, id=number) for number in range(13, 113)),
+)
+
+
+def drawn(queue: QueueStatus, *, width: int, rows: int | None = None) -> list[str]:
+    console = Console(file=io.StringIO(), width=width, color_system=None, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(queue_table(queue, width=width, rows=rows))
+    return [line.rstrip() for line in captured.get().splitlines()]
+
+
+def test_a_wide_window_shows_all_that_there_is() -> None:
+    table = [
+        "rover 1: task 12 executing; 1 waiting",
+        "1 queued, 1 executing",
+        "id  prio  state      what           why            done      left  starts in  after",
+        "12     8  executing  rotate 90 deg                 45 %  45.0 deg",
+        "13     8  queued     move 2 m       behind others   0 %    1.20 m      1m15s     12",
+    ]
+    assert drawn(QUEUE, width=90) == table
+    wider = drawn(QUEUE, width=120)
+    assert [line[:84].rstrip() for line in wider] == table
+    assert [line[84:].strip() for line in wider[2:]] == ["from", "244/190", "244/190"]
+
+
+def test_a_narrow_window_shows_what_matters_most() -> None:
+    assert drawn(QUEUE, width=40) == [
+        "rover 1: task 12 executing; 1 waiting",
+        "1 queued, 1 executing",
+        "id  state      what           why",
+        "12  executing  rotate 90 deg",
+        "13  queued     move 2 m       behind ot…",
+    ]
+
+
+@pytest.mark.parametrize("width", [20, 27, 40, 57, 80, 133])
+@pytest.mark.parametrize("rows", [3, 4, 10, 24, 200])
+def test_it_fits_any_window(width: int, rows: int) -> None:
+    for queue in (QUEUE, LONG, replace(LONG, paused=TaskReason.OPERATOR)):
+        lines = drawn(queue, width=width, rows=rows)
+        assert max(cell_len(line) for line in lines) <= width
+        assert len(lines) <= rows
+
+
+def test_what_has_no_room_is_counted() -> None:
+    lines = drawn(LONG, width=80, rows=10)
+    assert len(lines) == 10
+    assert lines[-1] == "and 295 more"  # of 301, behind two lines, the names, and six tasks
+    assert drawn(LONG, width=80)[-1] == "and 200 more"  # that were not asked for
+
+
+@pytest.mark.parametrize(
+    ("queue", "line"),
+    [
+        (replace(QUEUE, current=None, running=None), "rover 1: nothing runs; 1 waiting"),
+        (
+            replace(QUEUE, current=None, running=None, paused=TaskReason.STOPPED),
+            "rover 1: nothing runs; paused: stopped, to go on: mav-tasks resume; 1 waiting",
+        ),
+        (
+            replace(QUEUE, current=HELD),
+            (
+                "rover 1: task 12 held (off line); "
+                "decide: mav-tasks release 12 again|remainder|skip; 1 waiting"
+            ),
+        ),
+    ],
+)
+def test_the_first_line_says_what_is_in_the_way_and_what_to_do(
+    queue: QueueStatus, line: str
+) -> None:
+    assert drawn(queue, width=120)[0] == line
+
+
+def test_a_task_in_one_line_says_what_it_is_and_why_it_ended() -> None:
+    assert words.line_of(WAITING) == "task 13: move 2 m: queued (behind others)"
+    stuck = replace(RUNNING, state=TaskState.FAILED, reason=TaskReason.STUCK, execution_time=12.34)
+    assert words.line_of(stuck) == "task 12: rotate 90 deg: failed (stuck), in 12.3s"
+
+
+@pytest.mark.parametrize(
+    ("task", "line"),
+    [
+        (
+            replace(WAITING, reason=TaskReason.QUEUE_PAUSED),
+            "task 13: move 2 m: queued (queue paused); to go on: mav-tasks resume",
+        ),
+        (
+            replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.TAKEOVER),
+            "task 12: rotate 90 deg: paused (takeover); to go on: mav-tasks resume",
+        ),
+        (
+            replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.PREEMPTED),
+            "task 12: rotate 90 deg: paused (preempted)",
+        ),
+        (
+            HELD,
+            (
+                "task 12: rotate 90 deg: held (off line); "
+                "decide: mav-tasks release 12 again|remainder|skip"
+            ),
+        ),
+    ],
+)
+def test_a_task_that_waits_for_the_operator_says_what_to_do(task: TaskStatus, line: str) -> None:
+    assert words.line_of(task) == line
+
+
+def test_what_to_do_is_not_cut_off_where_lines_can_go_on() -> None:
+    paused = replace(QUEUE, paused=TaskReason.OPERATOR)
+    assert "mav-tasks resume" in " ".join(drawn(paused, width=46))
+
+
+def test_no_number_is_minus_nothing() -> None:
+    rover = VehicleStatus(1, "ardupilot", False, "HOLD", True, 191, north=-0.001)
+    console = Console(file=io.StringIO(), width=120)
+    with console.capture() as captured:
+        console.print(vehicle_table([rover]))
+    assert " 0.00 m" in captured.get()
+    assert "-0.00" not in captured.get()
+
+
+def test_json_has_degrees_names_and_nulls() -> None:
+    task = words.task_json(RUNNING)
+    assert (task["state"], task["reason"], task["what"]) == ("executing", None, "rotate 90 deg")
+    assert (task["left"], task["left_unit"], task["progress"]) == (45.0, "deg", 0.45)
+    assert (task["after"], task["position"]) == (None, None)
+    waiting = words.task_json(WAITING)
+    assert (waiting["reason"], waiting["left"], waiting["after"]) == ("behind_others", 1.2, 12)
+    assert words.queue_json(QUEUE)["current"] == task
+    assert words.queue_json(QUEUE)["waiting"] == [waiting]
+    assert words.queue_json(replace(QUEUE, paused=TaskReason.TAKEOVER))["paused"] == "takeover"
+
+
+def test_what_is_not_known_of_a_rover_is_a_dash() -> None:
+    rover = VehicleStatus(3, "px4", True, "OFFBOARD", True, 191, north=1.5, east=-2.25, yaw=-pi / 2)
+    console = Console(file=io.StringIO(), width=120, color_system=None)
+    with console.capture() as captured:
+        console.print(vehicle_table([rover]))
+    cells = captured.get().splitlines()[1].split("  ")
+    assert [cell.strip() for cell in cells if cell] == [
+        *("3", "px4", "OFFBOARD", "armed", "yes", "1.50 m", "-2.25 m", "270.0 deg", "-"),
+    ]
+    assert words.vehicle_json(rover)["heading"] == 270.0
