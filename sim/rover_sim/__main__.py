@@ -10,11 +10,14 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from ipaddress import ip_address
 from pathlib import Path
 from typing import TextIO
 
+from mav_tasks.errors import KeyRingError
+from mav_tasks.key_ring.ring_file import load, path_of_ring
+from mav_tasks.mavlink.signing import Key
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.errors import MissingExtra, SimulatedCrash
@@ -53,6 +56,8 @@ class Options:
     gui: bool
     speed: float  # simulated seconds per second
     truth: str | None  # file name
+    sign: str  # name of a key, "" for none
+    keys: str  # file name of the key ring, "" for the user's own
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -89,12 +94,19 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         default=ARDUPILOT.name,
         help="make of autopilot (default %(default)s)",
     )
+    add(
+        "--honours-yaw-rate",
+        action="store_true",
+        help="a px4 or generic rover turns at a yaw rate, too",
+    )
     add("--seed", type=int, help="draw each rover's differences from this number")
     add("--friction", type=float, default=0.8, help="tyres on ground (default %(default)s)")
     add("--friction-variation", type=float, default=0.0, help="0.3 for 30 %% (needs --seed)")
     add("--gui", action="store_true", help="open pybullet's window, of the first rover")
     add("--speed", default="real", help="'real', or simulated seconds per second")
     add("--truth", metavar="FILE", help="append the true poses at 10 Hz as CSV")
+    add("--sign", metavar="NAME", default="", help="sign with this key, hear nothing else")
+    add("--keys", metavar="FILE", default="", help="the key ring (default: the user's own)")
     values = parser.parse_args(arguments)
     if values.count < 1:
         parser.error("--count must be 1 or more")
@@ -120,7 +132,7 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         insecure=values.insecure,
         count=values.count,
         body="bullet" if values.body == "auto" else values.body,
-        persona=PERSONAS[values.persona],
+        persona=_persona(values.persona, honours_yaw_rate=values.honours_yaw_rate),
         system_id=values.system_id,
         seed=values.seed,
         friction=values.friction,
@@ -128,11 +140,19 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         gui=values.gui,
         speed=speed,
         truth=values.truth,
+        sign=values.sign,
+        keys=values.keys,
     )
+
+
+def _persona(name: str, *, honours_yaw_rate: bool) -> Persona:
+    persona = PERSONAS[name]
+    return replace(persona, honours_yaw_rate=True) if honours_yaw_rate else persona
 
 
 def run(options: Options, stack: ExitStack) -> None:
     """Set everything up, then drive the rovers until a signal."""
+    key = _key(options)
     stop = _stop_signals(stack)
     server = _open_socket(options, stack)
     truth = _open_truth(options, stack)
@@ -146,6 +166,7 @@ def run(options: Options, stack: ExitStack) -> None:
             now=now,
             persona=options.persona,
             unix_offset=time.time() - now,
+            key=key,
         )
         for index, body in enumerate(bodies)
     ]
@@ -157,6 +178,16 @@ def run(options: Options, stack: ExitStack) -> None:
         sys.stdout.write(f"rover_sim: rover {number} ({what}) on {where}\n")
     sys.stdout.flush()
     drive(server, stop, vehicles, clock, truth)
+
+
+def _key(options: Options) -> Key | None:
+    if not options.sign:
+        return None
+    path = path_of_ring(options.keys)
+    try:
+        return load(path).ring.usable_key(options.sign)
+    except KeyRingError as error:
+        raise StartError(f"--sign {options.sign}: {error}") from error
 
 
 def _stop_signals(stack: ExitStack) -> socket.socket:
@@ -182,10 +213,10 @@ def _open_socket(options: Options, stack: ExitStack) -> socket.socket:
         address = ip_address("127.0.0.1" if options.host == "localhost" else options.host)
     except ValueError as error:
         raise StartError(f"not an IP address: {options.host}") from error
-    if not address.is_loopback and not options.insecure:
+    if not address.is_loopback and not (options.insecure or options.sign):
         raise StartError(
             f"{address} is not a loopback address and MAVLink here is not signed:"
-            " say --insecure if you mean it"
+            " say --sign NAME, or --insecure if you mean it"
         )
     family = socket.AF_INET if address.version == 4 else socket.AF_INET6
     server = stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))

@@ -29,6 +29,7 @@ from rover_sim.setpoints import Destination
 from rover_sim.streams import Streams
 from rover_sim.telemetry import Telemetry
 
+MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # what it is driven by
 REBOOT_TIME = 1.0  # s in which a restarting autopilot neither hears nor says anything
 
 
@@ -61,6 +62,7 @@ class Autopilot:
         )
         self._estimate: Estimate = estimate_from(truth, NO_FAULTS, None)
         self._faults = NO_FAULTS
+        self._clock_stopped_at = now  # while that fault lasts; until then it goes
         self._start(now)
 
     def __repr__(self) -> str:
@@ -80,6 +82,8 @@ class Autopilot:
     def step(self, truth: BodyState, *, now: float) -> tuple[float, float]:
         """Live through one control period; give forward speed and yaw rate for the wheels."""
         self._estimate = estimate_from(truth, self._faults, self._estimate)
+        if not self._faults.clock_frozen:
+            self._clock_stopped_at = now
         if now < self._up_at:
             return 0.0, 0.0
         demand = self._flight.demand(self._estimate, now=now)
@@ -209,7 +213,12 @@ class Autopilot:
     def _send(self, message_id: int, now: float) -> bool:
         if not self._telemetry.knows(message_id):
             return False
-        message = self._telemetry.build(message_id, self._estimate, now=now)
+        estimate = self._estimate
+        if self._faults.not_finite and message_id in MEASURED:
+            estimate = estimate.without_numbers
+        if self._faults.clock_frozen:
+            now = self._clock_stopped_at
+        message = self._telemetry.build(message_id, estimate, now=now)
         if message is not None:
             self._outbox.send(message)
         return True

@@ -1,9 +1,9 @@
 """Where the autopilot believes it is: the truth, seen through its faults."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
-from rover_sim.body import BodyState
+from rover_sim.body import BodyState, wrap_angle
 from rover_sim.faults import Faults
 
 
@@ -27,6 +27,11 @@ class Estimate:
         """Speed over ground, m/s, never negative."""
         return math.hypot(self.vn, self.ve)
 
+    @property
+    def without_numbers(self) -> "Estimate":
+        """What an estimator says that has failed: nothing of it is a number."""
+        return Estimate(*[math.nan] * len(fields(self)))
+
 
 def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Estimate:
     """Give the estimate of this moment.
@@ -42,6 +47,11 @@ def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Es
         down = truth.down
         vn = truth.forward_speed * cos - truth.lateral_speed * sin
         ve = truth.forward_speed * sin + truth.lateral_speed * cos
+    yaw, yaw_rate = wrap_angle(truth.yaw + faults.heading_error), truth.yaw_rate
+    if faults.heading_frozen and last is not None:
+        yaw, yaw_rate = last.yaw, 0.0
+    if faults.says_it_stands:
+        vn = ve = yaw_rate = 0.0
     return Estimate(
         north=north,
         east=east,
@@ -50,7 +60,7 @@ def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Es
         ve=ve,
         roll=truth.roll,
         pitch=truth.pitch,
-        yaw=truth.yaw,
+        yaw=yaw,
         forward_speed=truth.forward_speed,
-        yaw_rate=truth.yaw_rate,
+        yaw_rate=yaw_rate,
     )

@@ -11,6 +11,11 @@ class Faults:
     deaf: bool = False  # receives nothing; with silent: a dead link
     position_frozen: bool = False  # position and velocity estimates repeat their last value
     position_jump: tuple[float, float] = (0.0, 0.0)  # m north, east, added to the estimate
+    says_it_stands: bool = False  # velocity and turn rate of the estimate are zero
+    heading_error: float = 0.0  # rad, added to the heading; position and velocity stay right
+    heading_frozen: bool = False
+    not_finite: bool = False  # ATTITUDE and LOCAL_POSITION_NED are full of NaN
+    clock_frozen: bool = False  # time_boot_ms stays as it is
     refuse_arm: bool = False  # even a forced one
     refuse_mode: bool = False  # of clients; the operator's switch works
     withheld: frozenset[int] = frozenset()  # ids of messages that are not sent

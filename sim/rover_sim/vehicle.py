@@ -8,11 +8,13 @@ from collections.abc import Hashable
 
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.mavlink.signing import Key
 from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.motion import CONTROL_PERIOD
 from rover_sim.personas import ARDUPILOT, Persona
+from rover_sim.signatures import RoverSignatures
 
 PEER_TIMEOUT = 10.0  # s of silence after which a peer is no longer talked to
 MAX_CATCH_UP = 0.5  # s; a vehicle held up for longer loses the time, as a stalled machine does
@@ -21,8 +23,16 @@ MAX_CATCH_UP = 0.5  # s; a vehicle held up for longer loses the time, as a stall
 class Vehicle:
     """One rover. Time is the caller's, in seconds, and starts with ``now`` of the constructor."""
 
-    def __init__(self, *, body: Body, autopilot: Autopilot, now: float) -> None:
+    def __init__(
+        self,
+        *,
+        body: Body,
+        autopilot: Autopilot,
+        now: float,
+        signatures: RoverSignatures | None = None,
+    ) -> None:
         self.body = body
+        self._signatures = signatures
         self.autopilot = autopilot
         self._decoder = Decoder()
         self._encoder = Encoder(autopilot.address)
@@ -41,6 +51,8 @@ class Vehicle:
     def receive(self, data: bytes, peer: Hashable, *, now: float) -> None:
         """Take a datagram, any bytes. Raises only SimulatedCrash."""
         for packet in split_datagram(data):
+            if self._signatures is not None and not self._signatures.believes(packet, now=now):
+                continue
             message = self._decoder.decode(packet)
             if message is not None:
                 self._peers[peer] = now
@@ -75,6 +87,8 @@ class Vehicle:
         self._forget_silent_peers()
         for message in messages:
             packet = self._encoder.encode(message)
+            if self._signatures is not None:
+                packet = self._signatures.sealed(packet, now=self._next_step)
             self._outgoing.extend((peer, packet) for peer in self._peers)
 
     def _forget_silent_peers(self) -> None:
@@ -92,11 +106,12 @@ def make_vehicle(
     persona: Persona = ARDUPILOT,
     origin: Origin = DEFAULT_ORIGIN,
     unix_offset: float = 0.0,
+    key: Key | None = None,
 ) -> Vehicle:
     """Put an autopilot that has just been switched on into a body.
 
     ``unix_offset`` is Unix time minus ``now``; 0 where there is no wall clock (SYSTEM_TIME then
-    says unknown).
+    says unknown). With a ``key`` it signs, and hears only what is signed with it.
     """
     autopilot = Autopilot(
         system_id=system_id,
@@ -106,4 +121,5 @@ def make_vehicle(
         truth=body.state,
         now=now,
     )
-    return Vehicle(body=body, autopilot=autopilot, now=now)
+    signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
+    return Vehicle(body=body, autopilot=autopilot, now=now, signatures=signatures)

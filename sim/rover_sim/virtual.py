@@ -56,19 +56,26 @@ class VirtualWorld:
         """Let time pass until the condition holds; whether it did within so many seconds."""
         end = self.now + within
         while not condition():
-            at = self._next()
-            if at is None or at > end:
-                self.net.now = end
+            if not self.step(end=end):
                 return condition()
-            self.net.now = max(self.now, at)
-            self.net.deliver()
-            for party in list(self._parties):
-                party.turn(now=self.now)
-            for watcher in self._watchers:
-                watcher(self.now)
         return True
 
-    def _next(self) -> float | None:
+    def step(self, *, end: float) -> bool:
+        """Let time pass up to what is due next, or else to ``end``; whether anything was."""
+        at = self.next_due()
+        if at is None or at > end:
+            self.net.now = end
+            return False
+        self.net.now = max(self.now, at)
+        self.net.deliver()
+        for party in list(self._parties):
+            party.turn(now=self.now)
+        for watcher in self._watchers:
+            watcher(self.now)
+        return True
+
+    def next_due(self) -> float | None:
+        """Give when the next thing is due; None: nothing ever is."""
         due = [party.next_deadline() for party in self._parties]
         due.append(self.net.next_arrival())
         return min((at for at in due if at is not None), default=None)

@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,24 @@ def test_the_demo_shows_three_tasks_and_finds_all_as_it_should_be(options: tuple
     picture = re.search(r"picture of the track: (\S+)", done.stdout)
     assert picture is not None
     assert Path(picture[1]).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.timeout(60)
+def test_a_recorded_demo_decides_the_same_again(tmp_path: Path) -> None:
+    done = demo("--fast", "--body", "kinematic", "--record", str(tmp_path))
+    assert done.returncode == 0, done.stdout + done.stderr
+    (record,) = tmp_path.iterdir()
+    replayed = subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", "replay", str(record)],
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+        env={**os.environ, "PYTHONHASHSEED": "12345"},
+    )
+    assert replayed.returncode == 0, replayed.stdout + replayed.stderr
+    assert [line for line in replayed.stdout.splitlines() if " completed; " in line]
+    assert replayed.stdout.splitlines()[-1].startswith("same: ")
 
 
 def test_the_window_cannot_be_had_in_virtual_time() -> None:

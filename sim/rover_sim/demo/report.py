@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from demo_lib.third_party import ACCEPTED, ORDER, STATES, TASK_MOVE, Place, Seen, ThirdParty
+from rover_sim.demo.third_party import ACCEPTED, ORDER, STATES, TASK_MOVE, Place, Seen, ThirdParty
 
 MOVE_TOLERANCE = 0.02  # m
 TURN_TOLERANCE = 1.0  # deg

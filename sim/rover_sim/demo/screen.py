@@ -8,7 +8,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from demo_lib.third_party import EXECUTING, FIRST_OVER, STATES, Seen, ThirdParty
+from rover_sim.demo.third_party import EXECUTING, FIRST_OVER, STATES, Seen, ThirdParty
 
 STEP = 25  # per cent of progress between two lines, where there is no live table
 

@@ -16,8 +16,8 @@ os.environ["MAVLINK20"] = "1"  # pymavlink's switch, read when it is imported
 
 from pymavlink import mavutil
 
-from demo_lib.screen import Screen
-from demo_lib.third_party import Place, ThirdParty
+from rover_sim.demo.screen import Screen
+from rover_sim.demo.third_party import Place, ThirdParty
 
 TIME_LIMIT = 85.0  # s, for everything
 STOP_LIMIT = 5.0  # s, for a process to end when asked to
@@ -28,7 +28,9 @@ class DemoError(Exception):
     """The demonstration could not be run; the text says why."""
 
 
-def drive(screen: Screen, *, body: str, gui: bool, seed: int) -> tuple[ThirdParty, list[Place]]:
+def drive(
+    screen: Screen, *, body: str, gui: bool, seed: int, record: str
+) -> tuple[ThirdParty, list[Place]]:
     """Run server, rover and third party; gives what the latter saw, and the true track."""
     with tempfile.TemporaryDirectory(prefix="mav-tasks-demo-") as folder:
         truth_file = Path(folder) / "truth.csv"
@@ -37,9 +39,10 @@ def drive(screen: Screen, *, body: str, gui: bool, seed: int) -> tuple[ThirdPart
         rover += ["--truth", str(truth_file)]
         rover += ["--seed", str(seed), "--friction-variation", "0.3"] if seed else []
         rover += ["--gui"] if gui else []
-        server = [sys.executable, "-m", "mav_tasks.cli", "serve"]
+        server = [sys.executable, "-m", "mav_tasks.cli", "serve", "--config", ""]
         server += ["--client", f"udpin:127.0.0.1:{client_port}"]
         server += ["--vehicle", f"udpout:127.0.0.1:{rover_port}", "--store", ":memory:"]
+        server += ["--record", record] if record else []
         with (
             process(rover, Path(folder) / "rover.log") as check_rover,
             process(server, Path(folder) / "server.log") as check_server,

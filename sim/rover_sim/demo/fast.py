@@ -2,12 +2,14 @@
 
 from pymavlink.dialects.v20 import common
 
-from demo_lib.screen import Screen
-from demo_lib.third_party import Place, ThirdParty
 from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.links.memory import MemoryLink, MemoryNet
+from mav_tasks.recording import witnesses
+from mav_tasks.settings import Recording, Settings
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
+from rover_sim.demo.screen import Screen
+from rover_sim.demo.third_party import Place, ThirdParty
 from rover_sim.kinematic import KinematicBody
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
@@ -17,14 +19,20 @@ TRACK_INTERVAL = 0.1  # virtual s
 START = Pose()
 
 
-def drive(screen: Screen, *, body: str, seed: int) -> tuple[ThirdParty, list[Place]]:
-    """Run server, rover and third party; gives what the latter saw, and the true track."""
+def drive(screen: Screen, *, body: str, seed: int, record: str) -> tuple[ThirdParty, list[Place]]:
+    """Run server, rover and third party; gives what the latter saw, and the true track.
+
+    ``record`` is the folder for a record of the server's decisions, "" for none.
+    """
+    settings = Settings()
+    recorders = witnesses(Recording(decisions=record), settings, None, now=0.0)
     net = MemoryNet()
     vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0)
     world = VirtualWorld(net)
     member = _Member(net.link("third party"), vehicle, screen)
     rover = RoverParty(vehicle, net.link("rover"))
-    world.join(rover, InMemoryServer(net, vehicles=("rover",)), member)
+    server = InMemoryServer(net, vehicles=("rover",), settings=settings, witnesses=recorders)
+    world.join(rover, server, member)
     track: list[Place] = []
 
     def follow(now: float) -> None:
@@ -36,6 +44,8 @@ def drive(screen: Screen, *, body: str, seed: int) -> tuple[ThirdParty, list[Pla
         screen.say(f"gave up after {TIME_LIMIT:.0f} s of virtual time")
     screen.update(member.party)
     vehicle.body.close()
+    for recorder in recorders:
+        recorder.close()
     return member.party, track
 
 

@@ -1,0 +1,1 @@
+"""The demonstration: `mav-tasks demo`, `tools/demo`."""

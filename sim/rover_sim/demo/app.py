@@ -1,0 +1,89 @@
+"""The demonstration: a rover drives the tutorial's three tasks, submitted by a third party.
+
+Forward 2.0 m at priority 3 starts at once; rotate 90 degrees at 8 and forward 1.5 m at 5 wait, and
+the more urgent of them runs first. Exit code 0 only if acknowledgements, order, states and the
+measured movement are all as they should be; 1 if not; 2 if it cannot be run.
+"""
+
+import argparse
+from importlib.util import find_spec
+from pathlib import Path
+
+from rich.console import Console
+
+from mav_tasks.errors import RecordError
+from rover_sim.demo import fast, real
+from rover_sim.demo.report import draw, print_table, problems
+from rover_sim.demo.screen import Screen
+from rover_sim.demo.third_party import Place, ThirdParty
+from rover_sim.errors import MissingExtra
+
+OUTPUT = "demo-output"
+PICTURE = "track.png"
+
+PIPE_WIDTH = 110  # columns, where there is no terminal to fit
+
+NO_PYBULLET = (
+    "demo: pybullet is not installed, so the rover is the kinematic one: no wheels, no friction.\n"
+    "      There are wheels for Python 3.11 on Linux x86-64: install mav-tasks[sim] there; in the\n"
+    "      sources, with python3.11 (or uv) installed, remove .venv and run tools/demo again."
+)
+NO_WINDOW = "demo: --gui is pybullet's window: it needs pybullet, and goes without --fast"
+
+
+def main() -> int:
+    """Run the demonstration; gives the exit code."""
+    options = _parser().parse_args()
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=PIPE_WIDTH)
+    body = options.body or ("bullet" if find_spec("pybullet") else "kinematic")
+    if options.body is None and body == "kinematic":
+        _say(console, NO_PYBULLET)
+    if options.gui and (options.fast or body != "bullet"):
+        _say(console, NO_WINDOW)
+        return 2
+    try:
+        with Screen(console) as screen:
+            party, track = _drive(screen, options, body)
+    except (real.DemoError, MissingExtra, RecordError) as error:
+        _say(console, f"demo: {error}")
+        return 2
+    picture = None if options.gui else Path(options.output).resolve() / PICTURE
+    return _conclude(console, party, track, picture)
+
+
+def _drive(
+    screen: Screen, options: argparse.Namespace, body: str
+) -> tuple[ThirdParty, list[Place]]:
+    if options.fast:
+        return fast.drive(screen, body=body, seed=options.seed, record=options.record)
+    return real.drive(screen, body=body, gui=options.gui, seed=options.seed, record=options.record)
+
+
+def _conclude(console: Console, party: ThirdParty, track: list[Place], picture: Path | None) -> int:
+    print_table(console, party)
+    if picture is not None and track:
+        draw(track, picture)
+        _say(console, f"picture of the track: {picture}")
+    wrong = problems(party)
+    for problem in wrong:
+        _say(console, f"WRONG: {problem}")
+    _say(console, "demo: all as it should be" if not wrong else f"demo: {len(wrong)} wrong")
+    return 1 if wrong else 0
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="mav-tasks demo", description=__doc__.partition("\n")[0])
+    add = parser.add_argument
+    add("--fast", action="store_true", help="one process, virtual time, no sockets")
+    add("--gui", action="store_true", help="open pybullet's window; no picture then")
+    add("--body", choices=("bullet", "kinematic"), help="default: bullet where it is installed")
+    add("--record", metavar="FOLDER", default="", help="keep a record for mav-tasks replay")
+    add("--output", metavar="FOLDER", default=OUTPUT, help="for the picture; default: %(default)s")
+    add("--seed", type=int, default=0, help="varies friction by 30 %% either way; 0: not")
+    return parser

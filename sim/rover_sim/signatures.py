@@ -1,0 +1,57 @@
+"""MAVLink 2 signing of a rover that was given a key: it signs all, and hears nothing unsigned.
+
+It has no SETUP_SIGNING: the key is there from the beginning. Radios may speak unsigned.
+"""
+
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.signing import (
+    UNITS,
+    Key,
+    Signer,
+    StreamTimes,
+    is_signed_with,
+    stream_of,
+    timestamp_at,
+    timestamp_of,
+)
+
+WINDOW = int(60 * UNITS)  # "more than 1 minute", MAVLink guide, "Accepting Signed Packets"
+FROM_RADIOS = frozenset({109, 166})
+LINK_ID = 0
+
+
+class RoverSignatures:
+    """What one rover signs and believes; ``unix_offset`` is Unix time less ``now``."""
+
+    def __init__(self, key: Key, *, unix_offset: float) -> None:
+        self._key = key
+        self._unix_offset = unix_offset
+        self._signer = Signer(key, link_id=LINK_ID)
+        self._times = StreamTimes()
+        self.refused = 0
+
+    def __repr__(self) -> str:
+        return f"RoverSignatures({self._key.name}, {self.refused} refused)"
+
+    def sealed(self, raw: bytes, *, now: float) -> bytes:
+        """Give a packet as it is to leave."""
+        return self._signer.sign(raw, clock=self._clock(now))
+
+    def believes(self, packet: Packet, *, now: float) -> bool:
+        """Whether a packet is to be looked at."""
+        is_good = packet.message_id in FROM_RADIOS
+        if packet.is_signed:
+            is_good = is_signed_with(packet, self._key.secret) and self._is_news(packet, now)
+        self.refused += not is_good
+        return is_good
+
+    def _is_news(self, packet: Packet, now: float) -> bool:
+        stream, timestamp = stream_of(packet), timestamp_of(packet)
+        if not self._times.is_news(stream, timestamp, clock=self._clock(now), window=WINDOW):
+            return False
+        self._times.note(stream, timestamp)
+        self._signer.heard(timestamp)
+        return True
+
+    def _clock(self, now: float) -> int:
+        return timestamp_at(now + self._unix_offset)

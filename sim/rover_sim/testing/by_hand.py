@@ -1,0 +1,61 @@
+"""A body within reach of a tester's hands: carried, turned, its wheels held."""
+
+from dataclasses import replace
+from math import cos, sin
+
+from rover_sim.body import Body, BodyState, Pose, wrap_angle
+
+
+class BodyByHand:
+    """A body that can be moved from outside; implements ``Body``.
+
+    The ground is the same everywhere: to carry a rover is to move the ground's frame under it.
+    """
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._offset: Pose | None = None  # of the body's own frame; None: not moved yet
+        self.are_wheels_blocked = False
+
+    def __repr__(self) -> str:
+        return f"BodyByHand({self._body!r})"
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last ``advance``, or after a hand has moved it."""
+        state, offset = self._body.state, self._offset
+        if offset is None:
+            return state
+        north, east = turned(state.north, state.east, offset.yaw)
+        return replace(
+            state,
+            north=offset.north + north,
+            east=offset.east + east,
+            yaw=wrap_angle(offset.yaw + state.yaw),
+        )
+
+    def place(self, pose: Pose) -> None:
+        """Put it down there. What moves, moves on from there, forward as it was."""
+        state = self._body.state
+        turn = wrap_angle(pose.yaw - state.yaw)
+        north, east = turned(state.north, state.east, turn)
+        self._offset = Pose(north=pose.north - north, east=pose.east - east, yaw=turn)
+
+    def drive(self, forward_speed: float, yaw_rate: float) -> None:
+        """Demand a motion, kept until the next call; blocked wheels stand."""
+        if self.are_wheels_blocked:
+            forward_speed = yaw_rate = 0.0
+        self._body.drive(forward_speed, yaw_rate)
+
+    def advance(self, duration: float) -> None:
+        """Step the physics by ``duration`` seconds."""
+        self._body.advance(duration)
+
+    def close(self) -> None:
+        """Release what the body holds."""
+        self._body.close()
+
+
+def turned(north: float, east: float, angle: float) -> tuple[float, float]:
+    """Turn a vector clockwise."""
+    return north * cos(angle) - east * sin(angle), north * sin(angle) + east * cos(angle)

@@ -1,0 +1,132 @@
+"""A net of which each way can be as bad as a test wants it, and that keeps the texts it carries."""
+
+from collections import deque
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Literal
+
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.mavlink.packet import split_datagram
+
+STATUSTEXT = 253
+MESSAGE_ID = slice(7, 10)  # in a MAVLink 2 packet
+TEXTS_KEPT = 200
+
+#: which ways are bad: between clients and server, between server and rovers, or both
+Leg = Literal["client", "rover", "both"]
+LEGS: dict[str, frozenset[str]] = {
+    "client": frozenset({CLIENT_LINK}),
+    "rover": frozenset({VEHICLE_LINK}),
+    "both": frozenset({CLIENT_LINK, VEHICLE_LINK}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A STATUSTEXT that reached a client; one that is longer than 50 bytes comes in pieces."""
+
+    at: float  # virtual s
+    system_id: int
+    component_id: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.at:9.2f} s  {self.system_id}/{self.component_id}  {self.text}"
+
+
+class LossyNet(MemoryNet):
+    """A net that is good at first; ``worsen`` its ways to and from an end of the server."""
+
+    def __init__(self, *, seed: int) -> None:
+        super().__init__(seed=seed)
+        self._of_end: dict[str, Conditions] = {}
+        self.texts: deque[Text] = deque(maxlen=TEXTS_KEPT)
+
+    @property
+    def ways(self) -> dict[str, Conditions]:
+        """The conditions of the server's ends that differ from the net's."""
+        return dict(self._of_end)
+
+    @ways.setter
+    def ways(self, of_end: dict[str, Conditions]) -> None:
+        self._of_end = dict(of_end)
+
+    def conditions_between(self, source: str, target: str) -> Conditions:
+        """Give how bad a way is; one end of each is the server's."""
+        for end in (source, target):
+            if end in self._of_end:
+                return self._of_end[end]
+        return self.conditions
+
+    def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
+        """Keep what a client is told in words."""
+        if source == CLIENT_LINK and data[MESSAGE_ID] == STATUSTEXT.to_bytes(3, "little"):
+            self.texts += (
+                Text(
+                    self.now,
+                    packet.system_id,
+                    packet.component_id,
+                    packet.payload[1:51].rstrip(b"\0").decode(errors="replace"),
+                )
+                for packet in split_datagram(data)
+                if packet.message_id == STATUSTEXT
+            )
+        super().arrive(link, source, data)
+
+
+class LossyLink:
+    """What the fixture gives: a call makes ways bad, from now on or while a ``with`` block runs."""
+
+    def __init__(self, net: LossyNet) -> None:
+        self._net = net
+
+    def __call__(
+        self,
+        *,
+        loss: float = 0.0,
+        duplication: float = 0.0,
+        delay: float = 0.001,
+        jitter: float = 0.0,
+        leg: Leg = "client",
+    ) -> AbstractContextManager[None]:
+        """Lose, double (probabilities 0–1), delay datagrams (s), both ways; ValueError.
+
+        ``jitter`` is up to how much later one may come than others; so they overtake each other.
+        """
+        if leg not in LEGS:
+            raise ValueError(f"leg must be one of {', '.join(LEGS)}, not {leg!r}")
+        for name, value in (("loss", loss), ("duplication", duplication)):
+            if not 0.0 <= value <= 1.0:
+                raise ValueError(f"{name} must be 0 to 1, not {value!r}")
+        for name, value in (("delay", delay), ("jitter", jitter)):
+            if not 0.0 <= value < float("inf"):
+                raise ValueError(f"{name} must be 0 s or more, not {value!r}")
+        how = Conditions(delay=delay, jitter=jitter, loss=loss, duplication=duplication)
+        before = self._net.ways
+        self._net.ways = before | dict.fromkeys(LEGS[leg], how)
+        return _Mending(self._net, before)
+
+    def mend(self) -> None:
+        """Make every way good again."""
+        self._net.ways = {}
+
+
+class _Mending:
+    """Puts back what was, at the end of a ``with`` block."""
+
+    def __init__(self, net: LossyNet, before: dict[str, Conditions]) -> None:
+        self._net = net
+        self._before = before
+
+    def __enter__(self) -> None:
+        """It is bad already."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._net.ways = self._before

@@ -1,0 +1,62 @@
+"""What a test asks of its simulated rovers, as its markers say it, and the seed by its name."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+from zlib import crc32
+
+from rover_sim.personas import PERSONAS
+
+BODIES = ("kinematic", "bullet")
+MOST_ROVERS = 250  # system ids
+
+
+class MarkerError(Exception):
+    """A marker asks for what there is not; the message is one line for the test's author."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoverOptions:
+    """The arguments of ``simulated_rover``."""
+
+    persona: str = "ardupilot"
+    count: int = 1  # of rovers, with system ids in a row
+    seed: int | None = None  # None: from the command line, or from the test's name
+    body: str = "kinematic"  # or "bullet": real physics, three times as slow
+    limit: float = 3600.0  # virtual s, for one thing that is waited for
+    real_limit: float = 60.0  # s, the same
+
+    def __post_init__(self) -> None:
+        """Refuse what there is not."""
+        _one_of("persona", self.persona, tuple(PERSONAS))
+        _one_of("body", self.body, BODIES)
+        if type(self.count) is not int or not 1 <= self.count <= MOST_ROVERS:
+            raise MarkerError(f"count must be 1 to {MOST_ROVERS}, not {self.count!r}")
+        if self.seed is not None and type(self.seed) is not int:
+            raise MarkerError(f"seed must be a whole number, not {self.seed!r}")
+        for name in ("limit", "real_limit"):
+            value = getattr(self, name)
+            if not isinstance(value, int | float) or not value > 0:
+                raise MarkerError(f"{name} must be above 0 seconds, not {value!r}")
+
+
+def read_markers(markers: Iterable[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> RoverOptions:
+    """Join the arguments of markers, given from the outermost to the test's own. MarkerError."""
+    known = [field.name for field in fields(RoverOptions)]
+    joined: dict[str, Any] = {}
+    for positional, named in markers:
+        if positional or not set(named) <= set(known):
+            raise MarkerError(f"takes {', '.join(f'{name}=' for name in known)}, by name only")
+        joined |= named
+    return RoverOptions(**joined)
+
+
+def seed_of(node_id: str) -> int:
+    """Give a seed that a test has for as long as it and its file keep their names."""
+    path, _, name = node_id.partition("::")
+    return crc32(f"{path.rpartition('/')[2]}::{name}".encode())
+
+
+def _one_of(name: str, value: object, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise MarkerError(f"{name} must be one of {', '.join(known)}, not {value!r}")

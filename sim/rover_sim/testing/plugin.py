@@ -1,0 +1,179 @@
+"""The pytest plugin: tests of rover code against a simulated rover, in virtual time.
+
+It is loaded in every pytest run of whoever has it installed: importing it imports nothing but
+pytest; the rest is imported when a test asks for a fixture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mav_tasks.client.sync import SyncClient
+    from mav_tasks.settings import Settings
+    from rover_sim.testing.lossy import LossyLink
+    from rover_sim.testing.options import RoverOptions
+    from rover_sim.testing.processes import RealTime
+    from rover_sim.testing.rover_world import RoverWorld
+    from rover_sim.testing.simulated_rover import SimulatedRover
+    from rover_sim.testing.task_server import TaskServer
+
+MARKER = "simulated_rover"
+TITLE = "simulated rover"
+OURS = ("mav_tasks", "rover_sim")
+WORLD = pytest.StashKey["RoverWorld"]()
+REAL_TIME = pytest.StashKey["RealTime"]()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Have our own modules loaded as they are.
+
+    pytest rewrites the asserts of whatever is installed with a plugin. To read the generated
+    dialect for that takes two seconds, in each run that finds no bytecode of an earlier one; and
+    there is no other way to be left alone. With a pytest that does not look so inside, it does.
+    """
+    marked: set[str] = getattr(early_config.pluginmanager.rewrite_hook, "_must_rewrite", set())
+    marked.difference_update(OURS)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add ``--rover-seed``."""
+    parser.getgroup(TITLE).addoption(
+        "--rover-seed",
+        type=int,
+        metavar="NUMBER",
+        help="seed of simulated rovers and links in tests whose marker names none"
+        " (default: each test has one by its name)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the marker known."""
+    config.addinivalue_line(
+        "markers",
+        f'{MARKER}(persona="ardupilot", count=1, seed=None, body="kinematic", limit=3600,'
+        " real_limit=60): what the fixture rover_world simulates; persona also px4 or generic,"
+        " body also bullet, limits in seconds of virtual and of real time",
+    )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Show with a failing test where its rover was, and how to repeat it."""
+    report = yield
+    if report.failed and (world := item.stash.get(WORLD, None)) is not None:
+        from rover_sim.testing.report import describe_world  # noqa: PLC0415
+
+        report.sections.append((TITLE, describe_world(world)))
+    if report.failed and (real_time := item.stash.get(REAL_TIME, None)) is not None:
+        report.sections.append((TITLE, real_time.describe()))
+    return report
+
+
+@pytest.fixture
+def task_server_settings() -> Settings:
+    """Give the task server's settings: override this fixture, or parametrize it, for others."""
+    from mav_tasks.settings import Settings  # noqa: PLC0415
+
+    return Settings()
+
+
+@pytest.fixture
+def rover_world(
+    request: pytest.FixtureRequest, task_server_settings: Settings
+) -> Iterator[RoverWorld]:
+    """Give the test's world: ``run`` a coroutine in its time, ``sleep``, ``until``, ``client``."""
+    from rover_sim.errors import MissingExtra  # noqa: PLC0415
+    from rover_sim.testing.rover_world import RoverWorld  # noqa: PLC0415
+
+    options, seed = _options_of(request)
+    try:
+        world = RoverWorld(options, seed=seed, settings=task_server_settings)
+    except MissingExtra as error:
+        pytest.fail(f"@pytest.mark.{MARKER}: {error}", pytrace=False)
+    request.node.stash[WORLD] = world
+    yield world
+    del request.node.stash[WORLD]  # what was tested stays until the last test is over
+    world.close()
+
+
+@pytest.fixture
+def rover(rover_world: RoverWorld) -> SimulatedRover:
+    """Give the first simulated rover: where it truly is, and what one can do to it."""
+    return rover_world.rovers[0]
+
+
+@pytest.fixture
+def rovers(rover_world: RoverWorld) -> tuple[SimulatedRover, ...]:
+    """Give every simulated rover; the marker's ``count`` says how many."""
+    return rover_world.rovers
+
+
+@pytest.fixture
+def task_server(rover_world: RoverWorld) -> TaskServer:
+    """Give the task server, running, with every rover found."""
+    rover_world.server.start()
+    rover_world.until(lambda: rover_world.server.is_ready)
+    return rover_world.server
+
+
+@pytest.fixture
+def task_client(
+    rover_world: RoverWorld,
+    task_server: TaskServer,  # noqa: ARG001 (it runs)
+) -> Iterator[SyncClient]:
+    """Give a client of the task server; each of its calls lets time pass until it is answered."""
+    with rover_world.sync_client() as client:
+        yield client
+
+
+@pytest.fixture
+def lossy_link(rover_world: RoverWorld) -> LossyLink:
+    """Give a way to make links bad: ``lossy_link(loss=0.3)``, for a while with ``with``."""
+    return rover_world.lossy_link
+
+
+@pytest.fixture
+def _real_time(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[RealTime]:
+    from rover_sim.testing.processes import RealTime  # noqa: PLC0415
+
+    options, seed = _options_of(request)
+    real_time = RealTime(options, seed=seed, folder=tmp_path)
+    request.node.stash[REAL_TIME] = real_time
+    yield real_time
+    del request.node.stash[REAL_TIME]
+    real_time.close()
+
+
+@pytest.fixture
+def rover_url(_real_time: RealTime) -> str:
+    """Give the URL of simulated rovers in a process, in real time: ``udpout:127.0.0.1:port``."""
+    return _real_time.start_rovers()
+
+
+@pytest.fixture
+def server_url(_real_time: RealTime, rover_url: str) -> str:
+    """Give the URL of a task server in a process, in real time, with every rover found."""
+    return _real_time.start_server(rover_url)
+
+
+def _options_of(request: pytest.FixtureRequest) -> tuple[RoverOptions, int]:
+    """Give what the markers ask for, and the seed; a marker that asks wrongly fails the test."""
+    from rover_sim.testing.options import MarkerError, read_markers, seed_of  # noqa: PLC0415
+
+    node = request.node
+    markers = reversed(list(node.iter_markers(MARKER)))
+    try:
+        options = read_markers((marker.args, marker.kwargs) for marker in markers)
+    except MarkerError as error:
+        pytest.fail(f"@pytest.mark.{MARKER}: {error}", pytrace=False)
+    seeds = (options.seed, request.config.getoption("--rover-seed"), seed_of(node.nodeid))
+    return options, next(seed for seed in seeds if seed is not None)

@@ -1,0 +1,125 @@
+"""Rovers and a task server as processes, in real time: for code that opens a socket of its own."""
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Self
+
+from rover_sim.testing.options import RoverOptions
+
+START_LIMIT = 20.0  # s, for a process to say that it is there, on a busy machine
+STOP_LIMIT = 5.0  # s, for one to end that was asked to
+LOOK = 0.02  # s between two looks at what it says
+SETTINGS = "MAV_TASKS_"  # of the environment: those of whoever runs the tests are not the test's
+LAST_LINES = 10  # shown of each with a failing test
+
+
+class ProcessFailed(Exception):
+    """A process did not start; the message has what it said."""
+
+
+class OwnProcess:
+    """A module run as a process while a ``with`` block runs; it is ended by its own id."""
+
+    def __init__(self, module: str, arguments: Sequence[str], folder: Path) -> None:
+        self.name = module
+        self._output = folder / f"{module}.log"
+        with self._output.open("wb") as sink:
+            self._popen = subprocess.Popen(
+                [sys.executable, "-m", module, *arguments],
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+                cwd=folder,
+                env={name: v for name, v in os.environ.items() if not name.startswith(SETTINGS)},
+            )
+
+    def __repr__(self) -> str:
+        return f"OwnProcess({self.name}, {self._popen.pid})"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._popen.terminate()
+        try:
+            self._popen.wait(STOP_LIMIT)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            self._popen.wait()
+
+    @property
+    def text(self) -> str:
+        """What it has said so far."""
+        return self._output.read_text(encoding="utf-8", errors="replace")
+
+    def wait_for(self, pattern: str) -> re.Match[str]:
+        """Wait until it says something that matches. ProcessFailed."""
+        end = time.monotonic() + START_LIMIT
+        while True:
+            is_over = self._popen.poll() is not None
+            if (found := re.search(pattern, self.text)) is not None:
+                return found
+            if is_over or time.monotonic() > end:
+                how = "ended" if is_over else f"did not say {pattern!r} in {START_LIMIT:g} s"
+                raise ProcessFailed(f"{self.name} {how}:\n{self.text}")
+            time.sleep(LOOK)
+
+
+class RealTime:
+    """What the fixtures ``rover_url`` and ``server_url`` start, until ``close``."""
+
+    def __init__(self, options: RoverOptions, *, seed: int, folder: Path) -> None:
+        self._options = options
+        self._seed = seed
+        self._folder = folder
+        self._stack = ExitStack()
+        self._processes: list[OwnProcess] = []
+
+    def start_rovers(self) -> str:
+        """Give the URL at which the rovers listen."""
+        options = self._options
+        what = ["--body", options.body, "--persona", options.persona]
+        how = ["--count", str(options.count), "--seed", str(self._seed)]
+        rovers = self._start("rover_sim", "--port", "0", *what, *how)
+        port = rovers.wait_for(r"on udp 127\.0\.0\.1:(\d+)")[1]
+        return f"udpout:127.0.0.1:{port}"
+
+    def start_server(self, rover_url: str) -> str:
+        """Give the URL at which the server listens, once it has found every rover."""
+        port = _free_udp_port()
+        links = ["--client", f"udpin:127.0.0.1:{port}", "--no-push", "--vehicle", rover_url]
+        server = self._start(
+            "mav_tasks.cli", "serve", "--config", "", *links, "--store", ":memory:"
+        )
+        for number in range(1, self._options.count + 1):
+            server.wait_for(rf"vehicle {number}: found")
+        return f"udpout:127.0.0.1:{port}"
+
+    def describe(self) -> str:
+        """Give what the processes said last, for a failing test."""
+        lines = [f"seed {self._seed} (the same again: --rover-seed {self._seed})"]
+        for process in self._processes:
+            lines += [f"{process.name}:", *process.text.splitlines()[-LAST_LINES:]]
+        return "\n".join(lines)
+
+    def close(self) -> None:
+        """End what was started, the last first."""
+        self._stack.close()
+
+    def _start(self, module: str, *arguments: str) -> OwnProcess:
+        process = self._stack.enter_context(OwnProcess(module, arguments, self._folder))
+        self._processes.append(process)
+        return process
+
+
+def _free_udp_port() -> int:
+    """Give a port of the loopback that nobody uses at this moment."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

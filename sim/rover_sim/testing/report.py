@@ -1,0 +1,34 @@
+"""What a failing test shows of its world: how to repeat it, where rovers were, who said what."""
+
+from mav_tasks.tasks.goal import describe
+from mav_tasks.tasks.lifecycle import words_of
+from mav_tasks.tasks.task import Task
+from rover_sim.testing.rover_world import RoverWorld
+
+LAST_TASKS, LAST_EVENTS, LAST_TEXTS = 8, 12, 8
+
+
+def describe_world(world: RoverWorld) -> str:
+    """Give the state of affairs in lines."""
+    options = world.options
+    kind = f"{options.persona}, {options.body} body"
+    lines = [
+        f"seed {world.seed} (the same again: --rover-seed {world.seed})",
+        f"{kind}, {world.now:.2f} s of virtual time",
+        *map(repr, world.rovers),
+    ]
+    lines += _part("tasks", [_line_of(task) for task in world.server.tasks[-LAST_TASKS:]])
+    events = [f"{event.at:9.2f} s  {event}" for event in world.server.events[-LAST_EVENTS:]]
+    lines += _part("journal", events)
+    lines += _part("texts", [str(text) for text in world.texts[-LAST_TEXTS:]])
+    return "\n".join(lines)
+
+
+def _line_of(task: Task) -> str:
+    why = f" ({words_of(task.reason)})" if task.reason else ""
+    state = task.state.name.lower()
+    return f"{task.id:6} of rover {task.vehicle}: {describe(task.goal)}: {state}{why}"
+
+
+def _part(title: str, lines: list[str]) -> list[str]:
+    return [f"{title}:", *lines] if lines else []

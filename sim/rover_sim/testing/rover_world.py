@@ -1,0 +1,190 @@
+"""The world of one test: rovers, a task server and clients, in a time that passes when waited for.
+
+While the test's own code runs, virtual time stands. It passes inside ``run``, ``sleep`` and
+``until``, and inside whatever a client waits for.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from datetime import UTC, datetime
+from itertools import count
+from typing import Any, TypeVar
+
+from mav_tasks.client.aio import Client
+from mav_tasks.client.sync import SyncClient
+from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.links.memory import MemoryLink
+from mav_tasks.settings import Settings
+from rover_sim.body import Body, Pose
+from rover_sim.bullet import BulletBody
+from rover_sim.errors import NotInVirtualTime, Stalled
+from rover_sim.kinematic import KinematicBody
+from rover_sim.personas import PERSONAS
+from rover_sim.testing.by_hand import BodyByHand
+from rover_sim.testing.lossy import LossyLink, LossyNet, Text
+from rover_sim.testing.options import RoverOptions
+from rover_sim.testing.simulated_rover import SimulatedRover
+from rover_sim.testing.task_server import TaskServer
+from rover_sim.testing.virtual_loop import VirtualLoop
+from rover_sim.vehicle import make_vehicle
+from rover_sim.virtual import RoverParty, VirtualWorld
+
+T = TypeVar("T")
+
+SPACING = 3.0  # m between rovers, side by side
+SLIP = 0.3  # of the kinematic body, before its seed varies it
+VARIATION = 0.3  # of the friction of bullet's ground
+LOOK = 0.02  # s of virtual time between two looks at what is waited for
+CLEAN_UP = 10.0  # virtual s for what was cut off to end
+
+
+class RoverWorld:
+    """Everything that takes part in one test. The same seed gives the same, bit for bit."""
+
+    def __init__(self, options: RoverOptions, *, seed: int, settings: Settings) -> None:
+        self.options = options
+        self.seed = seed
+        self._began = round(time.time())  # whole seconds, as starts by the time of day are
+        self._net = LossyNet(seed=seed)
+        self._world = VirtualWorld(self._net)
+        self._numbers = count(1)
+        self._bodies: list[BodyByHand] = []
+        self.rovers = tuple(self._add_rover(number) for number in range(1, options.count + 1))
+        names = tuple(_name_of(rover.system_id) for rover in self.rovers)
+        self.server = TaskServer(
+            self._world, vehicles=names, settings=settings, wall_offset=self._began
+        )
+        self.lossy_link = LossyLink(self._net)
+        self._loop = VirtualLoop(self._world)
+        self._runner = asyncio.Runner(loop_factory=lambda: self._loop)
+
+    def __repr__(self) -> str:
+        return f"RoverWorld(at {self.now:.3f} s, seed {self.seed}, {len(self.rovers)} rovers)"
+
+    @property
+    def now(self) -> float:
+        """Virtual seconds since the world began."""
+        return self._world.now
+
+    @property
+    def utc(self) -> datetime:
+        """The time of day in this world; it began at the real one, to the second."""
+        return datetime.fromtimestamp(self._began + self.now, UTC)
+
+    @property
+    def texts(self) -> list[Text]:
+        """The last STATUSTEXTs that reached a client."""
+        return list(self._net.texts)
+
+    def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
+        """Run a coroutine to its end in virtual time. Stalled, NotInVirtualTime.
+
+        Tasks that it leaves behind go on in the next call.
+        """
+        __tracebackhide__ = True
+        if _is_in_a_loop():
+            coroutine.close()
+            raise NotInVirtualTime(
+                "an event loop is running here already: inside of a coroutine await"
+                " rover_world.client(), and give the coroutine to rover_world.run()"
+            )
+        task: asyncio.Task[T] | None = None
+
+        async def kept() -> T:
+            nonlocal task
+            task = asyncio.current_task()
+            return await coroutine
+
+        self._allow(self.options.limit)
+        try:
+            return self._runner.run(kept())
+        except Stalled as stalled:
+            raise stalled.with_traceback(None) from None  # who waits is in its words
+        finally:
+            if task is not None and not task.done():
+                self._cut_off(task)
+
+    def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
+        """As ``run``: what a SyncClient asks of the place where its coroutines run."""
+        __tracebackhide__ = True
+        return self.run(coroutine)
+
+    def sleep(self, seconds: float) -> None:
+        """Let virtual time pass. Stalled beyond the marker's ``limit``."""
+        __tracebackhide__ = True
+        self.run(asyncio.sleep(seconds))
+
+    def until(self, condition: Callable[[], object], *, within: float = 60.0) -> None:
+        """Let virtual time pass until the condition holds; AssertionError if it does not."""
+        __tracebackhide__ = True
+        end = self.now + within
+        while not condition():  # out of the loop, so that it can ask a SyncClient
+            assert self.now < end, f"not within {within:g} s of virtual time"
+            self.sleep(LOOK)
+
+    def link(self) -> MemoryLink:
+        """Give a new link to the server's clients' side, for one client."""
+        return self._net.link(f"client{next(self._numbers)}", peers=(CLIENT_LINK,))
+
+    def client(self) -> Client:
+        """Give another client for ``async with``, inside of what ``run`` runs."""
+        return Client(self.link())
+
+    def sync_client(self) -> SyncClient:
+        """Give another client for ``with``; each call of it lets time pass until it is answered."""
+        return SyncClient(self.link(), portal=self)
+
+    def close(self) -> None:
+        """Cancel what still runs and give everything back."""
+        self._allow(CLEAN_UP)
+        try:
+            self._runner.run(_nothing())  # it makes its loop on its first run
+            self._runner.close()
+        finally:
+            for body in self._bodies:
+                body.close()
+
+    def _allow(self, seconds: float) -> None:
+        self._loop.allow(seconds, real_seconds=self.options.real_limit)
+
+    def _cut_off(self, task: asyncio.Task[Any]) -> None:
+        """End what a stalled run left behind, so that it does not go on in the next."""
+        self._allow(CLEAN_UP * 2)
+        task.cancel()
+        self._runner.run(_ended(task))
+
+    def _add_rover(self, number: int) -> SimulatedRover:
+        body = BodyByHand(self._make_body(number))
+        self._bodies.append(body)
+        persona = PERSONAS[self.options.persona]
+        vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona)
+        self._world.join(RoverParty(vehicle, self._net.link(_name_of(number))))
+        return SimulatedRover(vehicle, body, persona=persona, clock=lambda: self.now)
+
+    def _make_body(self, number: int) -> Body:
+        start = Pose(east=SPACING * (number - 1))
+        seed = self.seed + number
+        if self.options.body == "kinematic":
+            return KinematicBody(start=start, slip=SLIP, seed=seed)
+        return BulletBody(start=start, variation=VARIATION, seed=seed)
+
+
+def _name_of(number: int) -> str:
+    return f"rover{number}"
+
+
+def _is_in_a_loop() -> bool:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
+
+
+async def _nothing() -> None:
+    """End at once."""
+
+
+async def _ended(task: asyncio.Task[Any]) -> None:
+    await asyncio.wait({task}, timeout=CLEAN_UP)

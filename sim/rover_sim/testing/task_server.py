@@ -1,0 +1,142 @@
+"""The task server in a test's hands: the one that ``mav-tasks serve`` runs, in virtual time.
+
+It can be killed and started again; what it had acknowledged is there then, as from a disk.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mav_tasks.in_memory import InMemoryServer
+from mav_tasks.settings import Retention, Settings
+from mav_tasks.store import MemoryStore
+from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Task
+from rover_sim.virtual import VirtualWorld
+
+FOR_EVER = Retention(max_age=None, max_count=None)
+
+
+class TaskServer:
+    """One server for all rovers of a world, from its first life to its last."""
+
+    def __init__(
+        self,
+        world: VirtualWorld,
+        *,
+        vehicles: tuple[str, ...],
+        settings: Settings,
+        wall_offset: float,  # UTC less virtual time, s
+    ) -> None:
+        self.settings = settings  # in force from the next start on
+        self._world = world
+        self._vehicles = vehicles
+        self._wall_offset = wall_offset
+        self._server: InMemoryServer | None = None
+        self._is_killed = False
+        self._store = MemoryStore()
+        self._earlier: list[Event] = []
+
+    def __repr__(self) -> str:
+        state = "running" if self.is_running else "not running"
+        return f"TaskServer({state}, {len(self.tasks)} tasks)"
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it serves."""
+        return self._server is not None and not self._is_killed and not self._server.pump.is_over
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it serves and has found every rover."""
+        if self._server is None or not self.is_running:
+            return False
+        found = self._server.engine.snapshot(now=self._world.now).vehicles
+        return len(found) == len(self._vehicles) and all(vehicle.heard for vehicle in found)
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """Every task that it knows, or knew when it ended, in the order of their ids."""
+        if self._server is None:
+            return ()
+        return self._server.engine.snapshot(now=self._world.now).tasks
+
+    @property
+    def events(self) -> list[Event]:
+        """The journal, of all its lives; ``str`` gives an event in words."""
+        return self._earlier + self._store.events
+
+    def task(self, task_id: int) -> Task:
+        """Give a task by its id; KeyError."""
+        return {int(task.id): task for task in self.tasks}[task_id]
+
+    def start(self) -> None:
+        """Start it, on what it had stored; it needs some seconds to find the rovers again."""
+        if self.is_running:
+            raise RuntimeError("the task server is running already")
+        restored = self._end_life()
+        self._server = InMemoryServer(
+            self._world.net,
+            vehicles=self._vehicles,
+            settings=self.settings,
+            store=self._store,
+            restored=restored,
+            wall_offset=self._wall_offset,
+            now=self._world.now,
+        )
+        self._is_killed = False
+        self._world.join(self._server)
+
+    def kill(self) -> None:
+        """Let it be gone from one moment to the next; nobody stops the rovers."""
+        if self._server is None or not self.is_running:
+            raise RuntimeError("the task server is not running")
+        self._is_killed = True
+        self._world.leave(self._server)
+
+    def stop(self) -> None:
+        """Ask for its orderly end: it stops the rovers, and within a second it is not running."""
+        if self._server is None or not self.is_running:
+            raise RuntimeError("the task server is not running")
+        self._server.shut_down(now=self._world.now)
+
+    def restart(self) -> None:
+        """Kill it and start it at once, as after a crash: what ran is held, the queue paused."""
+        self.kill()
+        self.start()
+
+    def _end_life(self) -> Restored | None:
+        """Put the life that is over aside; give what it has left behind, None if there was none."""
+        if self._server is None:
+            return None
+        if not self._is_killed:
+            self._world.leave(self._server)
+        self._earlier = self.events
+        self._store = MemoryStore()
+        idle = self._world.now - self._earlier[-1].at if self._earlier else 0.0
+        return replace(
+            stored(self._earlier),
+            ended_well=not self._is_killed,
+            idle=idle,
+            wall_offset=self._wall_offset,
+        )
+
+
+def stored(events: list[Event]) -> Restored:
+    """Give what the real store makes of events when a server starts on it."""
+    with TemporaryDirectory(prefix="rover-sim-") as folder:
+        path = Path(folder) / "tasks.sqlite3"
+        first = SqliteStore(path, wall_offset=_no_offset, retention=FOR_EVER)
+        first.append(events)
+        first.close()
+        again = SqliteStore(path, wall_offset=_no_offset, retention=FOR_EVER)
+        try:
+            return again.load()
+        finally:
+            again.close()
+
+
+def _no_offset() -> float:
+    return 0.0

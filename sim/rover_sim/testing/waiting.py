@@ -1,0 +1,50 @@
+"""Who waits for what, in words: for a test that waits for what does not come."""
+
+import asyncio
+import linecache
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+MOST_TASKS = 8  # told of
+OURS = Path(__file__).parent  # what wraps the test's own coroutines is not told of
+
+
+def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
+    """Give a line for each coroutine in which a task of the loop waits, the task's own first."""
+    tasks = sorted(asyncio.all_tasks(loop), key=lambda task: task.get_name())
+    lines: list[str] = []
+    for task in tasks[:MOST_TASKS]:
+        lines.append(f"\n  {task.get_name()} waits:")
+        lines += (
+            f"\n    {_describe(frame)}"
+            for frame in _frames(task.get_coro())
+            if Path(frame.f_code.co_filename).parent != OURS
+        )
+    if len(tasks) > MOST_TASKS:
+        lines.append(f"\n  and {len(tasks) - MOST_TASKS} more tasks")
+    return "".join(lines)
+
+
+def _frames(awaitable: Any) -> Iterator[FrameType]:
+    """Give the frame of a coroutine, of the one that it awaits, and so on."""
+    while awaitable is not None:
+        for frame_name, next_name in (
+            ("cr_frame", "cr_await"),
+            ("gi_frame", "gi_yieldfrom"),
+            ("ag_frame", "ag_await"),
+        ):
+            frame = getattr(awaitable, frame_name, None)
+            if frame is not None:
+                yield frame
+                awaitable = getattr(awaitable, next_name)
+                break
+        else:
+            return
+
+
+def _describe(frame: FrameType) -> str:
+    code = frame.f_code
+    line = linecache.getline(code.co_filename, frame.f_lineno).strip()
+    return f"{Path(code.co_filename).name}:{frame.f_lineno} {code.co_qualname}: {line}"

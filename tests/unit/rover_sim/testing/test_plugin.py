@@ -1,0 +1,388 @@
+"""The pytest plugin as a stranger has it: test files of their own, run by a pytest of their own."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+# What the strangers' tests import is imported here, once for all of them.
+import rover_sim.testing.rover_world
+from tests.kit.plugin_example import EXAMPLE
+
+assert rover_sim.testing.rover_world
+
+pytest_plugins = ["pytester"]
+
+PLUGIN = ("-p", "rover_sim.testing.plugin")
+
+
+@pytest.fixture(autouse=True)
+def strict(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the strangers' pytest load this plugin only: others take a second each time."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    pytester.makeini("[pytest]\naddopts = --strict-markers -p no:cacheprovider\n")
+
+
+def run(pytester: pytest.Pytester, source: str, *options: str) -> pytest.RunResult:
+    """Run a stranger's test file in this process."""
+    pytester.makepyfile(test_patrol=source)
+    return pytester.runpytest_inprocess(*PLUGIN, "-W", "error", *options)
+
+
+def test_the_example_passes_in_a_process_of_its_own(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_patrol=EXAMPLE)
+    result = pytester.runpytest_subprocess(*PLUGIN, "-W", "error")
+    result.assert_outcomes(passed=2)
+    assert result.duration < 20  # two minutes of driving on a very busy machine
+
+
+def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
+    broken = EXAMPLE.replace("(2.0, abs", "(3.0, abs").replace("rover.block_wheels()", "pass")
+    result = run(pytester, broken)
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines(
+        [
+            "*- simulated rover -*",
+            "ardupilot, kinematic body, * s of virtual time",
+            "rover 1 at [12].* m north, 0.000 m east, heading 0.0 deg, 0.00 m/s, armed, hold",
+            "tasks:",
+            "     1 of rover 1: move 2 m: completed",
+            "journal:",
+            "*task 1 of vehicle 1: move 2 m, priority 5, from *",
+            "*task 1 completed; * setpoints at 20 Hz: p50 50.0, p99 50.0, max 50.0 ms, 0 late",
+            "texts:",
+            "* s  1/191  Task 1 done",
+        ]
+    )
+
+
+def test_loading_it_imports_nothing_of_ours() -> None:
+    code = """
+import sys
+import pytest
+before = set(sys.modules)
+import rover_sim.testing.plugin
+print(sorted(set(sys.modules) - before))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=True
+    )
+    assert done.stdout == "['rover_sim', 'rover_sim.testing', 'rover_sim.testing.plugin']\n"
+
+
+def test_what_tests_may_name_is_there() -> None:
+    names = ["Faults", "LossyLink", "NotInVirtualTime", "RoverWorld", "SimulatedRover", "Stalled"]
+    assert list(rover_sim.testing.__all__) == [*names, "TaskServer"]
+    for name in rover_sim.testing.__all__:
+        assert getattr(rover_sim.testing, name).__name__ == name
+    with pytest.raises(AttributeError, match="has no attribute 'Robot'"):
+        _ = rover_sim.testing.Robot
+
+
+def test_help_tells_of_fixtures_and_marker(pytester: pytest.Pytester) -> None:
+    assert "--rover-seed" in pytester.runpytest_inprocess(*PLUGIN, "--help").stdout.str()
+    shown = pytester.runpytest_inprocess(*PLUGIN, "--markers").outlines
+    assert any(line.startswith("@pytest.mark.simulated_rover(persona=") for line in shown)
+    shown = pytester.runpytest_inprocess(*PLUGIN, "--fixtures").outlines
+    names = ("rover", "rovers", "rover_world", "task_server", "task_client", "lossy_link")
+    for name in (*names, "task_server_settings"):
+        assert any(line.startswith(f"{name} ") for line in shown), name
+
+
+def test_the_marker_says_what_is_simulated(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import pytest
+
+        pytestmark = pytest.mark.simulated_rover(persona="px4", seed=7)
+
+        def test_of_the_file(rover, rovers, rover_world):
+            assert (rover.persona, len(rovers), rover_world.seed) == ("px4", 1, 7)
+            assert rover is rovers[0]
+
+        @pytest.mark.simulated_rover(count=3, persona="generic")
+        def test_its_own_goes_before(rovers, rover_world):
+            assert [rover.persona for rover in rovers] == ["generic"] * 3
+            assert rover_world.seed == 7
+        """,
+    )
+    result.assert_outcomes(passed=2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ('persona="arduplane"', "persona must be one of ardupilot, px4, generic, not 'arduplane'"),
+        ('body="lego"', "body must be one of kinematic, bullet, not 'lego'"),
+        ("count=0", "count must be 1 to 250, not 0"),
+        ("seed='x'", "seed must be a whole number, not 'x'"),
+        ("limit=0", "limit must be above 0 seconds, not 0"),
+        ("limit=float('nan')", "limit must be above 0 seconds, not nan"),
+        ('"px4"', "takes persona=, count=, seed=, body=, limit=, real_limit=, by name only"),
+        ("rovers=2", "takes persona=, count=, seed=, body=, limit=, real_limit=, by name only"),
+    ],
+)
+def test_what_there_is_not_is_said_in_one_line(
+    pytester: pytest.Pytester, arguments: str, said: str
+) -> None:
+    result = run(
+        pytester,
+        f"""
+        import pytest
+
+        @pytest.mark.simulated_rover({arguments})
+        def test_it(rover):
+            pass
+        """,
+    )
+    result.assert_outcomes(errors=1)
+    assert f"@pytest.mark.simulated_rover: {said}" in result.outlines
+    assert "Traceback" not in result.stdout.str()
+
+
+SHOWS_SEED = """
+    import pytest
+
+    def test_by_name(rover_world):
+        print("seed of the first", rover_world.seed)
+
+    def test_by_another_name(rover_world):
+        print("seed of the second", rover_world.seed)
+
+    @pytest.mark.simulated_rover(seed=7)
+    def test_by_marker(rover_world):
+        print("seed of the third", rover_world.seed)
+"""
+
+
+def seeds(result: pytest.RunResult) -> list[int]:
+    """Give the seeds that SHOWS_SEED shows."""
+    found = re.findall(r"^seed of the \w+ (\d+)$", result.stdout.str(), flags=re.MULTILINE)
+    return [int(seed) for seed in found]
+
+
+def test_each_test_has_a_seed_by_its_name(pytester: pytest.Pytester) -> None:
+    first, second, third = seeds(run(pytester, SHOWS_SEED, "-rP"))
+    assert (first != second, third) == (True, 7)
+    assert seeds(run(pytester, SHOWS_SEED, "-rP")) == [first, second, 7]
+    folder = pytester.mkdir("elsewhere")
+    (pytester.path / "test_patrol.py").rename(folder / "test_patrol.py")
+    assert seeds(pytester.runpytest_inprocess(*PLUGIN, "-rP")) == [first, second, 7]
+
+
+def test_the_command_line_gives_another_seed(pytester: pytest.Pytester) -> None:
+    assert seeds(run(pytester, SHOWS_SEED, "-rP", "--rover-seed", "12")) == [12, 12, 7]
+    result = run(pytester, SHOWS_SEED, "--rover-seed", "twelve")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+
+
+def test_a_failing_test_shows_its_world(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import pytest
+
+        @pytest.mark.simulated_rover(seed=11)
+        def test_it(rover, rover_world):
+            rover.place(north=4.0, east=-1.0)
+            rover_world.sleep(2.5)
+            assert rover.north == 5.0
+
+        def test_that_passes(rover):
+            pass
+        """,
+    )
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*- simulated rover -*",
+            "seed 11 (the same again: --rover-seed 11)",
+            "ardupilot, kinematic body, 2.50 s of virtual time",
+            "rover 1 at 4.000 m north, -1.000 m east, heading 0.0 deg, 0.00 m/s, disarmed, *",
+        ]
+    )
+    assert result.stdout.str().count("simulated rover -") == 1
+
+
+def test_a_missing_pybullet_is_said(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    result = run(
+        pytester,
+        """
+        import pytest
+
+        @pytest.mark.simulated_rover(body="bullet")
+        def test_it(rover):
+            pass
+        """,
+    )
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["@pytest.mark.simulated_rover: *pybullet*"])
+
+
+def test_fixtures_of_the_same_name_are_the_strangers(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import pytest
+
+        @pytest.fixture
+        def rover():
+            return "Spirit"
+
+        def test_it(rover):
+            assert rover == "Spirit"
+        """,
+    )
+    result.assert_outcomes(passed=1)
+
+
+def test_pytest_does_not_rewrite_the_dialect(pytester: pytest.Pytester) -> None:
+    """As it would, with all that is installed with a plugin; that takes two seconds each time."""
+    pytester.makepyfile(
+        installs="""
+        import pytest
+        pytest.register_assert_rewrite("mav_tasks", "theirs")
+        """,
+        theirs="",
+        test_it="""
+        import theirs
+        import mav_tasks.mavlink.messages
+
+        def test_it():
+            assert "Rewriting" in repr(theirs.__loader__)
+            assert "Rewriting" not in repr(mav_tasks.mavlink.messages.__loader__)
+        """,
+    )
+    pytester.syspathinsert()
+    result = pytester.runpytest_subprocess("-p", "installs", *PLUGIN)
+    result.assert_outcomes(passed=1)
+
+
+def test_a_test_without_a_rover_pays_nothing(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import sys
+
+        def test_it():
+            assert not [name for name in sys.modules if name.startswith(("mav_tasks", "pybullet"))]
+            assert "rover_sim.testing.plugin" in sys.modules
+        """
+    )
+    result = pytester.runpytest_subprocess(*PLUGIN, "-W", "error")
+    result.assert_outcomes(passed=1)
+    assert not list(Path(pytester.path).glob("*.sqlite3"))
+
+
+def test_code_with_a_socket_of_its_own_has_real_processes(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MAV_TASKS_CONFIG", "/nowhere/its-user-s.toml")
+    monkeypatch.setenv("MAV_TASKS_STORE", "/nowhere/its-user-s.sqlite3")
+    source = """
+        import subprocess, sys
+        import pytest
+        from pymavlink import mavutil
+
+        @pytest.mark.simulated_rover(persona="px4", count=2)
+        def test_it(server_url, rover_url):
+            for url in (server_url, rover_url):
+                link = mavutil.mavlink_connection(url, source_system=255)
+                link.mav.heartbeat_send(6, 8, 0, 0, 4)
+                assert link.wait_heartbeat(timeout=10).autopilot == 12, "not a PX4"
+                link.close()
+            assert not "shown"
+    """
+    pytester.makepyfile(test_patrol=source)
+    result = pytester.runpytest_subprocess(*PLUGIN)  # pymavlink loads numpy, which cannot be undone
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*- simulated rover -*", "seed *", "rover_sim:", "mav_tasks.cli:"])
+    result.stdout.fnmatch_lines(["*vehicle 2: found*"])
+
+
+def test_every_fixture_does_its_part(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import asyncio
+        import pytest
+        from mav_tasks import Move, TaskState
+        from mav_tasks.settings import Driving, Settings
+
+        @pytest.fixture
+        def task_server_settings():
+            return Settings(driving=Driving(speed=1.5))
+
+        def test_settings(task_client, rover, rover_world):
+            task_client.submit(Move(8.0))
+            rover_world.until(lambda: rover.speed > 1.4, within=15)
+
+        @pytest.mark.parametrize("task_server_settings", [Settings(driving=Driving(speed=0.3))])
+        def test_other_settings(task_client, rover, rover_world):
+            task_client.submit(Move(8.0))
+            rover_world.sleep(10)
+            assert 0.2 < rover.speed < 0.4
+
+        def test_restart(task_client, task_server, rover, rover_world):
+            task = task_client.submit(Move(8.0))
+            rover_world.until(lambda: rover.speed > 0.3)
+            task_server.restart()
+            assert task_server.task(task.id).state is TaskState.HELD
+            assert [str(event) for event in task_server.events][-1] != ""
+
+        def test_lossy_link(task_client, task_server, lossy_link):
+            lossy_link(loss=0.3)
+            ids = [task_client.submit(Move(0.1)).id for _ in range(5)]
+            assert [task.id for task in task_server.tasks] == ids
+
+        @pytest.mark.usefixtures("task_server")
+        def test_asyncio(rover_world, rover):
+            async def patrol():
+                async with rover_world.client() as tasks:
+                    task = await tasks.submit(Move(1.0))
+                    async with asyncio.timeout(60):
+                        return await task.done()
+
+            assert rover_world.run(patrol()).state is TaskState.COMPLETED
+            assert rover.north == pytest.approx(1.0, abs=0.05)
+        """,
+    )
+    result.assert_outcomes(passed=5)
+
+
+def test_a_test_that_waits_for_ever_ends_and_says_for_what(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import asyncio
+        import pytest
+        from mav_tasks import Move
+
+        async def patrol(client):
+            async with client as tasks:
+                task = await tasks.submit(Move(1.0))
+                await tasks.pause()
+                await task.done()
+
+        @pytest.mark.simulated_rover(limit=30)
+        @pytest.mark.usefixtures("task_server")
+        def test_it(rover_world):
+            rover_world.run(patrol(rover_world.client()))
+        """,
+    )
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            ">       rover_world.run(patrol(rover_world.client()))",
+            "E * not over within 30 s of virtual time; at *",
+            "E *test_patrol.py:9 patrol: await task.done()",
+            "tasks:",
+            "     1 of rover 1: move 1 m: paused (operator)",
+        ]
+    )
+    result.stdout.no_fnmatch_line("*_run_once*")
