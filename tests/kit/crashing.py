@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from mav_tasks.cli import main
+from mav_tasks.cli.app import main
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.database import Database
 from mav_tasks.store.writer import Writer

@@ -84,6 +84,9 @@ class LossyUdp:
         for each in (self._front, self._is_ending, *self._ways_down):
             each.close()
 
+    def see(self, data: bytes, *, is_for_server: bool) -> None:
+        """Look at a datagram that has come; a proxy that keeps some does more."""
+
     def _run(self) -> None:
         is_ending = False
         while not is_ending:
@@ -122,6 +125,7 @@ class LossyUdp:
 
     def _put_under_way(self, way: _Way, data: bytes) -> None:
         """As the virtual net of the scenarios does it."""
+        self.see(data, is_for_server=way.traffic is self.to_server)
         how, number, traffic = self._conditions, next(self._numbers), way.traffic
         traffic.came += 1
         if self._random.random() < how.loss or len(self._under_way) >= MOST_UNDER_WAY:

@@ -33,7 +33,7 @@ import sysconfig
 import termios
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -167,11 +167,17 @@ class MavProxy:
 
 
 @contextmanager
-def mavproxy(port: int, folder: Path, *options: str) -> Iterator[MavProxy]:
-    """Run it while the block runs, connected to a UDP port; all that it writes is in the folder."""
+def mavproxy(
+    port: int, folder: Path, *options: str, prepare: Callable[[], None] = lambda: None
+) -> Iterator[MavProxy]:
+    """Run it while the block runs, connected to a UDP port; all that it writes is in the folder.
+
+    ``prepare`` puts what it is to find there.
+    """
     script = Path(sysconfig.get_path("scripts")) / "mavproxy.py"
     state = folder / "mavproxy"
     state.mkdir()
+    prepare()
     terminal, its_side = pty.openpty()
     termios.tcsetwinsize(its_side, (50, 500))  # a longer line would be shown by its end alone
     popen = subprocess.Popen(

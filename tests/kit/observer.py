@@ -37,8 +37,11 @@ KNOWN = 0.5  # s since the server heard of it: no setpoint from before is on its
 GREETING = (
     4  # zeros in a row that are not driving: a client's OFFBOARD needs two, and may be asked twice
 )
+BY_CLIENT = 2.5  # s after a client's wish to arm, in which that the rover is armed is its doing
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
+ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops by itself: ArduPilot's; PX4's is 1
+FAR = 60.0  # s of driving by itself, to a place or in a mode of the rover's own
 
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 SHOW = "show"  # the request for a heartbeat
@@ -104,6 +107,8 @@ class Observer:
     ways: Ways = ARDUPILOT_WAYS
     #: a test that stops the server's clock expects a gap
     expects_gaps: bool = False
+    #: a world that does several things in one step: which came first is not known
+    batches: bool = False
     #: whether the rover is really armed and in our mode
     is_ready: Callable[[], bool] = lambda: True
     #: seen so by the server
@@ -116,6 +121,10 @@ class Observer:
     driven: list[tuple[float, Any]] = field(default_factory=list)
     #: everything that reached the rover
     reached: list[Reached] = field(default_factory=list)
+    #: until then the rover may move for what has reached it, whoever sent that
+    may_move_until: float = -1e9
+    #: when the server read the last STOP that is in force
+    stopped_at: float = -1e9
     _zeros_left: int = 0
     _newest: tuple[int, float] = (0, -1e9)  # of its heartbeats: number, and when it came
     _before_continue: tuple[bool, bool] | None = None
@@ -128,9 +137,15 @@ class Observer:
     _in_row: int = 0  # of the server's setpoints
     _hold_at: float = -1e9
     _disarm_at: float = -1e9
+    _mode_at: float = -1e9  # when it was last heard that the mode is another one
+    _hold_wished_at: float = -1e9  # when a client last asked for HOLD
+    _pause_at: float = -1e9  # when a client last asked for a pause
+    _hold_due: float | None = None  # when a zero left of which only HOLD says why
+    _client_arms_at: float = -1e9  # through the server, while it may be taking control
     _moved_last: bool = False
     _stop_due: tuple[float, set[str]] | None = None
     _last_source: tuple[float, tuple[int, int]] | None = None
+    _given_to: tuple[int, int] | None = None  # who last asked the rover for our mode
 
     def __post_init__(self) -> None:
         self._decoder = common.MAVLink(None)
@@ -152,7 +167,7 @@ class Observer:
         if kind in COMMANDS:
             self._see_command_of_client(now, message)
         elif kind == "SET_MODE":
-            self._see_wish_of_client(message.custom_mode)
+            self._see_wish_of_client(now, message.custom_mode)
         elif kind in BY_HAND and _off_centre(message):
             self._take_over(now, zeros=1)
 
@@ -205,7 +220,7 @@ class Observer:
         elif kind in COMMANDS:
             self.driven.append((now, message))
             self._see_command(now, message)
-        if self.stopped:
+        if self.stopped and not (self.batches and now == self.stopped_at):
             self._check_stopped(now, message)
 
     def arrived(self, now: float, data: bytes) -> None:
@@ -216,15 +231,24 @@ class Observer:
         message = self._decode(data)
         if message is None:
             return
+        self.may_move_until = max(self.may_move_until, now + self._keeps_moving(message))
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        if self._is_wish_for_our_mode(message):
+            self._given_to = source  # whoever asks for our mode drives from here on
         if message.get_type() in SETPOINTS and _moves(message):
-            source = (message.get_srcSystem(), message.get_srcComponent())
             if source == SERVER and not self.is_ready() and self._is_known_unready(now):
                 self._violation(now, "moving setpoint at a rover known not to be ready for it")
             if self._last_source is not None:
                 at, before = self._last_source
-                if before != source and now - at < TWO_SOURCES:
+                if source not in (before, self._given_to) and now - at < TWO_SOURCES:
                     self._violation(now, f"two sources of setpoints: {before}, {source}")
             self._last_source = (now, source)
+
+    def _is_wish_for_our_mode(self, message: Any) -> bool:
+        if message.get_type() == "SET_MODE":
+            return int(message.custom_mode) == self.ways.ours
+        is_of_mode = message.get_type() in COMMANDS and message.command == SET_MODE
+        return is_of_mode and self.ways.mode_of(message) == self.ways.ours
 
     def server_restarted(self) -> None:
         """Another server knows nothing of what the first one saw, and drives nothing yet."""
@@ -251,27 +275,41 @@ class Observer:
     def _see_command_of_client(self, now: float, message: Any) -> None:
         param1 = message.param1
         if message.command == STOP:
-            self.stopped, self.taken_over = True, False
-            self._stop_due = (now, {"zero", "HOLD"})
+            self.stopped, self.taken_over, self.stopped_at = True, False, now
+            if self.mode >= 0:  # else it is not found yet, and is stopped when it is
+                self._stop_due = (now, {"zero", "HOLD"})
+        elif message.command == PAUSE_CONTINUE and param1 == 0.0:
+            self._pause_at = now
         elif message.command == PAUSE_CONTINUE and param1 == 1.0:
             self._check_stop(now)
             self._before_continue = self.stopped, self.taken_over
             self.stopped = self.taken_over = False
         elif message.command == SET_MODE:
-            self._see_wish_of_client(self.ways.mode_of(message))
+            self._see_wish_of_client(now, self.ways.mode_of(message))
+        elif message.command == ARM and message.param1:
+            self._client_arms_at = now
 
-    def _see_wish_of_client(self, mode: int) -> None:
+    def _see_wish_of_client(self, now: float, mode: int) -> None:
+        if mode == self.ways.hold:
+            self._hold_wished_at = now
         if mode == self.ways.hold or mode in self.ways.given_back:
             self.taken_over = False
+            if self._before_continue is not None:  # a continue that is refused does not undo that
+                self._before_continue = (self._before_continue[0], False)
 
     def _see_heartbeat(self, now: float, message: Any) -> None:
         armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
+        if self.stopped and self.mode < 0:
+            self._stop_due = (now, {"zero", "HOLD"})  # found now
         if self.armed and not armed and now - self._disarm_at > OWN_REQUEST:
             self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
         if mode != self.mode:
             self._zero_in_mode = False
+            self._mode_at = now
             asked = mode == self.ways.hold and now - self._hold_at < OWN_REQUEST
             by_us = asked and not self._moved_last  # driving on, we had not asked for this one
+            # news of HOLD in the step in which a client asks for it, and in which we ask the rover
+            by_us |= self.batches and mode == self.ways.hold and now == self._hold_wished_at
             if self.mode == self.ways.ours and not by_us:
                 self._take_over(now, zeros=0)
         self.armed, self.mode = armed, mode
@@ -285,6 +323,7 @@ class Observer:
 
     def _take_over(self, now: float, *, zeros: int) -> None:
         """Somebody else has the rover; of interest only while the server is driving."""
+        self._in_row = 0  # it may have been handing it back, and ends that, too
         if not self._moved_last and now - self._hold_at < OWN_REQUEST:
             return  # it was handing it back
         if now - self._setpoint_at < ENGAGED and not self.stopped and not self.taken_over:
@@ -304,7 +343,11 @@ class Observer:
                 self._violation(now, "a client's setpoint while the server drives")
             return
         if self.taken_over:
-            if moves or self._zeros_left == 0:
+            # a client's pause stops a rover that somebody else drives: zero and HOLD at once; to
+            # no other pause does a zero belong
+            if now == self._pause_at and not moves:
+                self._hold_due = now
+            elif moves or self._zeros_left == 0:
                 self._violation(now, f"setpoint after a takeover: {self._name(message)}")
             self._zeros_left -= 1
         self._check_rate(now, moves=moves)
@@ -316,7 +359,7 @@ class Observer:
             self._zero_in_mode = True
             if self._stop_due is not None:
                 self._stop_due[1].discard("zero")
-        self._in_row = self._in_row + 1 if now - self._setpoint_at < ENGAGED else 1
+        self._in_row = self._in_row + 1 if now - self._setpoint_at <= GAP else 1
         self._setpoint_at = now
         self._moved_last = moves
 
@@ -341,6 +384,8 @@ class Observer:
 
     def _see_command(self, now: float, message: Any) -> None:
         if (message.get_srcSystem(), message.get_srcComponent()) != SERVER:
+            if self._is_wish_for_our_mode(message) and not self._moved_last:
+                self._in_row = 0  # it was handing the rover back, and that client has it now
             return
         if message.command == ARM:
             if message.param1 == 0.0:
@@ -360,6 +405,9 @@ class Observer:
         ways = self.ways
         if wanted == ways.hold:
             self._hold_at = now
+            if now == self._pause_at:  # carried out as HOLD it is a wish for HOLD
+                self._see_wish_of_client(now, wanted)
+                self._hold_due = None
             if self._stop_due is not None:
                 self._stop_due[1].discard("HOLD")
         elif self.taken_over:
@@ -369,8 +417,10 @@ class Observer:
                 self._violation(now, f"our mode taken from mode {self.mode}, armed={self.armed}")
             elif now - self._zeros_since < LEAD_IN or now - self._setpoint_at > GAP:
                 self._violation(now, "our mode asked for before a second of zeros")
+        elif self.batches and now == self._mode_at:
+            pass  # it left in the step in which the news came, and perhaps before them
         elif self.mode not in (ways.hold, ways.ours) and (
-            self.armed or self.mode not in ways.manual
+            (self.armed and now - self._client_arms_at > BY_CLIENT) or self.mode not in ways.manual
         ):
             self._violation(now, f"our mode taken from mode {self.mode}")
 
@@ -389,8 +439,26 @@ class Observer:
         if moves:
             self._violation(now, f"passed in spite of STOP: {self._name(message)}")
 
+    def _keeps_moving(self, message: Any) -> float:
+        """Give how long, in seconds, the rover may move for a packet that nothing follows."""
+        kind, never = message.get_type(), -1e9
+        quiet = (self.ways.ours, self.ways.hold)  # modes in which it waits for more
+        if kind in SETPOINTS:
+            return ROVER_TIMEOUT if _moves(message) else never
+        if kind == "SET_MODE":
+            return never if message.custom_mode in quiet else FAR
+        if kind not in COMMANDS:
+            return FAR if kind in (*MOTION[2:], *BY_HAND) else never
+        if message.command == SET_MODE:
+            return never if self.ways.mode_of(message) in quiet else FAR
+        goes = message.command in MOVING_COMMANDS and not _is_to_stay(message)
+        return FAR if goes else never
+
     def _check_stop(self, now: float) -> None:
-        """Zero and HOLD left in the step in which STOP came."""
+        """Zero and HOLD left in the step in which STOP, or a pause, came."""
+        if self._hold_due is not None and now > self._hold_due:
+            self._violation(self._hold_due, "setpoint after a takeover: zero without HOLD")
+            self._hold_due = None
         if self._stop_due is not None and now > self._stop_due[0]:
             at, missing = self._stop_due
             self._stop_due = None

@@ -64,13 +64,19 @@ def wait_until(
     return answer
 
 
+def environment_with(**variables: str) -> dict[str, str]:
+    """Give our environment without its user's configuration, and with these variables."""
+    return {**os.environ, "MAV_TASKS_CONFIG": "", **variables}
+
+
 @contextmanager
 def process(
     *arguments: str, folder: Path, name: str, python: str = sys.executable
 ) -> Iterator[Process]:
     """Run a Python process while the block runs; it is killed if it is still there after it.
 
-    A server in it that is told no store has one in ``folder``: never its user's own.
+    A server in it that is told no store has one in ``folder``: never its user's own, and none of
+    its user's configuration and keys.
     """
     output = folder / f"{name}.log"
     with output.open("wb") as sink:
@@ -79,7 +85,9 @@ def process(
             stdout=sink,
             stderr=subprocess.STDOUT,
             cwd=folder,
-            env={**os.environ, "MAV_TASKS_STORE": str(folder / f"{name}.sqlite3")},
+            env=environment_with(
+                MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"), XDG_CONFIG_HOME=str(folder)
+            ),
         )
     running = Process(popen, output)
     try:
@@ -162,19 +170,24 @@ def stand(
     *serve_options: str,
     body: str = "kinematic",
     persona: str = "ardupilot",
+    serve_store: str = ":memory:",
+    client_options: str = "",
+    rover_options: tuple[str, ...] = (),
     way: Callable[[int], AbstractContextManager[str]] = udp_to,
 ) -> Iterator[Stand]:
     """Run a server and a rover of that make on ports of their own.
 
-    ``way`` makes of the rover's UDP port the URL by which the server is to reach it.
+    ``way`` makes of the rover's UDP port the URL by which the server is to reach it,
+    ``client_options`` stand behind the URL for clients.
     """
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", body, "--persona", persona]
-    rover += ["--truth", str(truth)]
-    serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client_port}"]
+    rover += ["--truth", str(truth), *rover_options]
+    serve = ["-m", "mav_tasks.cli", "serve"]
+    serve += ["--client", f"udpin:127.0.0.1:{client_port}{client_options}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]
-    serve += ["--store", ":memory:", *serve_options]
+    serve += ["--store", serve_store, *serve_options]
     with (
         process(*rover, folder=folder, name="rover") as rover_process,
         way(rover_port) as url,

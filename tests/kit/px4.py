@@ -29,6 +29,6 @@ def go_to(world: World, north: float, east: float, *, yaw: float = nan) -> int:
     return sent.task_id
 
 
-def ask_mode(client: FakeClient, mode: int) -> Sent:
+def ask_mode(client: FakeClient, mode: int, *, target: tuple[int, int] = (1, 1)) -> Sent:
     """Ask for a mode as MAVSDK does."""
-    return client.command(SET_MODE, 1 | ARMED, mode >> 16 & 0xFF, mode >> 24, target=(1, 1))
+    return client.command(SET_MODE, 1 | ARMED, mode >> 16 & 0xFF, mode >> 24, target=target)

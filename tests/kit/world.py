@@ -1,14 +1,18 @@
 """The virtual world of the scenarios: server, rovers and clients on one net, always observed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from math import degrees, hypot, remainder
+from pathlib import Path
 from typing import Any, TypeVar
 
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.recording.decisions import Decisions
 from mav_tasks.settings import Settings
 from mav_tasks.store import Store
 from mav_tasks.tasks.events import TaskChanged
@@ -83,7 +87,17 @@ class World(VirtualWorld):
         body: Callable[[Pose], Body] = kinematic_body,
         persona: Persona = PROMPT,
         shows_on_request: bool = True,
+        records: Path | None = None,
+        policies: Mapping[str, LinkPolicy] | None = None,
+        keys: tuple[Key, ...] | None = None,
+        wall_offset: float | None = None,
+        rover_key: Key | None = None,
     ) -> None:
+        """``records``: a folder, for a record of each server that there is.
+
+        With ``rover_key`` rovers sign, and hear only what is signed. The rest is InMemoryServer's.
+        """
+        self._policies, self._keys, self._wall_offset = policies, keys, wall_offset
         self.seed = seed
         self.watched = ObservedNet(seed=seed, conditions=conditions or Conditions())
         self.watched.shows_on_request = shows_on_request
@@ -95,7 +109,14 @@ class World(VirtualWorld):
         self.observers: list[Observer] = []
         for number in range(1, rovers + 1):
             start = Pose(east=3.0 * (number - 1))
-            vehicle = make_vehicle(body(start), system_id=number, now=0.0, persona=persona)
+            vehicle = make_vehicle(
+                body(start),
+                system_id=number,
+                now=0.0,
+                persona=persona,
+                unix_offset=wall_offset or 0.0,
+                key=rover_key,
+            )
             link = self.net.link(f"rover{number}")
             ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
             observer = self.watched.observers[link.name] = Observer(
@@ -108,7 +129,9 @@ class World(VirtualWorld):
             self.join(party)
         names = tuple(f"rover{number}" for number in range(1, rovers + 1))
         self._names, self._settings = names, settings
-        self.server = InMemoryServer(self.net, vehicles=names, settings=settings, store=store)
+        self._records = records
+        self.recorders: list[Decisions] = []
+        self.server = self._new_server(store, None)
         self.join(self.server)
         self.client = self.add_client("client")
 
@@ -185,17 +208,17 @@ class World(VirtualWorld):
     def start_server(self, store: Store, restored: Restored) -> None:
         """Start another server on what an earlier one had stored."""
         self.watched.is_server_away = False
-        self.server = InMemoryServer(
-            self.net,
-            vehicles=self._names,
-            settings=self._settings,
-            store=store,
-            restored=restored,
-            now=self.now,
-        )
+        self.watched.forget_unread()  # what came meanwhile came to nobody
+        self.server = self._new_server(store, restored)
         self.join(self.server)
         for observer in self.observers:
             observer.server_restarted()
+
+    def end_records(self) -> list[Path]:
+        """Give the records, complete, in the order of the servers."""
+        for recorder in self.recorders:
+            recorder.close()
+        return [recorder.path for recorder in self.recorders]
 
     # what a person at the rover does, and what breaks
 
@@ -316,6 +339,27 @@ class World(VirtualWorld):
         """Raise what any observer saw that must never be."""
         for observer in self.observers:
             observer.check()
+
+    def _new_server(self, store: Store | None, restored: Restored | None) -> InMemoryServer:
+        witnesses: list[Decisions] = []
+        if self._records is not None:
+            settings = self._settings or Settings()
+            witnesses = [
+                Decisions(self._records, settings, restored, now=self.now, size=100_000_000)
+            ]
+            self.recorders += witnesses
+        return InMemoryServer(
+            self.net,
+            vehicles=self._names,
+            settings=self._settings,
+            store=store,
+            restored=restored,
+            witnesses=witnesses,
+            policies=self._policies,
+            keys=self._keys,
+            wall_offset=self._wall_offset,
+            now=self.now,
+        )
 
     def _is_ready(self) -> bool:
         found = self.server.engine.snapshot(now=self.now).vehicles

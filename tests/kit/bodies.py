@@ -1,0 +1,39 @@
+"""Bodies with a fault of their own."""
+
+from rover_sim.body import Body, BodyState, Pose
+from tests.kit.world import kinematic_body
+
+
+class WeakBrakes:
+    """A body that slows down no faster than at ``braking`` m/s²; implements ``Body``."""
+
+    def __init__(self, start: Pose, *, braking: float) -> None:
+        self._body: Body = kinematic_body(start)
+        self._braking = braking
+        self._wanted = self._given = 0.0
+        self._yaw_rate = 0.0
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last ``advance``."""
+        return self._body.state
+
+    def drive(self, forward_speed: float, yaw_rate: float) -> None:
+        """Demand a motion."""
+        self._wanted, self._yaw_rate = forward_speed, yaw_rate
+
+    def advance(self, duration: float) -> None:
+        """Move on."""
+        least = self._braking * duration
+        before, wanted = self._given, self._wanted
+        if before > 0:
+            self._given = max(wanted, before - least)
+        elif before < 0:
+            self._given = min(wanted, before + least)
+        else:
+            self._given = wanted
+        self._body.drive(self._given, self._yaw_rate)
+        self._body.advance(duration)
+
+    def close(self) -> None:
+        """Nothing is held."""

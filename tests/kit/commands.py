@@ -1,0 +1,74 @@
+"""``mav-tasks`` as an operator or a script runs it."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mav_tasks.cli.app import main
+
+LIMIT = 40.0  # s
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A command that has ended."""
+
+    status: int
+    output: str
+    error: str
+
+    @property
+    def lines(self) -> list[str]:
+        """Give the lines of its output."""
+        return self.output.splitlines()
+
+    @property
+    def objects(self) -> list[Any]:
+        """Give the JSON objects of its output, one a line."""
+        return [json.loads(line) for line in self.lines]
+
+
+def called(*arguments: str, server: str = "") -> Done:
+    """Run a command within this process: the same, without the second that a process takes."""
+    output, error = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    status: object = None
+    with redirect_stdout(output), redirect_stderr(error):
+        try:
+            main([*arguments, *(("--server", server) if server else ())])
+        except SystemExit as end:
+            status = end.code
+    texts = []
+    for stream in (output, error):
+        stream.seek(0)
+        texts.append(stream.read())
+    assert isinstance(status, int), status
+    return Done(status, *texts)
+
+
+def mav_tasks(
+    *arguments: str, server: str = "", folder: Path | None = None, **environment: str
+) -> Done:
+    """Run a command in pipes; ``server`` is the link to one, ``folder`` where it is run."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mav_tasks.cli", *arguments],
+        capture_output=True,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        timeout=LIMIT,
+        cwd=folder,
+        env=surroundings(server, **environment),
+        check=False,
+    )
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def surroundings(server: str, **environment: str) -> dict[str, str]:
+    """Give the environment of a command."""
+    own = {"MAV_TASKS_SERVER": server} if server else {}
+    return {**os.environ, "PYTHONIOENCODING": "utf-8", **own, **environment}

@@ -1,0 +1,59 @@
+"""How large what a server remembers may become: every container in it, found by walking it."""
+
+from collections import deque
+from collections.abc import Iterator, Sized
+from typing import Any
+
+#: entries; what is bounded by something else is named below
+MOST = 1_000
+#: by the name of the attribute that holds it; each has a constant of its own
+LARGER = {
+    "_finished": 10_000,
+    "_tasks": 12_000,
+    "_last_event": 12_000,
+    "_next": 1_100,  # sources of packets, see SequenceKeeper
+    "_offset": 1_100,
+    "_last": 8_000,  # streams: some 30 messages of each component that there can be of a vehicle
+}
+LEAVES = (str, bytes, int, float, bool, type(None))
+CONTAINERS = (list, dict, set, frozenset, deque, tuple)
+
+
+def too_large(root: object) -> Iterator[str]:
+    """Give the containers that hold more than they may, by the way to them."""
+    for path, container in containers(root):
+        name = path.rpartition(".")[2]
+        if len(container) > LARGER.get(name, MOST):
+            yield f"{path} holds {len(container)}"
+
+
+def containers(root: object) -> Iterator[tuple[str, Sized]]:
+    """Give every container that can be reached from an object of ours, and where it is."""
+    return ((path, each) for path, each in reachable(root) if isinstance(each, CONTAINERS))
+
+
+def reachable(root: object) -> Iterator[tuple[str, Any]]:
+    """Give everything that objects of ours and containers in them hold, each once, and where."""
+    seen: set[int] = set()
+    waiting: list[tuple[str, Any]] = [(type(root).__name__, root)]
+    while waiting:
+        path, value = waiting.pop()
+        if id(value) in seen or isinstance(value, type):
+            continue
+        seen.add(id(value))
+        yield path, value
+        if isinstance(value, LEAVES):
+            continue
+        if isinstance(value, CONTAINERS):
+            inner = [*value.keys(), *value.values()] if isinstance(value, dict) else value
+            waiting += [(f"{path}[]", each) for each in inner]
+        elif type(value).__module__.startswith("mav_tasks"):
+            waiting += [(f"{path}.{name}", each) for name, each in _attributes(value)]
+
+
+def _attributes(value: object) -> Iterator[tuple[str, Any]]:
+    yield from getattr(value, "__dict__", {}).items()
+    for kind in type(value).__mro__:
+        for name in getattr(kind, "__slots__", ()):
+            if hasattr(value, name):
+                yield name, getattr(value, name)

@@ -1,0 +1,86 @@
+"""A disk that outlives servers, and the store of each: slow, failing, and killed with its server.
+
+What a killed server had committed is on the disk, and nothing else. It is written by the code that
+writes the real file, when the next server asks for it, so that virtual time costs no real disk.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from mav_tasks.settings import Retention
+from mav_tasks.store import Kept, NotKept, Outcome
+from mav_tasks.store.batch import Batch
+from mav_tasks.store.codec import Encoder
+from mav_tasks.store.database import Database
+from mav_tasks.store.reading import read_restored
+from mav_tasks.store.retention import Trimmer
+from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.restored import Restored
+from tests.kit.store import LateStore
+
+
+class Disk:
+    """One store file. Times are the world's; ``wall_offset`` is UTC less these, s."""
+
+    def __init__(self, path: Path, *, wall_offset: float) -> None:
+        self.path = path
+        self.wall_offset = wall_offset
+        self._database = Database(path)
+        self._encoder = Encoder()
+
+    def write(self, events: Sequence[Event], *, now: float) -> None:
+        """Make events durable, in order."""
+        if events:
+            batch = Batch(
+                events,
+                first=self._database.last_number + 1,
+                encoder=self._encoder,
+                format_id=self._database.format_id,
+                offset=self.wall_offset,
+            )
+            self._database.write(batch, utc=now + self.wall_offset)
+
+    def forget(self, retention: Retention, *, now: float) -> None:
+        """Forget all that may be forgotten."""
+        trimmer = Trimmer(retention)
+        while self._database.trim(trimmer, utc=now + self.wall_offset):
+            pass
+
+    def load(self, *, ended_well: bool, idle: float) -> Restored:
+        """Give what the next server finds."""
+        return read_restored(self.path, offset=self.wall_offset, ended_well=ended_well, idle=idle)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._database.close(utc=None)
+
+
+class UncertainStore(LateStore):
+    """Implements ``Store`` for one server; may fail for a while."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.broken_until = 0.0
+        self.kept = 0  # events that the server was told are durable
+        self._says_so = False
+
+    def break_for(self, seconds: float) -> None:
+        """Let the disk refuse everything for so long."""
+        self.broken_until = self.clock() + seconds
+        self._says_so = True
+
+    def take_outcomes(self) -> list[Outcome]:
+        """Give what became of events; while it is broken, that once."""
+        if self.clock() < self.broken_until:
+            said, self._says_so = self._says_so, False
+            return [NotKept("the disk is full")] if said else []
+        outcomes = super().take_outcomes()
+        self.kept = max((o.through for o in outcomes if isinstance(o, Kept)), default=self.kept)
+        return outcomes
+
+    def committed(self) -> list[Event]:
+        """Give what would survive if the machine stopped now: perhaps more than was told."""
+        if self.clock() < self.broken_until:
+            return self.events[: self.kept]
+        due = (end for at, end in self._under_way if at + self.delay <= self.clock())
+        return self.events[: max(due, default=self.kept)]

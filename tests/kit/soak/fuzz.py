@@ -1,0 +1,122 @@
+"""Bytes for the targets: the corpus as it is, the corpus changed, and anything at all.
+
+Hypothesis makes them, and makes what fails small. What failed once is a file of the corpus, and is
+tried first from then on.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from zlib import crc32
+
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+
+from tests.kit.soak.targets import TARGETS, Target
+
+CORPUS = Path(__file__).resolve().parents[2] / "vectors" / "fuzz"
+EXAMPLES = 400  # of one target, between two looks at the clock
+LONGEST = 2_000  # bytes
+
+
+def corpus_of(name: str) -> list[bytes]:
+    """Give the files of a target, by their names."""
+    return [path.read_bytes() for path in sorted((CORPUS / name).iterdir())]
+
+
+def inputs(samples: list[bytes]) -> st.SearchStrategy[bytes]:
+    """Give what to try: bytes, and samples of which pieces are cut, doubled, moved or replaced."""
+    pieces = st.one_of(
+        st.binary(max_size=12),
+        st.text(max_size=8).map(lambda text: text.encode("utf-8", "replace")),
+        st.sampled_from(samples).flatmap(
+            lambda sample: st.tuples(
+                st.integers(0, len(sample)), st.integers(0, min(60, len(sample)))
+            ).map(lambda cut: sample[cut[0] : cut[0] + cut[1]])
+        ),
+        st.integers(-(2**70), 2**70).map(lambda number: str(number).encode()),
+    )
+    edit = st.tuples(st.floats(0, 1), st.integers(0, 40), pieces)
+
+    def edited(sample: bytes, edits: list[tuple[float, int, bytes]]) -> bytes:
+        for where, length, piece in edits:
+            at = int(where * len(sample))
+            sample = sample[:at] + piece + sample[at + length :]
+        return sample[:LONGEST]
+
+    changed = st.builds(edited, st.sampled_from(samples), st.lists(edit, min_size=1, max_size=6))
+    return st.one_of(changed, changed, changed, st.binary(max_size=600))
+
+
+def fuzz(name: str, *, examples: int, number: int) -> None:
+    """Try the corpus of a target, then so many changed; raises what the target raises."""
+    target = TARGETS[name]
+    samples = corpus_of(name)
+    for sample in samples:
+        target(sample)
+    _try(target, samples, examples=examples, number=number)
+
+
+def fuzz_for(seconds: float, *, seed: int, say: Callable[[str], None]) -> list[str]:
+    """Fuzz all targets in turn for so long; gives each failure, which is in the corpus then."""
+    end = time.monotonic() + seconds
+    crashes: dict[str, str] = {}
+    tried = dict.fromkeys(TARGETS, 0)
+    said_at = 0.0
+    for number in _numbers(seed):
+        for name in TARGETS:
+            if time.monotonic() >= end:
+                say(", ".join(f"{each} {count}" for each, count in tried.items()))
+                return list(crashes.values())
+            if name in crashes:
+                continue
+            try:
+                fuzz(name, examples=EXAMPLES, number=number)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is what is looked for
+                crashes[name] = f"{name}, seed {number}: {type(error).__name__}: {error}"
+                say(crashes[name])
+            tried[name] += EXAMPLES
+        if time.monotonic() > said_at + 30:
+            said_at = time.monotonic()
+            say(f"{sum(tried.values())} inputs, {end - said_at:.0f} s left, {len(crashes)} failed")
+    raise AssertionError("numbers never end")
+
+
+def _try(target: Target, samples: list[bytes], *, examples: int, number: int) -> None:
+    failed: list[bytes] = []
+
+    @seed(number)
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        phases=(Phase.generate, Phase.shrink),
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(inputs(samples))
+    def once(data: bytes) -> None:
+        try:
+            target(data)
+        except Exception:
+            failed[:] = [data]
+            raise
+
+    try:
+        once()
+    except Exception:
+        if failed:  # the last, and so the smallest
+            keep(target.__name__, failed[0])
+        raise
+
+
+def keep(name: str, data: bytes) -> Path:
+    """Put an input that failed into the corpus."""
+    path = CORPUS / name / f"crash-{crc32(data):08x}"
+    path.write_bytes(data)
+    return path
+
+
+def _numbers(first: int) -> Iterator[int]:
+    while True:
+        yield first
+        first += 1

@@ -1,0 +1,198 @@
+"""A world that lives long: links go down, servers end and come back, rules hold at each step."""
+
+from collections import Counter
+from collections.abc import Iterator
+from math import ceil, inf
+from pathlib import Path
+from zlib import crc32
+
+from mav_tasks.engine.inputs import WallClock
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Conditions
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason
+from rover_sim.personas import Persona
+from tests.kit.client import ACCEPTED, DRIVE, MOVE, ROTATE, TASK_STATUS, FakeClient, TaskStatus
+from tests.kit.mission import MISSION_ACK, Ack
+from tests.kit.soak.bounds import too_large
+from tests.kit.soak.disk import Disk, UncertainStore
+from tests.kit.soak.ledger import Ledger
+from tests.kit.soak.stillness import Stillness
+from tests.kit.world import World
+
+UTC = 1.8e9  # s, when the worlds begin
+GRAIN = 0.01  # s; what is due within it is done together, as by a machine with other things to do
+CONTROL_STEP = 0.025  # s, between two looks at where the rovers are
+FORGET = 5.0  # s, after which nobody looks back at what clients heard
+LOOK_THROUGH = 20.0  # s, between two walks through all that the server remembers
+TASK_COMMANDS = (MOVE, ROTATE, DRIVE)
+
+
+class Violation(AssertionError):
+    """A rule was broken; the text says which, when, and of what seed."""
+
+
+class SoakWorld(World):
+    """A World with a disk that outlives its servers. Rules are judged after each step of time."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        seed: int,
+        rovers: int,
+        persona: Persona,
+        conditions: Conditions,
+        settings: Settings | None = None,
+    ) -> None:
+        self.disk = Disk(folder / "tasks.sqlite3", wall_offset=UTC)
+        self.disk_store = UncertainStore()
+        super().__init__(
+            seed=seed,
+            conditions=conditions,
+            settings=settings,
+            store=self.disk_store,
+            rovers=rovers,
+            persona=persona,
+        )
+        self.ledger = Ledger()
+        self.clients: list[FakeClient] = [self.client]
+        self.faults: Counter[str] = Counter()
+        self.packets = 0
+        self.digest = 0  # of every packet that was sent, in order
+        self.restarts = 0
+        self._down_until: dict[str, float] = {}
+        self._stillness = [
+            Stillness(vehicle, observer)
+            for vehicle, observer in zip(self.rovers, self.observers, strict=True)
+        ]
+        self._followed = 0  # events of the present server
+        self._read: dict[str, int] = {}  # packets of each client
+        self._look_at = self._compare_at = self._forget_at = self._walk_at = 0.0
+        for observer in self.observers:
+            observer.expects_gaps = observer.batches = True
+        self.watched.loses = self._passes_by
+        self.watch(self._judge)
+
+    def next_due(self) -> float | None:
+        """Give when the next thing is due, in whole grains."""
+        due = super().next_due()
+        return None if due is None else max(due, ceil(due / GRAIN - 1e-6) * GRAIN)
+
+    # what breaks
+
+    def link_down(self, number: int, seconds: float) -> None:
+        """Let nothing pass between the server and a rover for so long."""
+        self.faults["link down"] += 1
+        self._down_until[f"rover{number}"] = self.now + seconds
+        self.disturb(number, seconds)
+
+    def disturb(self, number: int, seconds: float = 0.0) -> None:
+        """Note that a rover may not hear the server until so many seconds from now."""
+        for still in self._stillness:
+            if number in (0, still.observer.system_id):
+                still.disturbed_at = max(still.disturbed_at, self.now + seconds)
+
+    def step_wall_clock(self, seconds: float) -> None:
+        """Let the clock on the wall of the server's machine jump."""
+        self.faults["wall clock jumps"] += 1
+        self.disk.wall_offset += seconds
+        self.server.pump.handle(WallClock(self.disk.wall_offset), now=self.now)
+        self.server.pump.turn(now=self.now)
+
+    def restart(self, *, away: float) -> None:
+        """Let the server be killed, and another go on with what the disk has."""
+        self.faults["server killed"] += 1
+        self.restarts += 1
+        self._follow()
+        self.disk.write(self.disk_store.committed(), now=self.now)
+        self.end_server()
+        killed_at = self.now
+        self.disturb(0, away + 1.0)
+        self.run(away)
+        restored = self.disk.load(ended_well=False, idle=away)
+        self._raise(self.ledger.restart(restored.tasks, killed_at=killed_at))
+        self._followed = 0
+        delay = self.disk_store.delay
+        self.disk_store = UncertainStore()
+        self.disk_store.delay, self.disk_store.clock = delay, lambda: self.now
+        self.start_server(self.disk_store, restored)
+        for observer in self.observers:
+            paused = restored.paused.get(observer.system_id)
+            observer.stopped = paused is TaskReason.STOPPED
+            # of a takeover that did not reach the disk the next server knows nothing
+            observer.taken_over &= paused is TaskReason.TAKEOVER
+
+    # who takes part
+
+    def add_soaked_client(self, name: str, *, system_id: int) -> FakeClient:
+        """Let a client take part whose acks count."""
+        client = self.add_client(name, system_id=system_id)
+        self.clients.append(client)
+        return client
+
+    # rules
+
+    def judge_all(self) -> None:
+        """Judge everything now, also what is looked at now and then only."""
+        self._look_at = self._compare_at = self._walk_at = -inf
+        self._judge(self.now)
+
+    def _judge(self, now: float) -> None:
+        self._follow()
+        if now >= self._look_at:
+            self._look_at = now + CONTROL_STEP
+            for still in self._stillness:
+                self._raise(still.look(now))
+            for observer in self.observers:
+                if observer.violations:
+                    self._raise(iter([f"rover {observer.system_id}: {observer.violations[0]}"]))
+        if now >= self._compare_at:
+            self._compare_at = now + 1.0
+            self._raise(self.ledger.compare(self.server.engine.snapshot(now=now).tasks))
+        if now >= self._walk_at:
+            self._walk_at = now + LOOK_THROUGH
+            self._raise(too_large(self.server.engine))
+        if now >= self._forget_at:
+            self._forget_at = now + FORGET
+            self._forget()
+
+    def _follow(self) -> None:
+        """Take what the server has written down and what clients have heard since the last step."""
+        events = self.disk_store.events
+        if self._followed < len(events):
+            self._raise(self.ledger.follow(events[self._followed :]))
+            self._followed = len(events)
+        for client in self.clients:
+            heard = client.received
+            for packet in heard[self._read.get(client.name, 0) :]:
+                if packet.message_id == TASK_STATUS:
+                    status = TaskStatus.of(packet.payload)
+                    self._raise(self.ledger.tell(status, client.name))
+                elif packet.message_id == MISSION_ACK:
+                    ack = Ack.of(packet.payload)
+                    if ack.result == ACCEPTED and ack.opaque_id and not ack.kind:
+                        self._raise(self.ledger.accept(ack.opaque_id, client.name))
+            self._read[client.name] = len(heard)
+            for answer in client.acks:
+                if answer.command in TASK_COMMANDS and answer.result == ACCEPTED:
+                    self._raise(self.ledger.accept(answer.result_param2, client.name))
+            client.acks.clear()
+
+    def _forget(self) -> None:
+        for client in self.clients:
+            client.received.clear()
+            self._read[client.name] = 0
+        for observer in self.observers:
+            observer.driven.clear()
+            observer.reached.clear()
+
+    def _passes_by(self, source: str, target: str, data: bytes) -> bool:
+        self.packets += 1
+        self.digest = crc32(f"{self.now!r} {source} {target} ".encode() + data, self.digest)
+        rover = target if source == VEHICLE_LINK else source
+        return self._down_until.get(rover, -inf) > self.now
+
+    def _raise(self, faults: Iterator[str]) -> None:
+        for text in faults:
+            raise Violation(f"seed {self.seed}, {self.now:.3f} s: {text}\n{self.describe()}")
