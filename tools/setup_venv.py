@@ -60,11 +60,11 @@ def set_up() -> None:
             STAMP.write_text(UNFINISHED, encoding="utf-8")
         _run(
             "2/4 installing the pinned packages (minutes, the first time)",
-            _pip_install("-r", str(LOCK)),
+            _pip_install("--require-hashes", "-r", str(LOCK)),
         )
         _run(
             "3/4 installing what is pinned without its dependencies",
-            _pip_install("--no-deps", "-r", str(LOCK_WITHOUT_DEPENDENCIES)),
+            _pip_install("--require-hashes", "--no-deps", "-r", str(LOCK_WITHOUT_DEPENDENCIES)),
         )
         _run(
             "4/4 installing mav-tasks itself, editable, with its MAVLink dialect",
