@@ -7,13 +7,15 @@ Everything is on loopback, bounded in count and time. ``--profile FILE`` with on
 import argparse
 from collections.abc import Callable
 
-from . import commands, forwarding, queue, setpoints, simulation, start, stop, uploads
+from . import commands, floods, forwarding, queue, setpoints, simulation, start, stop, uploads
 from .table import Row, render
 
 MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "commands": commands.measure,
     "durable": commands.measure_durable,
+    "recorded": commands.measure_recorded,
     "stop": stop.measure,
+    "floods": floods.measure,
     "setpoints": setpoints.measure,
     "queue": queue.measure,
     "forwarding": forwarding.measure,

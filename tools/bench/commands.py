@@ -79,6 +79,23 @@ def measure_durable() -> list[Row]:
     return [*rows, rate]
 
 
+def measure_recorded() -> list[Row]:
+    """Give latency and rate with each kind of record, beside those without any."""
+    packets = _packets()
+    without = _server(packets)
+    rows: list[Row] = []
+    with TemporaryDirectory() as folder:
+        for option, words in (("--tlog", "telemetry log"), ("--record", "decisions")):
+            kept = _server(packets, option, folder)
+            row = _latency(f"command → ack, p50, {words}", kept[0], without[0], goal=None)
+            rows.append(replace(row, yardstick=row.yardstick.replace("echo", "without")))
+            rate = f"acks, {OUTSTANDING} outstanding, {words}"
+            yardstick = f"{without[2]:,.0f} /s without"
+            ratio = f"{kept[2] / without[2]:.0%}"
+            rows.append(Row(rate, f"{kept[2]:,.0f} /s", yardstick, ratio, "", None))
+    return rows
+
+
 def _echo(packets: list[bytes]) -> tuple[float, float, float]:
     port = free_port()
     with child("bare", "echo", str(port)), udp_socket() as client:

@@ -62,7 +62,7 @@ def meet(vehicle: ScriptedVehicle, client: socket.socket, server: tuple[str, int
     while vehicle.answer(wait=QUIET) or vehicle.server is None:
         if monotonic() > end:
             break
-    client.sendto(Encoder(CLIENT).encode(_ground_station()), server)
+    client.sendto(Encoder(CLIENT).encode(ground_station()), server)
     client.recv(2048)  # the vehicle's heartbeat: the server has introduced it
 
 
@@ -71,5 +71,6 @@ def loopback(port: int) -> tuple[str, int]:
     return (HOST, port)
 
 
-def _ground_station() -> m.Heartbeat:
+def ground_station() -> m.Heartbeat:
+    """Give the heartbeat of a ground station."""
     return m.Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)

@@ -1,17 +1,18 @@
 """A real server on loopback with room for every task of a measurement, and no thinning.
 
-``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [--store FILE] [--profile FILE] [--drive]``.
-With ``--profile``, cProfile's figures of the whole run are written to that file. With ``--drive``
-the server arms and drives; otherwise no task is ever begun. When it ends it prints, as JSON, by
-how many seconds each interval between two setpoints that move one vehicle missed 1/20 s: a zero
-that ends the drive leaves at once, whenever that is.
+``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [--store FILE] [--profile FILE] [--drive]
+[--tlog FOLDER] [--record FOLDER] [--default-limits]``.
+Unless ``--default-limits`` is said, no client is limited in what it may send. With ``--profile``,
+cProfile's figures of the whole run are written to that file. With ``--drive`` the server arms and
+drives; otherwise no task is ever begun. When it ends it prints, as JSON, by how many seconds each
+interval between two setpoints that move one vehicle missed 1/20 s: a zero that ends the drive
+leaves at once, whenever that is.
 """
 
 import argparse
 import asyncio
 import cProfile
 import json
-import logging
 import sys
 import time
 
@@ -19,10 +20,12 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl
+from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink import messages as m
+from mav_tasks.recording import witnesses
 from mav_tasks.runner import Runner
 from mav_tasks.serve import tame_collector
-from mav_tasks.settings import Clients, Queueing, Settings
+from mav_tasks.settings import Clients, Limits, Log, Queueing, Recording, Roles, Settings
 from mav_tasks.store import MemoryStore
 from mav_tasks.store.sqlite import SqliteStore
 
@@ -58,27 +61,33 @@ class TimedLink(UdpLink):
                 self.errors.append(abs(interval - PERIOD))
 
 
-def _settings(*, drives: bool) -> Settings:
+def _settings(*, drives: bool, is_limited: bool) -> Settings:
+    unlimited = Limits(quota=10_000_000, rate=1e9)
     return Settings(
         queueing=Queueing(capacity=10_000_000, quota=10_000_000),
-        clients=Clients(stream_interval=0.0),
+        clients=Clients() if is_limited else Clients(stream_interval=0.0, packet_rate=1e9),
+        roles=Roles() if is_limited else Roles(safety=unlimited),
         arming="server" if drives else "operator",
     )
 
 
 async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(message)s")
     store = (
         SqliteStore(options.store, wall_offset=lambda: time.time() - time.monotonic())
         if options.store
         else MemoryStore()
     )
     now = asyncio.get_running_loop().time()
-    engine = Engine(_settings(drives=options.drive), now=now)
+    settings = _settings(drives=options.drive, is_limited=options.default_limits)
+    engine = Engine(settings, now=now)
+    recording = Recording(tlog=options.tlog, decisions=options.record)
+    recorders = witnesses(recording, settings, None, now=now)
     tame_collector()
     clients = [UdpLink(LinkUrl("udpin", HOST, options.client_port))]
     print(READY, flush=True)
-    return await Runner(engine, store, clients=clients, vehicles=[vehicle_link]).run()
+    return await Runner(
+        engine, store, clients=clients, vehicles=[vehicle_link], witnesses=recorders
+    ).run()
 
 
 def main() -> int:
@@ -87,16 +96,20 @@ def main() -> int:
     parser.add_argument("client_port", type=int)
     parser.add_argument("vehicle_port", type=int)
     parser.add_argument("--store")
+    parser.add_argument("--tlog", default="")
+    parser.add_argument("--record", default="")
     parser.add_argument("--profile")
     parser.add_argument("--drive", action="store_true")
+    parser.add_argument("--default-limits", action="store_true")
     options = parser.parse_args()
     link = TimedLink(LinkUrl("udpout", HOST, options.vehicle_port))
-    if options.profile is None:
-        code = asyncio.run(_serve(options, link))
-    else:
-        profiler = cProfile.Profile()
-        code = profiler.runcall(asyncio.run, _serve(options, link))
-        profiler.dump_stats(options.profile)
+    with log_to_stderr(Log()):
+        if options.profile is None:
+            code = asyncio.run(_serve(options, link))
+        else:
+            profiler = cProfile.Profile()
+            code = profiler.runcall(asyncio.run, _serve(options, link))
+            profiler.dump_stats(options.profile)
     print(json.dumps(link.errors), flush=True)
     return code
 
