@@ -12,10 +12,14 @@ ROOT = Path(__file__).resolve().parent.parent
 MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.errors": frozenset(),
     "mav_tasks.settings": frozenset(),
+    "mav_tasks.setting_keys": frozenset({"mav_tasks.settings", "mav_tasks.errors"}),
     "mav_tasks.mavlink": frozenset({"mav_tasks.errors"}),
-    "mav_tasks.plan_files": frozenset({"mav_tasks.mavlink", "mav_tasks.errors"}),
+    "mav_tasks.whole_file": frozenset(),
+    "mav_tasks.plan_files": frozenset(
+        {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
+    ),
     "mav_tasks.services": frozenset(
-        {"mav_tasks.mavlink", "mav_tasks.settings", "mav_tasks.errors"}
+        {"mav_tasks.mavlink", "mav_tasks.setting_keys", "mav_tasks.settings", "mav_tasks.errors"}
     ),
     "mav_tasks.tasks": frozenset({"mav_tasks.errors", "mav_tasks.settings"}),
     "mav_tasks.engine": frozenset(
@@ -29,8 +33,48 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.links": frozenset({"mav_tasks.errors"}),
     "mav_tasks.store": frozenset({"mav_tasks.tasks", "mav_tasks.settings", "mav_tasks.errors"}),
+    "mav_tasks.witness": frozenset({"mav_tasks.engine", "mav_tasks.tasks"}),
+    "mav_tasks.recording": frozenset(
+        {
+            "mav_tasks.logs",
+            "mav_tasks.witness",
+            "mav_tasks.engine",
+            "mav_tasks.store",
+            "mav_tasks.tasks",
+            "mav_tasks.mavlink",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.logs": frozenset(
+        {
+            "mav_tasks.engine",
+            "mav_tasks.tasks",
+            "mav_tasks.services",
+            "mav_tasks.mavlink",
+            "mav_tasks.store",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.pump": frozenset(
+        {
+            "mav_tasks.logs",
+            "mav_tasks.witness",
+            "mav_tasks.engine",
+            "mav_tasks.store",
+            "mav_tasks.tasks",
+        }
+    ),
+    "mav_tasks.link_keys": frozenset(
+        {"mav_tasks.key_ring", "mav_tasks.links", "mav_tasks.settings", "mav_tasks.errors"}
+    ),
     "mav_tasks.runner": frozenset(
         {
+            "mav_tasks.mavlink",
+            "mav_tasks.pump",
+            "mav_tasks.logs",
+            "mav_tasks.witness",
             "mav_tasks.engine",
             "mav_tasks.links",
             "mav_tasks.store",
@@ -40,6 +84,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.in_memory": frozenset(
         {
+            "mav_tasks.mavlink",
+            "mav_tasks.pump",
+            "mav_tasks.witness",
             "mav_tasks.engine",
             "mav_tasks.links",
             "mav_tasks.store",
@@ -48,30 +95,123 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.tasks",
         }
     ),
+    "mav_tasks.config": frozenset(
+        {
+            "mav_tasks.links",
+            "mav_tasks.services",
+            "mav_tasks.setting_keys",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.key_ring": frozenset(
+        {"mav_tasks.config", "mav_tasks.mavlink", "mav_tasks.settings", "mav_tasks.errors"}
+    ),
     "mav_tasks.serve": frozenset(
         {
+            "mav_tasks.config",
+            "mav_tasks.key_ring",
+            "mav_tasks.link_keys",
+            "mav_tasks.witness",
+            "mav_tasks.logs",
             "mav_tasks.engine",
             "mav_tasks.links",
             "mav_tasks.store",
             "mav_tasks.settings",
             "mav_tasks.tasks",
+            "mav_tasks.recording",
             "mav_tasks.runner",
             "mav_tasks.errors",
         }
     ),
-    "mav_tasks.qgc_actions": frozenset({"mav_tasks.mavlink", "mav_tasks.errors"}),
-    "mav_tasks.cli": frozenset({"mav_tasks.serve", "mav_tasks.qgc_actions", "mav_tasks.errors"}),
-    "rover_sim": frozenset({"mav_tasks.mavlink", "mav_tasks.links"}),
+    "mav_tasks.client": frozenset(
+        {
+            "mav_tasks.services",
+            "mav_tasks.mavlink",
+            "mav_tasks.links",
+            "mav_tasks.plan_files",
+            "mav_tasks.tasks",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.qgc_actions": frozenset(
+        {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
+    ),
+    "mav_tasks.probe": frozenset(
+        {
+            "mav_tasks.engine",
+            "mav_tasks.tasks",
+            "mav_tasks.services",
+            "mav_tasks.mavlink",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.probing": frozenset(
+        {
+            "mav_tasks.client",
+            "mav_tasks.probe",
+            "mav_tasks.links",
+            "mav_tasks.mavlink",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.cli": frozenset(
+        {
+            "mav_tasks.config",
+            "mav_tasks.key_ring",
+            "mav_tasks.logs",
+            "mav_tasks.store",
+            "mav_tasks.tasks",
+            "mav_tasks.serve",
+            "mav_tasks.recording",
+            "mav_tasks.qgc_actions",
+            "mav_tasks.probe",
+            "mav_tasks.probing",
+            "mav_tasks.client",
+            "mav_tasks.plan_files",
+            "mav_tasks.mavlink",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
+    "rover_sim": frozenset(
+        {"mav_tasks.mavlink", "mav_tasks.links", "mav_tasks.key_ring", "mav_tasks.errors"}
+    ),
+    "rover_sim.testing": frozenset(
+        {
+            "rover_sim",
+            "mav_tasks.client",
+            "mav_tasks.in_memory",
+            "mav_tasks.links",
+            "mav_tasks.mavlink",
+            "mav_tasks.settings",
+            "mav_tasks.store",
+            "mav_tasks.tasks",
+        }
+    ),
+    "rover_sim.demo": frozenset(
+        {
+            "rover_sim",
+            "mav_tasks.in_memory",
+            "mav_tasks.links",
+            "mav_tasks.recording",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
 }
 
 #: pure: no I/O, no clock, no chance
 PURE = (
     "mav_tasks.errors",
     "mav_tasks.settings",
+    "mav_tasks.setting_keys",
     "mav_tasks.mavlink",
     "mav_tasks.services",
     "mav_tasks.tasks",
     "mav_tasks.engine",
+    "mav_tasks.probe",
     "rover_sim.autopilot",
 )
 BANNED_IN_PURE = frozenset(
@@ -122,7 +262,8 @@ def layer_of(module: str) -> str | None:
     """The rule that a module falls under, or None for what is not ours."""
     parts = module.split(".")
     if parts[0] == "rover_sim":
-        return "rover_sim"
+        parts = parts[:2] if parts[1:2] in (["testing"], ["demo"]) else parts[:1]
+        return ".".join(parts)
     return ".".join(parts[:2]) if parts[0] == "mav_tasks" and len(parts) > 1 else None
 
 
@@ -189,3 +330,10 @@ def test_the_rules_are_able_to_fail(tmp_path: Path) -> None:
         "mav_tasks.engine.engine",
     ]
     assert "time" in set(imports_of(bad))
+
+
+def test_the_simulator_itself_knows_neither_the_server_nor_its_plugin(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.py"
+    bad.write_text("import mav_tasks.in_memory\nimport rover_sim.testing.lossy\n", "utf-8")
+    assert violations("rover_sim.bad", bad) == ["mav_tasks.in_memory", "rover_sim.testing.lossy"]
+    assert violations("rover_sim.testing.bad", bad) == []

@@ -2,14 +2,18 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.kit.commands import mav_tasks
 from tests.kit.mavproxy import mavproxy
-from tests.kit.processes import stand
+from tests.kit.plugin_example import EXAMPLE
+from tests.kit.processes import free_tcp_ports, free_udp_ports, process, stand
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -23,6 +27,12 @@ COMMANDS = {
     "mav-tasks serve": "tests/e2e/test_by_hand.py",
     "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }
+
+#: the part of the README that is run from its first command to its last, by one stranger
+TOUR = README[README.index("## Ten minutes") : README.index("## From a script")]
+#: the parts that are run after a server has written records into the folder that they name
+FILES = README[README.index("### Configuration") : README.index("### Is this rover one for it?")]
+KEYS = README[README.index("### Keys and roles") : README.index("### Log, journal, recordings")]
 
 
 #: what MAVProxy says after each of the lines shown
@@ -45,18 +55,108 @@ def blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
+def commands(text: str) -> list[str]:
+    """Give the commands of its console blocks."""
+    return re.findall(r"^\$ (.*)$", "".join(blocks("console", text)), flags=re.MULTILINE)
+
+
+def is_test(block: str) -> bool:
+    """Whether a block is for pytest."""
+    return "\ndef test_" in block
+
+
 #: each example by itself, and what it prints; those of the wire contract go on from one another
 EXAMPLES = [
-    *(pytest.param(block, "task 1", id=block.split("\n")[0]) for block in blocks("python")),
+    *(
+        pytest.param(block, "task 1", id=block.split("\n")[0])
+        for block in blocks("python")
+        if not is_test(block)
+    ),
     pytest.param("".join(blocks("python", CONTRACT)), "completed", id="dialects/README.md"),
 ]
 
 
 def test_every_command_is_run_somewhere() -> None:
-    shown = re.findall(r"^\$ (.*)$", "".join(blocks("console")), flags=re.MULTILINE)
-    assert set(shown) == set(COMMANDS)
+    run_here = {*commands(TOUR), *commands(FILES)}
+    assert set(commands(README)) - run_here == set(COMMANDS) - run_here
     for command, where in COMMANDS.items():
         assert command.removeprefix("mav-tasks ").strip("./") in (ROOT / where).read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(150)
+def test_the_tour_goes_as_it_is_told(tmp_path: Path) -> None:
+    (way,) = blocks("waypoints")
+    (tmp_path / "way.waypoints").write_text(way, encoding="ascii")
+    store = tmp_path / "tour.sqlite3"
+    with stand(tmp_path, serve_store=str(store)) as it:
+        run = partial(
+            mav_tasks,
+            server=f"udpout:127.0.0.1:{it.client_port}",
+            folder=tmp_path,
+            MAV_TASKS_STORE=str(store),
+        )
+        first, second, *tour = commands(TOUR)
+        assert (first, second) == ("mav-tasks sim", "mav-tasks serve")
+        for command in tour:
+            done = run(*shlex.split(command)[1:])
+            assert (done.status, done.error) == (0, ""), command
+            assert done.output.strip(), command
+        ended = {t["id"]: t["state"] for t in run("status", "7", "--json").objects}
+        assert ended == {7: "completed"}
+        for number in (1, 2, 3, 4):
+            (task,) = run("status", str(number), "--json").objects
+            assert (number, task["state"]) == (number, "completed")
+
+
+@pytest.mark.slow
+def test_configuration_and_records_are_as_it_is_told(tmp_path: Path) -> None:
+    said = commands(FILES)
+    serve = next(command for command in said if command.startswith("mav-tasks serve "))
+    replay = next(command for command in said if command.startswith("mav-tasks replay "))
+    with stand(tmp_path, *shlex.split(serve)[2:]) as it:
+        asked = mav_tasks("vehicles", server=f"udpout:127.0.0.1:{it.client_port}")
+        assert asked.status == 0
+        it.server.end()
+    (record,) = (tmp_path / "records").glob("*.decisions.gz")
+    assert list((tmp_path / "records").glob("*.tlog"))
+    stamp = r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ"
+    assert re.fullmatch(stamp + r"\.decisions\.gz", record.name)
+    named = re.sub(stamp, record.name.removesuffix(".decisions.gz"), replay)
+    for command in said:
+        if command not in (serve, replay):
+            arguments = shlex.split(command)[1:]
+            done = mav_tasks(*arguments, folder=tmp_path, XDG_CONFIG_HOME=str(tmp_path))
+            assert done.status == 0, command
+            assert not done.error or command in commands(KEYS), done.error
+    done = mav_tasks(*shlex.split(named)[1:], folder=tmp_path)
+    assert (done.status, done.error) == (0, "")
+    assert "same" in done.lines[-1]
+
+
+def test_the_test_of_a_stranger_is_the_one_that_is_run() -> None:
+    (shown,) = [block for block in blocks("python") if is_test(block)]
+    assert shown == EXAMPLE
+
+
+#: as they are, but for the ports of others
+SERVING = sorted(set(re.findall(r"`(mav-tasks serve --[^`]*)`", README)))
+
+
+@pytest.mark.parametrize("command", SERVING)
+def test_a_server_that_is_started_so_serves(command: str, tmp_path: Path) -> None:
+    client, vehicle = free_udp_ports(2)
+    (stream,) = free_tcp_ports(1)
+    arguments = shlex.split(command)[1:]
+    for old, new in (("14551", vehicle), ("14540", vehicle), ("5760", stream)):
+        arguments = [re.sub(rf":{old}$", f":{new}", argument) for argument in arguments]
+    arguments += ["--client", f"udpin:127.0.0.1:{client}", "--store", ":memory:"]
+    if "--no-push" not in arguments:
+        arguments.append("--no-push")
+    with process("-m", "mav_tasks.cli", *arguments, folder=tmp_path, name="serve") as server:
+        server.wait_for("store in memory")
+        server.end()
+        assert server.popen.returncode == 0
 
 
 @pytest.mark.parametrize(("example", "printed"), EXAMPLES)

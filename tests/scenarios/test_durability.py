@@ -127,3 +127,52 @@ def test_nobody_is_told_of_a_task_that_is_not_durable(world: World, store: LateS
     world.run(0.1)
     assert world.client.texts()[1] == "Task 1 queued: move 1 m"
     assert [s.task_id for s in world.client.statuses()][:1] == [1]
+
+
+@pytest.mark.parametrize(("delay", "told_after"), [(0.2, 0.2), (inf, 0.4)])
+@pytest.mark.parametrize("by", ["kill", "STOP"])
+def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
+    world: World, store: LateStore, by: str, delay: float, told_after: float
+) -> None:
+    world.client.move(2, nonce=1)
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    store.delay = delay
+    at = world.now
+    sent = world.client.command(54010, 1, 1) if by == "kill" else world.client.stop()
+    world.run(0.05)
+    assert sent.answer == (ACCEPTED, 1)
+    assert {"zero", "HOLD"} <= set(world.observer.sent_since(at))
+    world.run(told_after - 0.06)
+    assert world.state(1)[0] is S.KILLED
+    assert {status.state for status in world.client.statuses(1)} == {S.STARTING, S.EXECUTING}
+    world.run(0.05)
+    assert world.client.statuses(1)[-1].state == S.KILLED
+
+
+def test_an_end_is_not_told_by_news_of_the_same_step(world: World, store: LateStore) -> None:
+    world.client.move(2, nonce=1)
+    world.until_state(1, S.EXECUTING)
+    world.client.pause()
+    world.run(2)
+    store.delay = 0.2
+    world.client.command(54010, 1)  # cancelling, and cancelled as it stands
+    world.run(0.15)
+    assert world.state(1)[0] is S.CANCELLED
+    assert world.client.statuses(1)[-1].state == S.PAUSED
+    world.client.move(2, nonce=1)  # the same again, which is answered with the task's state
+    world.run(0.04)
+    assert world.client.statuses(1)[-1].state == S.PAUSED
+    world.run(0.1)
+    assert world.client.statuses(1)[-1].state == S.CANCELLED
+
+
+def test_the_state_that_is_asked_for_waits_for_nothing(world: World, store: LateStore) -> None:
+    world.client.move(2, nonce=1)
+    world.until_state(1, S.EXECUTING)
+    store.delay = inf
+    world.client.stop()
+    world.run(0.05)
+    world.client.request_status(1)
+    world.run(0.05)
+    assert world.client.statuses(1)[-1].state == S.KILLED

@@ -11,7 +11,7 @@ from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.client import TEMPORARILY_REJECTED
 from tests.kit.observer import Observer
-from tests.kit.world import World
+from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 
@@ -155,5 +155,9 @@ def test_a_server_that_vanishes_leaves_a_rover_that_stops_by_itself(world: World
     world.client.move(20, speed=1.0)
     world.run(4)
     world.leave(world.server)
-    world.run(6)
-    assert world.stands()
+    north = world.truth.north
+    world.until(world.stands, within=3.0 + 2.0)  # its time-out, and braking
+    assert world.truth.north - north < 1.0 * 3.0 + 1.0
+    where = world.pose()
+    world.run(5)
+    assert near_pose(world.pose(), where, metres=0.01)

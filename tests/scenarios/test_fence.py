@@ -4,6 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
+from mav_tasks.settings import Driving, Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -28,6 +29,8 @@ def box(command: int, south: float, west: float, north: float, east: float) -> l
 
 
 YARD = box(INCLUSION, -3, -3, 3, 3)
+SILENT_AT = 1.0  # m north, where it still drives fast
+LOCAL_POSITION_NED = 32
 POND = box(EXCLUSION, 1, -1, 2, 1)
 
 
@@ -114,6 +117,24 @@ def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: flo
     world.run(3)
     assert world.state(1) == (S.HELD, R.FENCE)
     assert 2.3 < abs(world.truth.north) < 3.0
+    assert world.stands()
+
+
+@pytest.mark.parametrize("fresh", [0.3, 1.0])
+def test_a_rover_that_falls_silent_before_the_boundary_stops_before_it(
+    fresh: float,
+) -> None:
+    """As long as its last words count as fresh it is driven on by them, wherever it is by then."""
+    watch = Watch(motion_fresh=fresh, position_lost=2.0)
+    # of nobody who observes it: he would not let it drive on data older than by default
+    world = World(settings=Settings(watch=watch, driving=Driving(acceleration=1.0))).ready()
+    fenced(world, *YARD)
+    world.client.command(DRIVE, 2.0, 0, 30, 0, 0, 0, 5)
+    world.until(lambda: world.truth.north > SILENT_AT, within=20)
+    assert world.truth.forward_speed > 0.9
+    world.fault(Faults(withheld=frozenset({LOCAL_POSITION_NED})))
+    world.run(4)
+    assert world.truth.north < 3.0
     assert world.stands()
 
 

@@ -31,6 +31,9 @@ LOSSES = {
     "everything": (Faults(silent=True), R.POSITION_LOST, 1.5),
     "position": (Faults(withheld=frozenset({POSITION})), R.POSITION_LOST, 1.5),
     "attitude": (Faults(withheld=frozenset({ATTITUDE})), R.POSITION_LOST, 1.5),
+    "all but heartbeats": (Faults(withheld=frozenset(range(1, 512))), R.POSITION_LOST, 1.5),
+    "numbers": (Faults(not_finite=True), R.POSITION_LOST, 1.5),
+    "the rover's clock": (Faults(clock_frozen=True), R.POSITION_LOST, 1.5),
     "frozen position": (Faults(position_frozen=True), R.POSITION_LOST, 1.5),
 }
 
@@ -159,7 +162,7 @@ def test_another_rover_of_the_same_id_is_not_given_what_waited_for_the_lost_one(
     assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
 
 
-@pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0)])
+@pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
 def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float, float]) -> None:
     world = driving
     world.fault(Faults(position_jump=jump))

@@ -20,6 +20,7 @@ from tests.kit.client import (
 from tests.kit.observer import Observer
 
 ROVER, SERVER, CLIENT = (1, 1), (250, 191), (255, 190)
+PAUSE = command_long(PAUSE_CONTINUE, 0)
 
 
 class Story:
@@ -66,6 +67,10 @@ class Story:
         self.observer.is_ready = lambda: False
         return self
 
+    def in_batches(self) -> "Story":
+        self.observer.batches = True
+        return self
+
     def driving(self) -> "Story":
         """A rover that we have taken as we should, and that we drive."""
         self.rover(HOLD, armed=False).position()
@@ -101,6 +106,38 @@ def test_a_stop_well_done_is_no_violation() -> None:
     story.sends(mode_request(HOLD)).moves(0.0).later(0.05).moves(0.0).rover(HOLD, armed=True)
     story.later(3).asks(command_long(PAUSE_CONTINUE, 1)).answers(PAUSE_CONTINUE, 0)
     story.sends(mode_request(GUIDED)).observer.check()
+
+
+def test_a_pause_that_is_hold_is_no_violation_after_a_takeover() -> None:
+    story = Story().driving().rover(AUTO, armed=True).later(1).asks(PAUSE)
+    story.moves(0.0).sends(mode_request(HOLD)).later(0.05).moves(0.0).observer.check()
+
+
+def test_news_of_hold_in_the_step_in_which_a_client_asks_for_it_is_no_takeover() -> None:
+    story = Story().driving().later(0.05).in_batches()
+    story.asks(mode_request(HOLD)).rover(HOLD, armed=True)
+    story.moves(0.0).sends(mode_request(HOLD)).later(0.05).moves(0.0).observer.check()
+
+
+@pytest.mark.parametrize(("mode", "later"), [(AUTO, 0.0), (HOLD, 0.01)])
+def test_news_of_another_mode_or_of_another_step_is_a_takeover(mode: int, later: float) -> None:
+    story = Story().driving().later(0.05).in_batches()
+    story.asks(mode_request(HOLD)).later(later).rover(mode, armed=True)
+    with pytest.raises(AssertionError, match="after a takeover"):
+        story.moves(0.0).observer.check()
+
+
+def test_a_client_that_is_handed_the_rover_between_two_zeros_may_drive_it() -> None:
+    story = Story().driving()
+    for _ in range(8):
+        story.later(0.05).moves(0.0)
+    story.sends(mode_request(GUIDED), CLIENT).later(0.05).moves(0.0).moves(0.0)
+    story.sends(setpoint(1.0), CLIENT).observer.check()
+
+
+def test_a_rover_that_is_stopped_when_it_is_found_is_no_violation() -> None:
+    story = Story().asks(command_long(STOP)).later(1).rover(AUTO, armed=True)
+    story.moves(0.0).sends(mode_request(HOLD)).later(1).observer.check()
 
 
 def test_a_continue_that_was_refused_ends_no_stop() -> None:
@@ -166,6 +203,22 @@ SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
         "after a takeover",
         lambda s: s.driving().asks(sticks(500)).later(0.05).position().moves(),
     ),
+    "a zero after a pause without HOLD": (
+        "after a takeover",
+        lambda s: s.driving().rover(AUTO, armed=True).asks(PAUSE).later(0.01).moves(0.0),
+    ),
+    "a zero at a pause without HOLD": (
+        "after a takeover",
+        lambda s: s.driving().rover(AUTO, armed=True).asks(PAUSE).moves(0.0),
+    ),
+    "a zero after HOLD of no pause": (
+        "after a takeover",
+        lambda s: s.driving().rover(AUTO, armed=True).sends(mode_request(HOLD)).moves(0.0),
+    ),
+    "motion after a pause": (
+        "in mode 10",
+        lambda s: s.driving().rover(AUTO, armed=True).asks(PAUSE).sends(mode_request(HOLD)).moves(),
+    ),
     "arming after a disarm": (
         "arming after a takeover",
         lambda s: s.driving().rover(GUIDED, armed=False).later(0.05).sends(arming(1)),
@@ -173,6 +226,10 @@ SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
     "no HOLD at a STOP": (
         "without HOLD",
         lambda s: s.driving().asks(command_long(STOP)).moves(0.0),
+    ),
+    "no STOP when the rover is found": (
+        "STOP without HOLD",
+        lambda s: s.asks(command_long(STOP)).later(1).rover(AUTO, armed=True).moves(0.0),
     ),
     "no zero at a STOP": (
         "without zero",
@@ -185,6 +242,28 @@ SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
     "two sources": (
         "two sources",
         lambda s: s.driving().later(0.5).sends(setpoint(1.0), CLIENT),
+    ),
+    "two sources, and HOLD between": (
+        "two sources",
+        lambda s: s.driving().sends(mode_request(HOLD)).later(0.5).sends(setpoint(1.0), CLIENT),
+    ),
+    "two sources, one of which was not given the rover": (
+        "two sources",
+        lambda s: (
+            s.driving()
+            .sends(mode_request(GUIDED), CLIENT)
+            .later(0.5)
+            .sends(setpoint(1.0), CLIENT)
+            .sends(setpoint(1.0), (200, 190))
+        ),
+    ),
+    "a client drives although the server does not let go": (
+        "while the server drives",
+        lambda s: [
+            s.driving().later(0.05).moves(0.0).sends(mode_request(GUIDED), CLIENT),
+            *(s.later(0.05).moves(0.0) for _ in range(5)),
+            s.later(0.01).sends(setpoint(1.0), CLIENT),
+        ],
     ),
     "a client drives too": (
         "while the server drives",

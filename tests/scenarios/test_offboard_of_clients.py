@@ -115,3 +115,24 @@ def test_is_not_opened_for_a_stream_that_would_not_pass(make_world: MakeWorld, l
         modes.add(world.rover.autopilot.mode)
     assert abs(world.truth.north - where) < 0.1
     assert Mode.GUIDED not in modes
+
+
+def test_of_two_clients_whoever_asked_last_drives(world: World) -> None:
+    """Two streams at once would be two drivers; who is to drive is asked for, not raced for."""
+    second = world.add_client("second", system_id=201)
+    ask_mode(world.client, OFFBOARD)
+    world.run(1.5)
+    assert world.truth.forward_speed > 0.3
+    second.stream(northwards(-0.3), rate=20)
+    world.run(1)
+    assert world.truth.forward_speed > 0.3
+    ask_mode(second, OFFBOARD)
+    world.run(0.2)
+    at = world.now
+    world.run(1)
+    sources = {
+        reached.source
+        for reached in world.observer.reached
+        if reached.at > at + 0.1 and reached.kind == 84
+    }
+    assert sources == {(201, 190)}

@@ -10,10 +10,12 @@ from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, Mode
+from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, AUTO, HOLD, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
+
+CANCEL = 54010
 
 
 @pytest.fixture
@@ -179,3 +181,21 @@ def test_mode_requests_by_the_old_message_are_heeded_too(world: World) -> None:
     world.client.send(set_mode(HOLD))
     world.until(world.stands, within=4)
     assert world.state(1) == (S.PAUSED, R.OPERATOR)
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
+@pytest.mark.parametrize("after", [0.0, 0.05, 0.2, 0.6])
+def test_what_was_armed_and_not_seen_yet_when_it_is_cancelled_is_disarmed(
+    make_world: MakeWorld, persona: Persona, after: float
+) -> None:
+    world = make_world(persona=persona, shows_on_request=False)
+    world.client.move(2.0)
+    world.until(lambda: world.rover.autopilot.armed, within=10)
+    world.run(after)
+    world.client.command(CANCEL, 1)
+    world.until(lambda: world.control() == "IDLE", within=10)
+    world.run(1.5)
+    assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (False, Mode.HOLD)
+    world.client.move(0.5)
+    world.until_idle(tasks=2)
+    assert world.state(2)[0] is S.COMPLETED

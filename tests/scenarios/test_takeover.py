@@ -25,6 +25,8 @@ from tests.kit.client import (
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
+CANCEL = 54010
+
 
 def packed(message: object, system_id: int, component_id: int) -> bytes:
     raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))  # type: ignore[attr-defined]
@@ -156,6 +158,45 @@ def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, 
     world.operator_mode(Mode.HOLD)
     world.run(3)
     assert world.client.proceed()
+    world.until_idle(tasks=2)
+
+
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO])
+@pytest.mark.parametrize("kill", [0, 1])
+def test_to_call_the_task_off_does_not_take_the_rover_out_of_anothers_hands(
+    driving: World, mode: Mode, kill: int
+) -> None:
+    world = driving
+    world.operator_mode(mode)
+    world.until_state(1, S.PAUSED, within=0.5)
+    world.run(0.1)
+    at = world.now
+    sent = world.client.command(CANCEL, 1, kill)
+    world.run(3)
+    assert sent.answer == (ACCEPTED, 1)
+    assert world.state(1) == ([S.CANCELLED, S.KILLED][kill], R.CANCELLED)
+    assert world.observer.sent_since(at) == []
+    assert world.rover.autopilot.mode is mode
+
+
+@pytest.mark.parametrize("is_over", [False, True])
+def test_a_pause_stops_a_rover_that_somebody_else_drives(driving: World, *, is_over: bool) -> None:
+    world = driving
+    world.operator_mode(Mode.MANUAL)
+    world.rover.autopilot.operator_sticks(0.8, 0.0)
+    world.run(1)
+    if is_over:
+        world.client.command(CANCEL, 1)
+        world.run(0.1)
+    at = world.now
+    sent = world.client.pause()
+    world.run(3)
+    assert sent.result == ACCEPTED
+    assert set(world.observer.sent_since(at)) == {"zero", "HOLD"}
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.stands()
+    assert world.paused() is R.TAKEOVER
+    world.client.proceed()
     world.until_idle(tasks=2)
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from mav_tasks import errors, settings
+import mav_tasks
+from mav_tasks import Client, SyncClient, SyncTask, Task, errors, settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Input
 from mav_tasks.errors import MavTasksError
@@ -19,14 +20,14 @@ def public(thing: object) -> list[str]:
     return sorted(name for name in vars(thing) if not name.startswith("_"))
 
 
-def test_the_engine_has_five_methods_and_a_view() -> None:
+def test_the_engine_has_five_methods_and_two_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
-    assert public(Engine) == sorted([*methods, "snapshot"])
+    assert public(Engine) == sorted([*methods, "snapshot", "parameters"])
 
 
 def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
     engine = Engine(settings.Settings(), now=0.0)
-    assert public(engine) == ["last_words", "not_in_force"]
+    assert public(engine) == ["last_words", "not_in_force", "signatures"]
     assert (engine.last_words, engine.not_in_force) == ((), ())
 
 
@@ -40,6 +41,7 @@ def test_what_can_come_into_the_engine() -> None:
     assert [kind.__name__ for kind in Input.__args__] == [
         "Packets",
         "LinkChanged",
+        "KeysChanged",
         "PeerChanged",
         "Congestion",
         "Committed",
@@ -59,6 +61,7 @@ def test_every_setting_is_known_by_name() -> None:
             "push_lost",
             "stream_interval",
             "text_rate",
+            "packet_rate",
             "status_rate",
             "priorities",
         ],
@@ -77,10 +80,25 @@ def test_every_setting_is_known_by_name() -> None:
             "acceptance_radius",
         ],
         "Identity": ["system_id", "component_id"],
+        "Limits": ["tasks", "max_priority", "max_speed", "quota", "rate"],
+        "Links": ["clients", "push", "vehicles", "insecure", "unsigned", "keys"],
+        "Log": ["format", "level"],
         "Queueing": ["capacity", "quota", "aging", "preemption_gap", "preemption_rest"],
+        "Recording": ["tlog", "tlog_size", "tlog_files", "decisions", "decisions_size"],
         "Retention": ["max_age", "max_count"],
+        "Roles": [
+            "unsigned",
+            "addresses",
+            "observer",
+            "submitter",
+            "operator",
+            "safety",
+        ],
+        "ServerSettings": ["engine", "links", "store", "profiles", "recording", "log"],
         "Settings": [
             "identity",
+            "signing",
+            "roles",
             "driving",
             "watch",
             "queueing",
@@ -93,7 +111,24 @@ def test_every_setting_is_known_by_name() -> None:
             "operator_lost",
             "on_failure",
             "on_restart",
+            "profiles",
         ],
+        "VehicleProfile": [
+            "system_id",
+            "uid",
+            "autopilot",
+            "firmware",
+            "probed",
+            "yaw_rate",
+            "reverse",
+            "setpoints",
+            "loss_stop",
+            "setpoint_timeout",
+            "speed",
+            "stopping_distance",
+            "stopping_time",
+        ],
+        "Signing": ["window", "setup"],
         "Watch": [
             "setpoint_period",
             "motion_fresh",
@@ -141,3 +176,61 @@ def test_the_tree_of_errors_is_the_one_in_its_docstring() -> None:
     ]
     assert drawn == {kind.__name__: kind.__base__.__name__ for kind in kinds}
     assert all(issubclass(kind, MavTasksError) for kind in kinds)
+
+
+def test_what_a_script_may_import_is_there_and_no_more() -> None:
+    assert mav_tasks.__all__ == [
+        "Client",
+        "ClientError",
+        "Drive",
+        "Face",
+        "GlobalPlace",
+        "GoTo",
+        "Key",
+        "LocalPlace",
+        "MavTasksError",
+        "Move",
+        "NoAnswer",
+        "NoSuchVehicle",
+        "QueueStatus",
+        "Refused",
+        "Rotate",
+        "SyncClient",
+        "SyncTask",
+        "Task",
+        "TaskFailed",
+        "TaskReason",
+        "TaskState",
+        "TaskStatus",
+        "TaskTiming",
+        "Text",
+        "UsageError",
+        "VehicleStatus",
+        "Wait",
+        "read_plan",
+        "write_plan",
+    ]
+    for name in mav_tasks.__all__:
+        assert getattr(mav_tasks, name).__name__ == name
+    with pytest.raises(AttributeError, match="no attribute 'Rover'"):
+        mav_tasks.Rover  # noqa: B018
+
+
+#: of the asyncio face, what only its own loop may call
+INSIDE = {"rearm", "streaming", "wake", "close"}
+
+
+@pytest.mark.parametrize(("one", "other"), [(Client, SyncClient), (Task, SyncTask)])
+def test_both_faces_of_the_library_take_the_same(one: type, other: type) -> None:
+    def calls(kind: type) -> dict[str, list[str]]:
+        methods = inspect.getmembers(kind, inspect.isfunction)
+        return {
+            name: list(inspect.signature(method).parameters)
+            for name, method in methods
+            if not name.startswith("_") and name not in INSIDE
+        }
+
+    ours, theirs = calls(one), calls(other)
+    if one is Task:
+        ours["done"].append("timeout")  # asyncio has asyncio.timeout
+    assert theirs == ours

@@ -1,0 +1,10 @@
+"""No test, and no process of one, reads the configuration of whoever runs the tests."""
+
+import os
+
+for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
+    del os.environ[name]
+os.environ["MAV_TASKS_CONFIG"] = ""
+
+# pymavlink settles on a version of MAVLink when it is first imported, whichever test that is in.
+os.environ["MAVLINK20"] = "1"
