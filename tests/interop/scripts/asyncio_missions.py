@@ -12,6 +12,7 @@ from tests.interop.scripts.asyncio_waiting import Watch, wait_for, wait_for_moti
 from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.facts import METRES, NAN
 from tests.interop.scripts.plans import places, plan, raw_items
+from tests.interop.scripts.progress import is_told_to_the_end, pairs
 
 
 async def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: Any) -> None:
@@ -27,9 +28,8 @@ async def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: An
         await here.attempt_async(raw.set_current_mission_item, 3)
         await here.attempt_async(raw.start_mission)
         await wait_for(raw.is_mission_finished, "the end")
-        # told by another thread, perhaps later; and a start that is sent again after it begins anew
-        await progress.until(lambda seen: any(p.current == p.total for p in seen), "the last item")
-        print("raw progress", {(each.current, each.total) for each in progress.seen})
+        await progress.until(is_told_to_the_end, "the last item")
+        print("raw progress", set(pairs(progress.seen)))
     await here.attempt_async(raw.clear_mission)
 
 
@@ -45,7 +45,8 @@ async def mission(here: Circumstances, system: Any, home: Any) -> None:
         await here.attempt_async(plugin.set_current_mission_item, 1)
         await here.attempt_async(plugin.start_mission)
         await wait_for(plugin.is_mission_finished, "the end")
-        print("progress", [(each.current, each.total) for each in progress.seen])
+        await progress.until(is_told_to_the_end, "the last item")
+        print("progress", pairs(progress.seen))
     await here.attempt_async(plugin.clear_mission)
 
 

@@ -10,6 +10,7 @@ from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.common import arm, connected, wait_for, wait_for_motion
 from tests.interop.scripts.facts import METRES, NAN
 from tests.interop.scripts.plans import places, plan, raw_items
+from tests.interop.scripts.progress import is_told_to_the_end, pairs
 
 
 def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: Any) -> None:
@@ -17,34 +18,34 @@ def raw_mission(here: Circumstances, system: Any, telemetry: Any, home: Any) -> 
     here.attempt(raw.upload_mission, raw_items(home))
     back = here.attempt(raw.download_mission)
     print("raw downloaded", places(back, home, here.persona)[-3:])
-    seen: list[tuple[int, int]] = []
-    raw.subscribe_mission_progress(lambda p, _: seen.append((p.current, p.total)))
+    seen: list[Any] = []
+    raw.subscribe_mission_progress(lambda report, _: seen.append(report))
     here.attempt(raw.start_mission)
-    wait_for(lambda: seen and seen[-1][0] >= 2, "an item")
+    wait_for(lambda: seen and seen[-1].current >= 2, "an item")
     here.attempt(raw.pause_mission)
     wait_for_motion(telemetry, moves=False)
     here.attempt(raw.set_current_mission_item, 3)
     here.attempt(raw.start_mission)
     wait_for(raw.is_mission_finished, "the end")
-    # told by another thread, perhaps later; and a start that is sent again after it begins anew
-    wait_for(lambda: any(current == total for current, total in seen), "the last item")
-    print("raw progress", set(seen))
+    wait_for(lambda: is_told_to_the_end(seen), "the last item")
+    print("raw progress", set(pairs(seen)))
     here.attempt(raw.clear_mission)
 
 
 def mission(here: Circumstances, system: Any, home: Any) -> None:
     plugin = Mission(system)
-    seen: list[tuple[int, int]] = []
-    plugin.subscribe_mission_progress(lambda p, _: seen.append((p.current, p.total)))
+    seen: list[Any] = []
+    plugin.subscribe_mission_progress(lambda report, _: seen.append(report))
     here.attempt(plugin.upload_mission, plan(home))
     print("downloaded", len(here.attempt(plugin.download_mission).mission_items))
     here.attempt(plugin.start_mission)
-    wait_for(lambda: seen and seen[-1][0] >= 1, "the first item")
+    wait_for(lambda: seen and seen[-1].current >= 1, "the first item")
     here.attempt(plugin.pause_mission)
     here.attempt(plugin.set_current_mission_item, 1)
     here.attempt(plugin.start_mission)
     wait_for(plugin.is_mission_finished, "the end")
-    print("progress", seen)
+    wait_for(lambda: is_told_to_the_end(seen), "the last item")
+    print("progress", pairs(seen))
     here.attempt(plugin.clear_mission)
 
 

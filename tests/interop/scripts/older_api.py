@@ -14,6 +14,7 @@ from mavsdk_grpc.telemetry import TelemetryError
 from tests.interop.scripts.asyncio_waiting import Watch, first, wait_for, wait_for_motion
 from tests.interop.scripts.circumstances import Circumstances
 from tests.interop.scripts.facts import METRES, NAN
+from tests.interop.scripts.progress import is_told_to_the_end, pairs
 
 
 def item(home: Any, north: float) -> MissionItem:
@@ -51,7 +52,8 @@ async def mission(here: Circumstances, rover: System, home: Any) -> None:
     async with Watch(rover.mission.mission_progress()) as progress:
         await here.attempt_async(rover.mission.start_mission)
         await wait_for(rover.mission.is_mission_finished, "the end")
-        print("progress", [(each.current, each.total) for each in progress.seen])
+        await progress.until(is_told_to_the_end, "the last item")
+        print("progress", pairs(progress.seen))
     await here.attempt_async(rover.mission.clear_mission)
 
 
@@ -65,6 +67,8 @@ async def place(here: Circumstances, rover: System, home: Any) -> None:
             rover.telemetry.position(), "arrival", lambda at: abs(at.latitude_deg - north) < 1e-6
         )
         await wait_for_motion(rover.telemetry.velocity_ned(), moves=False)
+        if not here.is_lossy:  # a text comes once
+            await texts.until(lambda seen: any("Task" in t.text for t in seen), "a task's text")
         print("arrived", any("Task" in each.text for each in texts.seen))
 
 
