@@ -182,7 +182,12 @@ class Vehicle:
         self._authority.moved(may_arm=may_arm)
 
     def come_back(self, *, was_driven: bool, now: float) -> None:
-        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving."""
+        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
+
+        If somebody else had taken it over, we do not arm it before a person lets us go on.
+        """
+        if self.tasks.paused is TaskReason.TAKEOVER:
+            self._authority.withdraw_arming()
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
         elif was_driven and self._may_still_be_driven:

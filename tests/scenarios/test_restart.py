@@ -12,7 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, DENIED, MOVE
+from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
 from tests.kit.mission import Download, Item, Upload, reached
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at, is_at, near_pose
@@ -21,6 +21,7 @@ from tests.scenarios.conftest import MakeWorld
 VERSION = 148  # AUTOPILOT_VERSION
 UTC = 1.8e9  # s, when the worlds begin
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
+RETURN = 11  # the mode
 STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
 
 
@@ -205,6 +206,26 @@ def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
     world.client.proceed()
     world.run(1)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
+
+
+@pytest.mark.parametrize("is_restarted", [False, True])
+def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
+    world: World, path: Path, *, is_restarted: bool
+) -> None:
+    world.client.move(2)
+    world.run(3)
+    world.operator_arm(False)
+    world.run(1)
+    world.operator_mode(Mode.HOLD)
+    world.run(1)
+    if is_restarted:
+        restart(world, path)
+    at_once = world.client.mode(RETURN)
+    world.run(2)
+    assert at_once.answer == (TEMPORARILY_REJECTED, R.DISARMED)
+    assert not world.rover.autopilot.armed
+    assert world.client.proceed()
+    world.until_state(1, S.COMPLETED)
 
 
 @pytest.mark.parametrize("answers_lost", [0, 1, 1000])
