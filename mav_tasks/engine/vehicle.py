@@ -673,9 +673,9 @@ class Vehicle:
         if fell_silent:
             self._was_heard = False
             self._note("silent", now=now)
-        self.requests.handle_deadline(now=now)
         if now >= self._clock.next_at or fell_silent:
-            self.step(now=now)
+            self.step(now=now)  # first: what is late may make a request pointless
+        self.requests.handle_deadline(now=now)
         self.requests.flush(now=now)
         self._ask_for_rates(now=now)
 

@@ -257,9 +257,14 @@ class OffboardControl:
                 self._end_disarming()
             case Phase.ASKING_HOLD if not self._in_hold:
                 self._insist(Refused.MODE, now=now)
-            case Phase.ASKING_MODE if not self._in_our_mode:
-                if self._persona.arms_in_hold:
+            case Phase.ASKING_MODE if not self._in_our_mode and self._persona.arms_in_hold:
+                if now > self._led_at + LEAD_GAP:  # the stream has ended: what is asked for, too
+                    self._lead_in(now=now)
+                else:
+                    self._led_at = now
                     self._send_setpoint(STANDING)
+                    self._insist(Refused.MODE, now=now)
+            case Phase.ASKING_MODE if not self._in_our_mode:
                 self._insist(Refused.MODE, now=now)
             case Phase.ASKING_ARM if self._may_arm_here and not self._armed:
                 self._send_setpoint(STANDING)
@@ -287,10 +292,7 @@ class OffboardControl:
         elif self.phase is Phase.ASKING_HOLD and not self._armed:
             self._begin_arming(may_arm=may_arm, now=now)
         elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._in_hold:
-            self._begin_asking(Phase.LEADING_IN, now=now)
-            self._lead_until, self._led_at = now + LEAD_IN, now
-            self._was_heard_leading_in = False
-            self._send_setpoint(STANDING)
+            self._lead_in(now=now)
         elif self.phase is Phase.LEADING_IN and self._in_hold and self._armed:
             self._begin_asking(Phase.ASKING_MODE, now=now)
             self._send_setpoint(STANDING)
@@ -298,6 +300,13 @@ class OffboardControl:
         else:
             self._begin_asking(Phase.ASKING_HOLD, now=now)
             self._ask_hold(now=now)
+
+    def _lead_in(self, *, now: float) -> None:
+        """Begin the zeros that our mode is entered from."""
+        self._begin_asking(Phase.LEADING_IN, now=now)
+        self._lead_until, self._led_at = now + LEAD_IN, now
+        self._was_heard_leading_in = False
+        self._send_setpoint(STANDING)
 
     def _is_leading_in(self, now: float) -> bool:
         """Whether the stream has not lasted yet, or nothing was heard of the vehicle meanwhile.

@@ -50,6 +50,7 @@ MOTION = (*SETPOINTS, "SET_ATTITUDE_TARGET", "SET_ACTUATOR_CONTROL_TARGET", "FOL
 BY_HAND = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE")
 MOVING_COMMANDS = (16, 17, 18, 19, 20, 21, 22, 34, 115, 192, 209, 213, 300)
 STOP, PAUSE_CONTINUE, SET_MODE, ARM, REQUEST = 54003, 193, 176, 400, 512
+RELEASE, SKIP = 54013, 2
 REPOSITION = 192
 ACK, ACCEPTED = 77, 0
 NO_PLACE = 0x7FFFFFFF
@@ -127,7 +128,8 @@ class Observer:
     stopped_at: float = -1e9
     _zeros_left: int = 0
     _newest: tuple[int, float] = (0, -1e9)  # of its heartbeats: number, and when it came
-    _before_continue: tuple[bool, bool] | None = None
+    #: what was in force before a client had it go on, while it is not known whether it may
+    _before: tuple[bool, bool] | None = None
     _zero_in_mode: bool = False
     _unready_since: float | None = None  # of heartbeats that say so, one after the other
     _position_at: float = -1e9
@@ -140,6 +142,7 @@ class Observer:
     _mode_at: float = -1e9  # when it was last heard that the mode is another one
     _hold_wished_at: float = -1e9  # when a client last asked for HOLD
     _pause_at: float = -1e9  # when a client last asked for a pause
+    _greeting_at: float = -1e9  # when a client last asked for our mode: zeros may go before it
     _hold_due: float | None = None  # when a zero left of which only HOLD says why
     _client_arms_at: float = -1e9  # through the server, while it may be taking control
     _moved_last: bool = False
@@ -199,13 +202,13 @@ class Observer:
         return False
 
     def answered(self, now: float, data: bytes) -> None:
-        """The server sends a datagram to a client: a continue that is refused ends nothing."""
-        if data[7] != ACK or self._before_continue is None:
+        """The server sends a datagram to a client: to go on ends nothing if it is refused."""
+        if data[7] != ACK or self._before is None:
             return
         message = self._decoder.decode(bytearray(data))
-        if message.command == PAUSE_CONTINUE and message.result != ACCEPTED:
-            self.stopped, self.taken_over = self._before_continue
-        self._before_continue = None
+        if message.command in (PAUSE_CONTINUE, RELEASE) and message.result != ACCEPTED:
+            self.stopped, self.taken_over = self._before
+        self._before = None
 
     def sent(self, now: float, data: bytes) -> None:
         """The server sends a datagram to the rover."""
@@ -282,8 +285,11 @@ class Observer:
             self._pause_at = now
         elif message.command == PAUSE_CONTINUE and param1 == 1.0:
             self._check_stop(now)
-            self._before_continue = self.stopped, self.taken_over
+            self._before = self.stopped, self.taken_over
             self.stopped = self.taken_over = False
+        elif message.command == RELEASE and message.param2 != SKIP:
+            self._before = self.stopped, self.taken_over
+            self.taken_over = False
         elif message.command == SET_MODE:
             self._see_wish_of_client(now, self.ways.mode_of(message))
         elif message.command == ARM and message.param1:
@@ -292,10 +298,12 @@ class Observer:
     def _see_wish_of_client(self, now: float, mode: int) -> None:
         if mode == self.ways.hold:
             self._hold_wished_at = now
+        if mode == self.ways.ours:
+            self._greeting_at = now
         if mode == self.ways.hold or mode in self.ways.given_back:
             self.taken_over = False
-            if self._before_continue is not None:  # a continue that is refused does not undo that
-                self._before_continue = (self._before_continue[0], False)
+            if self._before is not None:  # to go on, refused, does not undo that
+                self._before = (self._before[0], False)
 
     def _see_heartbeat(self, now: float, message: Any) -> None:
         armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
@@ -342,7 +350,7 @@ class Observer:
             if moves and now - self._setpoint_at < ENGAGED and self._in_row > GREETING:
                 self._violation(now, "a client's setpoint while the server drives")
             return
-        if self.taken_over:
+        if self.taken_over and (moves or now != self._greeting_at):
             # a client's pause stops a rover that somebody else drives: zero and HOLD at once; to
             # no other pause does a zero belong
             if now == self._pause_at and not moves:

@@ -11,6 +11,8 @@ STANDS = 0.02  # m/s and rad/s
 BRAKING = 1.5  # s, from the highest speed that is driven here to a stand
 STOP_BOUND = 1.5  # s from when the server reads a STOP, where the rover hears it
 STOP_BOUND_UNHEARD = 3.0 + BRAKING  # s, where it does not: by its own time-out
+#: s that it must have moved: a mode of its own that is turned to and away from between two looks
+FLASH = 0.1
 UNHEARD = 6.0  # s after something was wrong with the way to the rover
 BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL})
 
@@ -24,6 +26,7 @@ class Stillness:
         #: when the way from the server to the rover, or the rover itself, was last not as it should
         self.disturbed_at = -1e9
         self._by_itself_at = -1e9
+        self._stood_at = -1e9
 
     def look(self, now: float) -> Iterator[str]:
         """Give what is wrong now."""
@@ -32,7 +35,9 @@ class Stillness:
             self._by_itself_at = now
         truth = self.vehicle.truth
         speed = max(hypot(truth.forward_speed, truth.lateral_speed), abs(truth.yaw_rate))
-        if speed <= STANDS or now - self._by_itself_at <= BRAKING:
+        if speed <= STANDS:
+            self._stood_at = now
+        if now - self._stood_at <= FLASH or now - self._by_itself_at <= BRAKING:
             return
         number, observer = self.observer.system_id, self.observer
         if now > observer.may_move_until + BRAKING:
