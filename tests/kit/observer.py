@@ -203,12 +203,13 @@ class Observer:
 
     def answered(self, now: float, data: bytes) -> None:
         """The server sends a datagram to a client: to go on ends nothing if it is refused."""
-        if data[7] != ACK or self._before is None:
+        if data[7] != ACK or data[5] != self.system_id or self._before is None:
             return
         message = self._decoder.decode(bytearray(data))
-        if message.command in (PAUSE_CONTINUE, RELEASE) and message.result != ACCEPTED:
-            self.stopped, self.taken_over = self._before
-        self._before = None
+        if message.command in (PAUSE_CONTINUE, RELEASE):
+            if message.result != ACCEPTED:
+                self.stopped, self.taken_over = self._before
+            self._before = None
 
     def sent(self, now: float, data: bytes) -> None:
         """The server sends a datagram to the rover."""
