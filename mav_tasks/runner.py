@@ -141,7 +141,10 @@ class Runner:
             for link, side in self._sides:
                 policy = self._policies.get(link.name, TAKES_ALL)
                 self._guarded(link_changed(link, side, policy))
-                self._loop.add_reader(link.fileno(), self._on_readable, link)
+                if isinstance(link, StreamLink):
+                    self._loop.add_reader(link.fileno(), self._on_stream_readable, link)
+                else:
+                    self._loop.add_reader(link.fileno(), self._on_readable, link)
             if self._store_fd is not None:
                 self._loop.add_reader(self._store_fd, self._on_stored)
             if self._streams:
@@ -163,9 +166,9 @@ class Runner:
             self._pump.close()
 
     def _on_readable(self, link: Link) -> None:
-        if not isinstance(link, StreamLink):
-            self._take_in(link, link.receive(DRAIN))
-            return
+        self._take_in(link, link.receive(DRAIN))
+
+    def _on_stream_readable(self, link: StreamLink) -> None:
         while before := link.take_changes():  # to tell of some may show others
             self._note(link, before)
         pieces = link.receive(DRAIN)

@@ -225,13 +225,15 @@ class Commands:
         is_reposition = asked.command.command == MavCmd.DO_REPOSITION
         if is_reposition and place_in(asked.command) is None:
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
-        else:
+        elif is_reposition:
             held_at = asked.vehicle.hold_before.since
             # a copy of a "go to" from before a HOLD says nothing about that
             is_older = asked.receiver.older_copy(asked.command, before=held_at, now=now)
             self._submissions.submit(asked, now=now)
-            if is_reposition and not is_older:
+            if not is_older:
                 self._undo_hold_before(asked, now=now)
+        else:
+            self._submissions.submit(asked, now=now)
 
     def _undo_hold_before(self, asked: Asked, *, now: float) -> None:
         vehicle = asked.vehicle
