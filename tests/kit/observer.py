@@ -26,6 +26,8 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import common
 
+from tests.kit.wishes import Latches, Wish, Wishes
+
 SERVER = (250, 191)
 
 FRESH = 0.3  # s
@@ -40,6 +42,8 @@ GREETING = (
 BY_CLIENT = 2.5  # s after a client's wish to arm, in which that the rover is armed is its doing
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
+SAME_PACKET = 5.0  # s; then numbers may have begun anew, and it is another one
+REMEMBERED = 64  # commands of clients
 ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops by itself: ArduPilot's; PX4's is 1
 FAR = 60.0  # s of driving by itself, to a place or in a mode of the rover's own
 
@@ -128,8 +132,7 @@ class Observer:
     stopped_at: float = -1e9
     _zeros_left: int = 0
     _newest: tuple[int, float] = (0, -1e9)  # of its heartbeats: number, and when it came
-    #: what was in force before a client had it go on, while it is not known whether it may
-    _before: tuple[bool, bool] | None = None
+    _wishes: Wishes = field(default_factory=Wishes)
     _zero_in_mode: bool = False
     _unready_since: float | None = None  # of heartbeats that say so, one after the other
     _position_at: float = -1e9
@@ -152,7 +155,7 @@ class Observer:
 
     def __post_init__(self) -> None:
         self._decoder = common.MAVLink(None)
-        self._asked: deque[tuple[str, bytes]] = deque(maxlen=64)
+        self._asked: dict[tuple[str, bytes], float] = {}
         self._recent: deque[float] = deque(maxlen=BURST)
 
     # where it looks
@@ -164,9 +167,11 @@ class Observer:
             return
         kind = message.get_type()
         if kind in COMMANDS and message.command != STOP:
-            if (peer, data) in self._asked:
+            if now - self._asked.get((peer, data), -1e9) <= SAME_PACKET:
                 return  # the same packet again is not acted on
-            self._asked.append((peer, data))
+            self._asked[peer, data] = now
+            if len(self._asked) > REMEMBERED:
+                del self._asked[next(iter(self._asked))]
         if kind in COMMANDS:
             self._see_command_of_client(now, message)
         elif kind == "SET_MODE":
@@ -203,13 +208,12 @@ class Observer:
 
     def answered(self, now: float, data: bytes) -> None:
         """The server sends a datagram to a client: to go on ends nothing if it is refused."""
-        if data[7] != ACK or data[5] != self.system_id or self._before is None:
+        if data[7] != ACK or data[5] != self.system_id:
             return
         message = self._decoder.decode(bytearray(data))
-        if message.command in (PAUSE_CONTINUE, RELEASE):
-            if message.result != ACCEPTED:
-                self.stopped, self.taken_over = self._before
-            self._before = None
+        left = self._wishes.answered(message.command, is_granted=message.result == ACCEPTED)
+        if left is not None:
+            self.stopped, self.taken_over = left
 
     def sent(self, now: float, data: bytes) -> None:
         """The server sends a datagram to the rover."""
@@ -280,21 +284,26 @@ class Observer:
         param1 = message.param1
         if message.command == STOP:
             self.stopped, self.taken_over, self.stopped_at = True, False, now
+            self._wishes.stopped()
             if self.mode >= 0:  # else it is not found yet, and is stopped when it is
                 self._stop_due = (now, {"zero", "HOLD"})
-        elif message.command == PAUSE_CONTINUE and param1 == 0.0:
-            self._pause_at = now
-        elif message.command == PAUSE_CONTINUE and param1 == 1.0:
-            self._check_stop(now)
-            self._before = self.stopped, self.taken_over
-            self.stopped = self.taken_over = False
-        elif message.command == RELEASE and message.param2 != SKIP:
-            self._before = self.stopped, self.taken_over
-            self.taken_over = False
+        elif message.command == PAUSE_CONTINUE:
+            is_continue = param1 == 1.0
+            if param1 == 0.0:
+                self._pause_at = now
+            elif is_continue:
+                self._check_stop(now)
+            self._ask(now, Wish(PAUSE_CONTINUE, is_continue, is_continue))
+        elif message.command == RELEASE:
+            self._ask(now, Wish(RELEASE, ends_stop=False, ends_takeover=message.param2 != SKIP))
         elif message.command == SET_MODE:
             self._see_wish_of_client(now, self.ways.mode_of(message))
         elif message.command == ARM and message.param1:
             self._client_arms_at = now
+
+    def _ask(self, now: float, wish: Wish) -> None:
+        latches = Latches(self.stopped, self.taken_over)
+        self.stopped, self.taken_over = self._wishes.asked(now, wish, latches)
 
     def _see_wish_of_client(self, now: float, mode: int) -> None:
         if mode == self.ways.hold:
@@ -303,8 +312,7 @@ class Observer:
             self._greeting_at = now
         if mode == self.ways.hold or mode in self.ways.given_back:
             self.taken_over = False
-            if self._before is not None:  # to go on, refused, does not undo that
-                self._before = (self._before[0], False)
+            self._wishes.taken_over_no_more()
 
     def _see_heartbeat(self, now: float, message: Any) -> None:
         armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
