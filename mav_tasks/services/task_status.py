@@ -7,11 +7,13 @@ for. It keeps ids only; what is sent is the state at the time of sending.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mav_tasks.services.message_interval import LONGEST_US
 from mav_tasks.services.token_bucket import TokenBucket
 
 BURST = 20
 MOST = 1000  # tasks whose news waits to be told to one client
 SHORTEST = 0.05  # s between reports of one task to one client
+LONGEST = LONGEST_US / 1e6  # s; a longer one could not be told
 
 
 @dataclass(slots=True)
@@ -46,7 +48,7 @@ class TaskStatusSender:
         if interval is None:
             self._streams.pop(vehicle, None)
         else:
-            self._streams[vehicle] = _Stream(max(interval, SHORTEST), now)
+            self._streams[vehicle] = _Stream(min(max(interval, SHORTEST), LONGEST), now)
 
     def interval(self, vehicle: int) -> float | None:
         """Give the interval of a vehicle's stream, seconds; None: there is none."""

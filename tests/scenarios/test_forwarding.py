@@ -169,6 +169,17 @@ def test_an_interval_can_be_asked_for(world: World) -> None:
     assert (answer.message_id, answer.interval_us) == (ATTITUDE, 40_000)
 
 
+@pytest.mark.parametrize("message_id", [ATTITUDE, TASK_STATUS])
+def test_an_interval_that_is_too_long_to_be_told_is_the_longest(
+    world: World, message_id: int
+) -> None:
+    world.client.command(SET_INTERVAL, message_id, 3e38)
+    world.client.command(GET_INTERVAL, message_id)
+    world.run(0.1)
+    answer = world.client.of_type("MESSAGE_INTERVAL")[0]
+    assert (answer.message_id, answer.interval_us) == (message_id, 2**31 - 1)
+
+
 def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
     for message_id in (ATTITUDE, POSITION):
         world.client.command(SET_INTERVAL, message_id, 1, target=(1, 1))
