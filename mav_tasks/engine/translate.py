@@ -62,6 +62,7 @@ UNIT_RADIANS = 2
 UNIT_SECONDS = 3
 FLOAT32_MAX = 3.4e38
 UNKNOWN_POSITION = 65535
+LAST_POSITION = 65534  # or behind it: a queue may be longer than the field can say
 UNKNOWN_PROGRESS = 255
 
 
@@ -99,7 +100,7 @@ def task_status(
         time_to_finish=_float32(to_finish),
         execution_time=nan if task.progress.anchor is None else task.progress.execution_time,
         command=task.command,
-        queue_position=UNKNOWN_POSITION if ahead is None else ahead,
+        queue_position=UNKNOWN_POSITION if ahead is None else min(ahead, LAST_POSITION),
         step=_step(task),
         step_count=_step_count(task.goal),
         target_system=reader.system_id,

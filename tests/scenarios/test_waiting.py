@@ -2,6 +2,7 @@
 
 import pytest
 
+from mav_tasks.engine import translate
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -172,6 +173,17 @@ def test_a_dependency_can_be_set_and_lifted_again(world: World) -> None:
     world.client.command(MODIFY, other, RUN_AFTER, 0)
     world.run(0.1)
     assert world.state(other)[0] is S.QUEUED
+
+
+def test_a_place_that_is_too_far_back_to_be_told_is_the_last_that_can_be(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(translate, "position", lambda *_: 70_000)  # of 100,000 that there may be
+    submit(world, 2)
+    waiting = submit(world, 1)
+    world.client.request_status(waiting)
+    world.run(0.1)
+    assert world.client.statuses(waiting)[-1].queue_position == 65_534
 
 
 def test_estimates_are_given_on_request(world: World) -> None:
