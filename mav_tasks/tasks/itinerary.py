@@ -118,7 +118,7 @@ def _driven(plan: Plan, step: int) -> SingleGoal | None:
 def _at(plan: Plan, progress: Progress, step: int) -> Progress:
     """Walk on to the next step that drives, or past the end."""
     made = dict(zip(progress.jumps[::2], progress.jumps[1::2], strict=True))
-    pending = list(progress.pending)
+    pending = dict.fromkeys(progress.pending)  # each once, or a loop would carry ever more of them
     while 0 <= step < len(plan.steps):  # it ends: a plan that loops in vain is none
         present = plan.steps[step]
         if isinstance(present, Jump):
@@ -128,7 +128,7 @@ def _at(plan: Plan, progress: Progress, step: int) -> Progress:
                 step = present.to
                 continue
         elif isinstance(present, ON_THE_WAY):
-            pending.append(step)
+            pending[step] = None
         elif not isinstance(present, Nothing):
             break
         step += 1

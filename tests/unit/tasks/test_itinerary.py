@@ -92,6 +92,15 @@ def test_what_lies_between_belongs_to_the_way_to_the_next() -> None:
     assert following(plan, last) is None
 
 
+def test_what_is_still_pending_when_a_loop_comes_round_is_pending_once() -> None:
+    progress = begun(plan := Plan((A, Delay(86_400.0), Perform(), Jump(0, -1))), Progress())
+    for _ in range(10):
+        after = following(plan, progress)
+        assert after is not None
+        progress = after
+    assert (progress.step, progress.pending) == (0, (1, 2))
+
+
 def test_another_step_can_be_gone_on_with() -> None:
     plan = Plan((A, Nothing(), B, C))
     assert skipped_to(plan, begun(plan, Progress()), 1).step == 2
