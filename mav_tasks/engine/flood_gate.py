@@ -1,11 +1,12 @@
 """What of a flood of datagrams is looked at: so much of each client, a little of all strangers.
 
 It decides by nothing but who sends, and how much, before anything is read: to read costs more. Of
-what is too much a STOP is let in, alone.
+what is too much STOPs are let in, alone.
 """
 
 import re
 from collections.abc import Callable, Sequence
+from itertools import islice
 
 from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets, Peer
 from mav_tasks.mavlink.enums import MavCmd
@@ -20,6 +21,7 @@ _STOP = re.compile(
 )
 STRANGERS = 500.0  # datagrams a second, of all together who are no clients
 MOST_BUCKETS = 1024
+MOST_STOPS = 16  # of one datagram: routers put several packets into one
 WITHIN = 1.0  # s, of which the rate may come at once
 SIZE = 64  # bytes that count as one more datagram: many packets may be in one
 
@@ -63,12 +65,14 @@ class FloodGates:
         return item if gate is None else Packets(item.link, gate.let_in(item.datagrams, now=now))
 
 
-def stop_in(data: bytes) -> bytes:
-    """Give the packet in a datagram that looks like a STOP, the first one; b"" if none does."""
-    found = _STOP.search(data)
-    if found is None:
-        return b""
-    packet = data[found.start() :]
+def stops_in(data: bytes) -> bytes:
+    """Give what of a datagram looks like STOPs, one after the other; b"" if nothing does."""
+    found = islice(_STOP.finditer(data), MOST_STOPS)
+    return b"".join(_packet_at(data, each.start()) for each in found)
+
+
+def _packet_at(data: bytes, start: int) -> bytes:
+    packet = data[start:]
     if packet[0] == MAGIC_V2:
         is_signed = packet[2] & SIGNED
         return packet[: packet[1] + HEADER_V2 + CRC + (SIGNATURE_LENGTH if is_signed else 0)]
@@ -105,8 +109,8 @@ class FloodGate:
             peer, data = each
             if bucket.take(tokens=1 + len(data) // SIZE, now=now):
                 let_in.append(each)
-            elif stop := stop_in(data):
-                let_in.append((peer, stop))
+            elif stops := stops_in(data):
+                let_in.append((peer, stops))
         self.left_out += len(datagrams) - len(let_in)
         return let_in
 

@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.flood_gate import STRANGERS, FloodGate
+from mav_tasks.engine.flood_gate import MOST_STOPS, STRANGERS, FloodGate
 from mav_tasks.mavlink.packet import split_datagram
 from tests.kit.client import MOVE, STOP, Message, command_long, heartbeat
 
@@ -62,6 +62,13 @@ def test_a_signed_stop_is_let_in_whole(full: FloodGate) -> None:
     mav.signing.secret_key, mav.signing.sign_outgoing = b"s" * 32, True
     stop = command_long(STOP).pack(mav)
     assert full.let_in([("somebody", BEAT + stop + BEAT)], now=0.0) == [("somebody", stop)]
+
+
+def test_each_of_several_stops_in_one_datagram_is_let_in_up_to_a_number(full: FloodGate) -> None:
+    stops = [packed(command_long(STOP, target=(number, 191))) for number in (1, 2, 3)]
+    assert full.let_in([("somebody", BEAT.join(stops))], now=0.0) == [("somebody", b"".join(stops))]
+    ((_, many),) = full.let_in([("somebody", stops[0] * 100)], now=0.0)
+    assert many == stops[0] * MOST_STOPS
 
 
 def test_a_datagram_of_many_packets_counts_as_many(full: FloodGate) -> None:
