@@ -256,7 +256,8 @@ class Commands:
         vehicle = self._vehicles.get(message.target_system)
         if vehicle is not None:
             submitter = client.submitter(packet.source)
-            self._control.cancel_latest(vehicle, submitter, message.command, now=now)
+            rights = client.rights
+            self._control.cancel_latest(rights, vehicle, submitter, message.command, now=now)
 
     def deliver(self, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
         """Bring a vehicle's answer, or its silence, to the client that asked."""

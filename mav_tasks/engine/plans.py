@@ -134,6 +134,8 @@ class Plans:
         rights.require(SUBMITTER, "start a plan")
         if vehicle.tasks.paused:
             rights.require(OPERATOR, "start a plan while tasks are paused")
+        if vehicle.armed and vehicle.is_by_hand:
+            rights.require(OPERATOR, "end driving by hand")
         for task in (vehicle.tasks.begun, self.task(vehicle)):
             if task is not None and isinstance(task.goal, Plan):
                 rights.require_own(task, submitter, "start that plan")

@@ -68,6 +68,10 @@ class Rights(NamedTuple):
         if priority > most:
             raise self.refusal(f"may not have priority {priority}, {most} at the most")
 
+    def check_preemptive(self) -> None:
+        """Raise Rejection unless a task of its may interrupt those of others at once."""
+        self.require(OPERATOR, "make a task pre-emptive")
+
     def checked(self, draft: Draft, *, waiting: int) -> Draft:
         """Give a task as it may be submitted by somebody of whom so many wait; Rejection."""
         self.require(SUBMITTER, "submit tasks")
@@ -77,6 +81,8 @@ class Rights(NamedTuple):
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(self.limits.tasks)}")
         if not self.reach(OPERATOR) and _performs(draft.goal):
             raise self.refusal("may not send a plan with commands to the rover")
+        if draft.terms.is_preemptive:
+            self.check_preemptive()
         if waiting >= self.limits.quota:
             raise self.refusal(f"may have {self.limits.quota} tasks waiting", R.QUOTA)
         top = self.limits.max_speed

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.goals import MAX_DELAY, flag, number, whole
-from mav_tasks.engine.rights import OPERATOR
+from mav_tasks.engine.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavSeverity, TaskProperty
@@ -60,11 +60,11 @@ class TaskControl:
                 return self._change_speed(asked, now=now)
 
     def cancel_latest(
-        self, vehicle: Vehicle, submitter: Submitter, command: int, *, now: float
+        self, rights: Rights, vehicle: Vehicle, submitter: Submitter, command: int, *, now: float
     ) -> None:
         """COMMAND_CANCEL: call off a client's latest task of a command, if it is not over."""
         task = self._book.latest(submitter, command, vehicle=vehicle.system_id)
-        if task is not None:
+        if task is not None and rights.reach(SUBMITTER):
             vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: Asked, *, now: float) -> int:
@@ -112,6 +112,8 @@ class TaskControl:
         terms = _modified(task, asked.command, now=now)
         if terms.priority > task.terms.priority:
             asked.rights.check_priority(terms.priority)
+        if terms.is_preemptive and not task.terms.is_preemptive:
+            asked.rights.check_preemptive()
         asked.vehicle.modify(task, terms, actor=asked.actor, now=now)
         return task.id
 

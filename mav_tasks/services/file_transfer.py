@@ -10,9 +10,9 @@ from mav_tasks.mavlink.address import Address
 NETWORK = 0
 ACK, NAK = 128, 129
 FILE_NOT_FOUND = 10
-#: opcodes that change no file: sessions, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and
-#: BurstReadFile
-READING = frozenset({0, 1, 2, 3, 4, 5, 14, 15})
+#: opcodes that change no file, nor end all sessions, in one of which somebody may write: none,
+#: TerminateSession, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and BurstReadFile
+READING = frozenset({0, 1, 3, 4, 5, 14, 15})
 #: offsets in the payload: session after a 16-bit sequence number, then the opcode
 SESSION, OPCODE = 2, 3
 

@@ -240,6 +240,18 @@ class World(VirtualWorld):
         """Break something in the first rover; ``Faults()`` mends it."""
         self.rover.autopilot.set_faults(faults)
 
+    def passed_on(self, source: tuple[int, int]) -> set[int]:
+        """Give the ids of a client's messages that go to rovers from here on, as they come."""
+        ids: set[int] = set()
+
+        def look(sender: str, _target: str, data: bytes) -> bool:
+            if sender == VEHICLE_LINK and (data[5], data[6]) == source:
+                ids.add(int.from_bytes(data[7:10], "little"))
+            return False
+
+        self.watched.loses = look
+        return ids
+
     def lose_acks(self) -> list[bytes]:
         """From now on lose the acks of the first rover; gives the list that they end up in."""
         lost: list[bytes] = []
