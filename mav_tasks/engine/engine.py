@@ -131,7 +131,7 @@ class Engine:
         self._publisher = Publisher(
             self._gcs, self._vehicles, self._book, self._displays, self._submissions
         )
-        self._passing = Passing(self._vehicles)
+        self._passing = Passing(self._vehicles, self._vehicles.our_address)
         self._requests = RequestLimit(self._vehicles)
         self._operator = OperatorWatch()
         self._setup = SetupSigning(self.signatures, self._vehicles, settings)

@@ -9,6 +9,7 @@ from math import isfinite
 
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.packet import Packet
 
 #: drive the vehicle: pass only for a client that has control of it
 MOTION = (
@@ -20,37 +21,62 @@ MOTION = (
     m.MissionItem,  # with current = 2 it is ArduPilot's "go to"
     m.MissionItemInt,
 )
+#: the same, of kinds that are no messages here: inputs of a radio or of a simulator, of which it is
+#: not looked at what they say
+RAW_MOTION = frozenset(
+    {
+        65,  # RC_CHANNELS, an input of PX4
+        81,  # MANUAL_SETPOINT
+        91,  # HIL_CONTROLS
+        92,  # HIL_RC_INPUTS_RAW
+        93,  # HIL_ACTUATOR_CONTROLS
+        420,  # RADIO_RC_CHANNELS
+    }
+)
+#: what may pass while STOP is latched: what asks, what tells, and what is set for later
+MOTIONLESS = frozenset(
+    {
+        *(m.Heartbeat.id, m.SystemTime.id, m.Ping.id, m.Timesync.id, m.Statustext.id),
+        *(m.ParamRequestRead.id, m.ParamRequestList.id, m.ParamSet.id),
+        *(m.MissionRequestList.id, m.MissionRequest.id, m.MissionRequestInt.id, m.MissionAck.id),
+        *(m.FileTransferProtocol.id, m.CommandAck.id),
+        *(117, 119, 121, 122),  # LOG_REQUEST_LIST, _DATA, LOG_ERASE, LOG_REQUEST_END
+        *(320, 321, 323),  # PARAM_EXT_REQUEST_READ, _LIST, PARAM_EXT_SET
+        *(109, 233),  # RADIO_STATUS, GPS_RTCM_DATA
+    }
+)
 GO_TO = (2, 3)  # MISSION_ITEM.current: go there now, at once or to this altitude
 STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
 RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 
 
-def may_pass(vehicle: Vehicle, client: Hashable, message: m.Message | None) -> bool:
-    """Whether a client's message may be passed on to the vehicle; then ``passed`` is called."""
-    if _moves(message):
-        assert message is not None
-        return _is_finite(message) and vehicle.may_move(client)
-    if isinstance(message, m.ManualControl | m.RcChannelsOverride):
-        return not vehicle.tasks.is_stopped
-    return True
+def may_pass(vehicle: Vehicle, client: Hashable, packet: Packet, message: m.Message | None) -> bool:
+    """Whether a client's packet may be passed on to the vehicle; then ``passed`` is called."""
+    if _moves(packet, message):
+        return (message is None or _is_finite(message)) and vehicle.may_move(client)
+    return packet.message_id in MOTIONLESS or not vehicle.tasks.is_stopped
 
 
-def withheld(vehicle: Vehicle, client: Hashable, message: m.Message | None, *, now: float) -> None:
-    """Note that a client's message does not go to the vehicle."""
-    if _moves(message):
+def withheld(
+    vehicle: Vehicle, client: Hashable, packet: Packet, message: m.Message | None, *, now: float
+) -> None:
+    """Note that a client's packet does not go to the vehicle."""
+    if _moves(packet, message):
         vehicle.is_not_moved_by(client, now=now)
 
 
-def passed(vehicle: Vehicle, message: m.Message | None, *, now: float) -> None:
-    """Note what a message that goes to the vehicle means for its tasks."""
-    if _moves(message):
+def passed(vehicle: Vehicle, packet: Packet, message: m.Message | None, *, now: float) -> None:
+    """Note what a packet that goes to the vehicle means for its tasks."""
+    if _moves(packet, message):
         vehicle.is_moved_by_client(now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
         vehicle.sticks_moved(now=now)
 
 
-def _moves(message: m.Message | None) -> bool:
+def _moves(packet: Packet, message: m.Message | None) -> bool:
+    if packet.message_id in RAW_MOTION:
+        return True
     if isinstance(message, m.MissionItem | m.MissionItemInt):
         return message.current in GO_TO  # or else it is part of an upload
     return isinstance(message, MOTION)

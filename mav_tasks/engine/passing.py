@@ -11,7 +11,7 @@ from mav_tasks.engine.rights import OPERATOR, SAFETY, Rights
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
@@ -43,14 +43,16 @@ BOUNDING = frozenset(
 class Passing:
     """Passes clients' packets on."""
 
-    def __init__(self, vehicles: VehicleSide) -> None:
+    def __init__(self, vehicles: VehicleSide, identity: Address) -> None:
+        """``identity``: as whom the server speaks to vehicles."""
         self._vehicles = vehicles
+        self._identity = identity
 
     def pass_on(
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
         """Pass a packet to the vehicles that it is for; what is for us ends here."""
-        if not _may_send(client.rights, packet, message):
+        if not _may_send(client.rights, packet, message) or self._is_ours(packet.source):
             return
         target = EVERYBODY if message is None else _target(message)
         behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
@@ -62,13 +64,20 @@ class Passing:
                 if refusal is not None:
                     client.outlet.send(refusal, vehicle.server_address)
         for vehicles in behind.values():
-            if all(may_pass(vehicle, client.key, message) for vehicle in vehicles):
+            if all(may_pass(vehicle, client.key, packet, message) for vehicle in vehicles):
                 for vehicle in vehicles:
-                    passed(vehicle, message, now=now)
+                    passed(vehicle, packet, message, now=now)
                 vehicles[0].requests.forward(packet)
             else:
                 for vehicle in vehicles:
-                    withheld(vehicle, client.key, message, now=now)
+                    withheld(vehicle, client.key, packet, message, now=now)
+
+    def _is_ours(self, source: Address) -> bool:
+        """Whether a packet says that it is of the server or of a rover, and is of neither."""
+        return source == self._identity or any(
+            source in (vehicle.server_address, Address(vehicle.system_id, AUTOPILOT))
+            for vehicle in self._vehicles.addressed_by(source.system_id)
+        )
 
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """A client is gone: whatever it was driving is driven by nobody."""

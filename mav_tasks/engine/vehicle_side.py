@@ -202,7 +202,7 @@ class VehicleSide:
         COMMAND_ACK is not to be forwarded: it goes to the one who asked.
         """
         message: m.Message | None = None
-        if packet.message_id in USED or packet.source == self._our_address:
+        if packet.message_id in USED or packet.source == self.our_address:
             message = self._decoder.decode(packet)
             if message is None:  # what cannot be verified changes nothing
                 return None
@@ -252,7 +252,7 @@ class VehicleSide:
 
     def handle_deadline(self, *, now: float) -> None:
         """Send heartbeats and let each vehicle do what is due."""
-        source = self._our_address
+        source = self.our_address
         for link in self._links.values():
             if link.heartbeat.is_due(now=now):
                 for outlet in link.outlets.values():
@@ -263,7 +263,8 @@ class VehicleSide:
                 vehicle.handle_deadline(now=now)
 
     @property
-    def _our_address(self) -> Address:
+    def our_address(self) -> Address:
+        """As whom the server speaks to vehicles."""
         identity = self._settings.identity
         return Address(identity.system_id, identity.component_id)
 
@@ -281,7 +282,7 @@ class VehicleSide:
         """A first heartbeat: from an autopilot that we can drive, it is a new vehicle."""
         if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
             return None
-        if packet.system_id in (0, self._our_address.system_id):
+        if packet.system_id in (0, self.our_address.system_id):
             return None  # 0 would address every vehicle, and our own id is no vehicle's
         if heartbeat.type not in DRIVEN:  # others mean other things by the same mode numbers
             words = f"a vehicle of type {heartbeat.type} is no rover: not driven"
@@ -302,7 +303,7 @@ class VehicleSide:
             if len(link.outlets) >= MAX_PEERS:
                 return None
             outlet = link.outlets[peer] = self._outlet(link_name, peer)
-            outlet.send(gcs_heartbeat(), self._our_address)
+            outlet.send(gcs_heartbeat(), self.our_address)
         self._router.learn(packet.system_id, (link_name, peer))
         vehicle = Vehicle(
             packet.system_id,
@@ -362,7 +363,7 @@ class VehicleSide:
             self._outlets.pop(place, None)
 
     def _is_intruder(self, packet: Packet) -> bool:
-        return packet.source == self._our_address or packet.message_id in SETPOINTS
+        return packet.source == self.our_address or packet.message_id in SETPOINTS
 
     def _note_intruder(
         self, link: str, packet: Packet, message: m.Message | None, *, now: float

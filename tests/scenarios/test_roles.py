@@ -6,10 +6,15 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.inputs import SettingsChanged
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Packer
 from mav_tasks.settings import Limits, Roles, Settings
 from mav_tasks.tasks.events import QueuePaused, SubmissionRefused, TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -19,6 +24,7 @@ from tests.kit.client import (
     HOLD,
     IDS,
     MANUAL,
+    MOVE,
     REQUEST,
     RTL,
     SET_INTERVAL,
@@ -37,7 +43,7 @@ from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR, MODIFY, RELEASE = 54010, 54011, 54012, 54013
-PRIORITY = 1  # TASK_MODIFY, param2
+PRIORITY, PREEMPTIVE = 1, 6  # TASK_MODIFY, param2
 CHANGE_SPEED, MISSION_START, SET_FENCE, REBOOT = 178, 300, 207, 246
 WAYPOINT, RELAY, FENCE_CIRCLE = 16, 181, 5003
 FENCE = 1  # MAV_MISSION_TYPE
@@ -332,6 +338,68 @@ def test_a_plan_is_started_and_replaced_by_its_owner_or_an_operator(with_roles: 
     assert answer(world, submitter.command(MISSION_START, target=(1, 1))) == NOT_ALLOWED
     started = operator.command(MISSION_START, target=(1, 1))
     assert answer(world, started) == (ACCEPTED, started.task_id)
+
+
+@pytest.mark.parametrize("by", ["operator", "the rover's own switch"])
+def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str) -> None:
+    world = with_roles()
+    submitter, operator = join(world, SUBMITTER), join(world, OPERATOR)
+    if by == "operator":
+        operator.mode(MANUAL)
+        world.run(1)
+        operator.arm()
+    else:
+        world.operator_mode(Mode.MANUAL)
+        world.operator_arm(True)
+    world.run(2)
+    submitter.move(1.0)
+    upload(world, submitter, target=(1, 1))
+    at = world.now
+    assert answer(world, submitter.command(MISSION_START, target=(1, 1))) == NOT_ALLOWED
+    assert "may not end driving by hand, operator may" in " ".join(submitter.texts())
+    world.run(3)
+    assert world.observer.sent_since(at) == []
+    assert world.rover.autopilot.mode is Mode.MANUAL
+
+
+def test_a_submitter_makes_no_task_pre_emptive(with_roles: MakeRoles) -> None:
+    world = with_roles()
+    submitter = join(world, SUBMITTER)
+    running = begun(world, 3.0)
+    waiting = submitter.move(1.0)
+    world.run(0.2)
+    sent = submitter.command(MODIFY, waiting.task_id, PREEMPTIVE, 1)
+    assert answer(world, sent) == NOT_ALLOWED
+    assert "may not make a task pre-emptive, operator may" in " ".join(submitter.texts())
+    assert world.state(running)[0] is S.EXECUTING
+    assert answer(world, world.client.command(MODIFY, waiting.task_id, PREEMPTIVE, 1))
+    world.until_state(waiting.task_id, S.EXECUTING)
+
+
+def test_who_may_submit_no_more_calls_off_nothing_by_command_cancel(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(roles=Roles(unsigned="submitter")))
+    running = begun(world, 3.0)
+    observers = Settings(roles=Roles(unsigned="observer"))
+    world.server.engine.handle(SettingsChanged(observers), now=world.now)
+    cancel = Packer().pack(m.CommandCancel(1, 191, MOVE), Address(255, 190), seq=200)
+    world.client.send_raw(cancel)
+    world.run(0.5)
+    assert world.state(running)[0] is S.EXECUTING
+
+
+@pytest.mark.parametrize("who", [(250, 191), (1, 1), (1, 191)])
+def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
+    make_world: MakeWorld, who: tuple[int, int]
+) -> None:
+    world = make_world()
+    client = world.add_client("of a borrowed name", system_id=who[0], component_id=who[1])
+    passed = world.passed_on(who)
+    world.run(1.2)
+    client.send(common.MAVLink_mission_ack_message(1, 190, 15, 1))
+    client.send(common.MAVLink_timesync_message(12345, 6789))
+    client.send(common.MAVLink_param_request_list_message(1, 1))
+    world.run(0.2)
+    assert not passed.intersection((MISSION_ACK, 111, 21))
 
 
 def test_what_bounds_a_rover_is_of_safety_alone(with_roles: MakeRoles) -> None:

@@ -1,6 +1,7 @@
 """STOP: whatever the rover does, it stands soon, and nothing moves it until continue."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -245,6 +246,20 @@ MOTION_OF_CLIENTS = [
     set_mode(AUTO),
     set_mode(MANUAL),
 ]
+#: what may carry anything, or is for a part of the rover that is not known
+OTHER_WAYS = [
+    common.MAVLink_serial_control_message(10, 0, 0, 0, 4, [65] * 70),
+    common.MAVLink_tunnel_message(1, 1, 0, 4, [0] * 128),
+    common.MAVLink_v2_extension_message(0, 1, 1, 7, [0] * 249),
+    common.MAVLink_mission_set_current_message(1, 99, 0),
+    common.MAVLink_mission_count_message(1, 99, 3, 0),
+]
+QUESTIONS = [
+    common.MAVLink_param_request_list_message(1, 1),
+    common.MAVLink_param_set_message(1, 1, b"CRUISE_SPEED", 1.0, 9),
+    common.MAVLink_timesync_message(0, 1),
+    common.MAVLink_file_transfer_protocol_message(0, 1, 1, [0] * 251),
+]
 MOVING_COMMANDS: list[Callable[[World], object]] = [
     lambda world: world.client.arm(),
     lambda world: world.client.arm(target=(1, 0)),
@@ -267,6 +282,47 @@ def test_no_motion_message_passes_while_stopped(world: World, message: object) -
     world.client.stream(message, rate=10)
     world.run(2)
     assert stands_in_hold(world)
+
+
+@pytest.mark.parametrize("number", [65, 81, 91, 92, 93, 420])
+@pytest.mark.parametrize("is_stopped", [True, False])
+def test_what_may_be_an_input_of_the_rover_passes_neither_after_stop_nor_beside_a_task(
+    world: World, number: int, *, is_stopped: bool
+) -> None:
+    passed = world.passed_on((255, 190))
+    world.client.move(3)
+    world.until_state(1, S.EXECUTING)
+    if is_stopped:
+        world.client.stop()
+        world.run(1)
+    header = bytes((0xFD, 20, 0, 0, 1, 255, 190)) + number.to_bytes(3, "little")
+    world.client.send_raw(header + b"\1" * 22)
+    world.run(0.2)
+    assert number not in passed
+
+
+@pytest.mark.parametrize("message", OTHER_WAYS, ids=lambda m: m.get_type())
+def test_other_ways_to_the_rover_are_closed_after_stop(world: World, message: Any) -> None:
+    passed = world.passed_on((255, 190))
+    world.client.send(message)
+    world.run(0.2)
+    assert message.get_msgId() in passed
+    passed.clear()
+    world.client.stop()
+    world.run(1)
+    world.client.send(message)
+    world.run(0.2)
+    assert message.get_msgId() not in passed
+
+
+@pytest.mark.parametrize("message", QUESTIONS, ids=lambda m: m.get_type())
+def test_what_asks_or_is_set_for_later_passes_in_spite_of_stop(world: World, message: Any) -> None:
+    passed = world.passed_on((255, 190))
+    world.client.stop()
+    world.run(1)
+    world.client.send(message)
+    world.run(0.2)
+    assert message.get_msgId() in passed
 
 
 @pytest.mark.parametrize("send", MOVING_COMMANDS)
