@@ -146,6 +146,8 @@ class VehicleTasks:
         """Give up to ``count`` waiting tasks from a position on."""
         if first + count <= len(self._queue):
             return self._queue.page(first, count)
+        if first >= self._room.count(self.vehicle):
+            return []  # without putting all that wait in order
         return self.waiting[first : first + count]
 
     def start_time(self, task: Task) -> float:

@@ -208,7 +208,7 @@ class Observer:
 
     def answered(self, now: float, data: bytes) -> None:
         """The server sends a datagram to a client: to go on ends nothing if it is refused."""
-        if data[7] != ACK or data[5] != self.system_id:
+        if int.from_bytes(data[7:10], "little") != ACK or data[5] != self.system_id:
             return
         message = self._decoder.decode(bytearray(data))
         left = self._wishes.answered(message.command, is_granted=message.result == ACCEPTED)
