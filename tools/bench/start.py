@@ -17,6 +17,9 @@ REPEATS = 5
 GIVE_UP = 10.0  # s
 MAV_TASKS = Path(sys.executable).with_name("mav-tasks")
 
+#: in which modules are kept compiled, as where the package is installed
+ENVIRONMENT = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
+
 GOAL_START = 1.0  # s
 GOAL_HELP = 0.3  # s
 GOAL_IMPORT = 0.15  # s, without the generated dialect
@@ -55,10 +58,9 @@ def _row(what: str, seconds: float, python: float, goal: float | None) -> Row:
 
 
 def _run(*command: str) -> float:
-    """Seconds of a process that finds its modules compiled, as every one but the first does."""
-    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
+    """Seconds of a process; all but the first find their modules compiled."""
     start = perf_counter()
-    subprocess.run(command, stdout=subprocess.DEVNULL, check=True, env=environment)
+    subprocess.run(command, stdout=subprocess.DEVNULL, check=True, env=ENVIRONMENT)
     return perf_counter() - start
 
 
@@ -80,6 +82,7 @@ def _first_heartbeat() -> float:
             ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            env=ENVIRONMENT,
         )
         try:
             end = monotonic() + GIVE_UP
