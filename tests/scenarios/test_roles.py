@@ -402,6 +402,19 @@ def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     assert not passed.intersection((MISSION_ACK, 111, 21))
 
 
+@pytest.mark.parametrize(("opcode", "passes"), [(1, True), (2, False), (4, True), (7, False)])
+def test_an_observer_reads_files_and_ends_nobody_else_s_sessions(
+    with_roles: MakeRoles, opcode: int, *, passes: bool
+) -> None:
+    world = with_roles()
+    observer = join(world, OBSERVER)
+    passed = world.passed_on((OBSERVER, 190))
+    payload = [0, 0, 0, opcode] + [0] * 247
+    observer.send(common.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
+    world.run(0.2)
+    assert bool(passed) is passes
+
+
 def test_what_bounds_a_rover_is_of_safety_alone(with_roles: MakeRoles) -> None:
     world = with_roles()
     operator = join(world, OPERATOR)
