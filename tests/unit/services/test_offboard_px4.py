@@ -148,6 +148,19 @@ class TestTakingControl:
             ticks(rig, PERIOD)
         assert rig.story() == ["zero", "our mode", "zero"]
 
+    def test_where_the_zeros_had_ended_it_begins_anew(self) -> None:
+        rig = armed_in_hold()
+        ticks(rig, LEAD_IN + 2 * PERIOD)
+        rig.story()
+        rig.now += 0.4  # the server stood still
+        ticks(rig, LEAD_IN - PERIOD)
+        assert rig.story() == ["zero", "HOLD"], "what was asked for may come yet"
+        rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
+        ticks(rig, LEAD_IN - PERIOD)
+        assert rig.story() == ["zero"]
+        ticks(rig, 4 * PERIOD)
+        assert rig.story() == ["zero", "our mode", "zero"]
+
     @pytest.mark.parametrize("speed", [0.5, -0.5])
     def test_no_motion_before_control(self, speed: float) -> None:
         rig = Rig(PX4)
