@@ -22,6 +22,7 @@ T = TypeVar("T")
 
 START_LIMIT = 20.0  # s, for a process to say that it is there (cold caches, busy machine)
 STOP_LIMIT = 10.0  # s
+TOLD_OF_A_FAILURE = 8_000  # characters of what each process had said
 
 
 @dataclass
@@ -92,6 +93,9 @@ def process(
     running = Process(popen, output)
     try:
         yield running
+    except BaseException:
+        print(f"--- {name} had said, at its end:\n{running.text[-TOLD_OF_A_FAILURE:]}")
+        raise
     finally:
         if popen.poll() is None:
             popen.kill()
