@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +23,8 @@ T = TypeVar("T")
 
 START_LIMIT = 20.0  # s, for a process to say that it is there (cold caches, busy machine)
 STOP_LIMIT = 10.0  # s
+PORTS = range(20_000, 32_000)  # below those that Linux gives by itself, above 14550 and its like
+WORKERS = 8  # of pytest-xdist, each with ports of its own
 TOLD_OF_A_FAILURE = 8_000  # characters of what each process had said
 
 
@@ -237,14 +240,32 @@ def free_udp_ports(count: int) -> list[int]:
 
 
 def _free_ports(count: int, kind: socket.SocketKind) -> list[int]:
-    sockets = [socket.socket(socket.AF_INET, kind) for _ in range(count)]
-    try:
-        for each in sockets:
-            each.bind(("127.0.0.1", 0))
-        return [int(each.getsockname()[1]) for each in sockets]
-    finally:
-        for each in sockets:
-            each.close()
+    return list(islice((port for port in _own_ports if _is_free(port, kind)), count))
+
+
+def _is_free(port: int, kind: socket.SocketKind) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def _ports_of_this_process() -> Iterator[int]:
+    """Give ports that no other process of this run is given, none again before all have been.
+
+    They lie below those that the system gives by itself: a server goes on sending to who has just
+    left, and pushes to where nobody may listen. What comes next to such a port would hear it, and
+    take a stranger's rover for its own.
+    """
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    own = PORTS[worker % WORKERS :: WORKERS]
+    begin = os.getpid() * 97 % len(own)  # two runs beside each other begin at different ones
+    return cycle((*own[begin:], *own[:begin]))
+
+
+_own_ports = _ports_of_this_process()
 
 
 def wait_for(
