@@ -2,9 +2,18 @@
 
 import os
 
+import pytest
+
+from tests.kit.run_again import RunAgain
+
 for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
     del os.environ[name]
 os.environ["MAV_TASKS_CONFIG"] = ""
 
 # pymavlink settles on a version of MAVLink when it is first imported, whichever test that is in.
 os.environ["MAVLINK20"] = "1"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Run again what failed while the machine stood still."""
+    config.pluginmanager.register(RunAgain())

@@ -1,0 +1,83 @@
+"""When the machine stood still: a small process beside the tests that only sleeps and looks.
+
+Started as a program it writes a line for each time it was kept from running, until its parent ends.
+"""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from time import monotonic, sleep
+
+STALL = 0.25  # s; half of watch.late_tick, by which a server holds what it drives
+PERIOD = 0.02  # s
+
+
+@dataclass(frozen=True)
+class Stall:
+    """From when to when, monotonic seconds, which all processes of a machine share."""
+
+    begin: float
+    end: float
+
+
+@dataclass
+class StallWatch:
+    """Knows the stalls since it was made."""
+
+    stalls: list[Stall] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._watcher = subprocess.Popen(
+            [sys.executable, "-I", "-S", __file__], stdout=subprocess.PIPE
+        )
+        assert self._watcher.stdout is not None
+        self._watcher.stdout.readline()  # it watches
+        self._told = self._watcher.stdout.fileno()
+        os.set_blocking(self._told, False)
+        self._rest = b""
+
+    @property
+    def pid(self) -> int:
+        """The watcher's process id."""
+        return self._watcher.pid
+
+    def since(self, begin: float) -> list[Stall]:
+        """Give the stalls that ended after that time."""
+        sleep(3 * PERIOD)  # of one that has just ended the watcher has yet to tell
+        self._read()
+        return [stall for stall in self.stalls if stall.end > begin]
+
+    def close(self) -> None:
+        """End the watcher."""
+        self._watcher.kill()
+        self._watcher.wait()
+        assert self._watcher.stdout is not None
+        self._watcher.stdout.close()
+
+    def _read(self) -> None:
+        while True:
+            try:
+                told = os.read(self._told, 65_536)
+            except BlockingIOError:
+                return
+            if not told:
+                raise RuntimeError("who watches for stalls has ended")
+            *lines, self._rest = (self._rest + told).split(b"\n")
+            self.stalls += [Stall(*map(float, line.split())) for line in lines]
+
+
+def watch() -> None:
+    """Write an empty line, then begin and end of each stall, until the parent is gone."""
+    parent, last = os.getppid(), monotonic()
+    print(flush=True)
+    while os.getppid() == parent:
+        sleep(PERIOD)
+        now = monotonic()
+        if now - last > STALL:
+            print(last, now, flush=True)
+        last = now
+
+
+if __name__ == "__main__":
+    watch()

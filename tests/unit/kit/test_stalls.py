@@ -1,0 +1,41 @@
+"""Tests of who watches whether the machine stands still, with a watcher that is held up itself."""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import closing
+from time import monotonic, sleep
+
+import pytest
+
+from tests.kit.processes import wait_until
+from tests.kit.stalls import STALL, StallWatch
+
+
+@pytest.fixture
+def watch() -> Iterator[StallWatch]:
+    with closing(StallWatch()) as it:
+        yield it
+
+
+def hold_up(watch: StallWatch, seconds: float) -> None:
+    """Keep the watcher from running, as a machine does that stands still."""
+    os.kill(watch.pid, signal.SIGSTOP)
+    sleep(seconds)  # what is tried
+    os.kill(watch.pid, signal.SIGCONT)
+
+
+def test_a_stall_is_told_with_its_time(watch: StallWatch) -> None:
+    before = monotonic()
+    hold_up(watch, 2 * STALL)
+    after = monotonic()
+    (stall,) = wait_until(lambda: watch.since(before), within=10, what="the stall")
+    assert stall.begin <= before + 0.1
+    assert stall.end >= before + 2 * STALL
+    assert not watch.since(max(after, stall.end))
+
+
+def test_a_watcher_that_ended_is_no_quiet_machine(watch: StallWatch) -> None:
+    os.kill(watch.pid, signal.SIGKILL)
+    with pytest.raises(RuntimeError, match="has ended"):
+        wait_until(lambda: watch.since(0.0), within=10, what="the error")
