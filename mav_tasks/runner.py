@@ -35,8 +35,10 @@ from mav_tasks.witness import Witness
 log = logging.getLogger("mav_tasks")
 
 DRAIN = 64  # datagrams read from one link before the others have their turn
-AT_A_TIME = 8  # of them, taken in even when a setpoint is due
-EACH_TAKES = 1e-4  # s, about, to take one in: so many are, before the time asks for something
+EACH_TAKES = 1e-4  # s, to take one in, until it is known what those of a link take
+LEARNT = 0.2  # the part that the latest count for in that: one may be slow by chance
+SLOWER = 4.0  # times what was known, at the most, do they count for
+TURN = 1e-3  # s, for which datagrams are taken in even when a setpoint is due
 WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 
 HANGUP = 0.2  # s after SIGHUP, when it is seen whether the terminal is gone
@@ -126,6 +128,8 @@ class Runner:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._over: asyncio.Future[int] | None = None
+        #: s, that a datagram of a link takes with all that it has sent: to many clients, longer
+        self._each_takes = dict.fromkeys(self._links, EACH_TAKES)
         self._wall_offset: float | None = None
         self._is_ending = False
 
@@ -183,11 +187,15 @@ class Runner:
         assert self._over is not None
         while datagrams and not self._over.done():
             due = self._timer.when() if self._timer is not None else inf
-            left = due - self._loop.time()
-            count = max(AT_A_TIME, int(min(left / EACH_TAKES, DRAIN)))
-            self._guarded(Packets(link.name, datagrams[:count]))
-            datagrams = datagrams[count:]
-            if datagrams and self._timer is not None and self._timer.when() <= self._loop.time():
+            began = self._loop.time()
+            each = self._each_takes[link.name]
+            now_in = datagrams[: max(1, int(min(max(due - began, TURN) / each, DRAIN)))]
+            datagrams = datagrams[len(now_in) :]
+            self._guarded(Packets(link.name, now_in))
+            ended = self._loop.time()
+            took = min((ended - began) / len(now_in), SLOWER * each)
+            self._each_takes[link.name] = each + LEARNT * (took - each)
+            if datagrams and self._timer is not None and self._timer.when() <= ended:
                 self._guarded(None)
 
     def _note(self, link: StreamLink, changes: list[PeerChange]) -> None:
