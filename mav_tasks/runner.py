@@ -325,8 +325,15 @@ class Runner:
             self._over.set_result(code)
 
     def _send(self, outgoing: Outgoing) -> None:
+        if outgoing.until < inf and self._is_over_for(outgoing):
+            return
         link = self._links[outgoing.link]
         if outgoing.is_first and isinstance(link, StreamLink):
             link.send(outgoing.peer, outgoing.data, first=True)
         else:
             link.send(outgoing.peer, outgoing.data)
+
+    def _is_over_for(self, outgoing: Outgoing) -> bool:
+        """Whether it was made before this process stood still: then it must not leave any more."""
+        assert self._loop is not None
+        return self._loop.time() > outgoing.until

@@ -3,6 +3,7 @@
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.mavlink.signing import Key
@@ -120,9 +121,14 @@ Input = (
 
 
 class Outgoing(NamedTuple):
-    """One datagram to send; ``is_first``: before everything that waits for its turn."""
+    """One datagram to send; ``is_first``: before everything that waits for its turn.
+
+    What has not left ``until`` then, monotonic seconds, must not leave any more: a process that was
+    not given time would move a vehicle by what it knew long ago.
+    """
 
     link: str
     peer: Peer
     data: bytes
     is_first: bool = False
+    until: float = inf

@@ -1,5 +1,7 @@
 """The way out to one endpoint: numbering per source, packing, and the shared queue of packets."""
 
+from math import inf
+
 from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.signatures import Signatures
 from mav_tasks.mavlink.address import Address
@@ -34,10 +36,12 @@ class Outlet:
         """Give an outlet to the same endpoint that fills another queue, and signs nothing."""
         return Outlet(self.link, self.peer, queue, self._packer)
 
-    def send(self, message: Message, source: Address, *, first: bool = False) -> None:
-        """Send a message of our own in the name of ``source``."""
+    def send(
+        self, message: Message, source: Address, *, first: bool = False, until: float = inf
+    ) -> None:
+        """Send a message of our own in the name of ``source``; as ``Outgoing`` has it."""
         raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
-        self._put(raw, first=first)
+        self._put(raw, first=first, until=until)
 
     def forward(self, packet: Packet) -> None:
         """Pass a packet on; a gap in its source's numbers stays one."""
@@ -53,7 +57,7 @@ class Outlet:
         """Note that a packet of the source is not passed on, so that no gap shows."""
         self._sequence.withheld(source)
 
-    def _put(self, raw: bytes, *, first: bool = False) -> None:
+    def _put(self, raw: bytes, *, first: bool = False, until: float = inf) -> None:
         if self._signatures is not None:
             raw = self._signatures.sealed(self.link, self.peer, raw)
-        self._queue.append(Outgoing(self.link, self.peer, raw, first))
+        self._queue.append(Outgoing(self.link, self.peer, raw, first, until))

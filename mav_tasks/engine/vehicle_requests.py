@@ -19,6 +19,7 @@ from mav_tasks.services.loss_failsafe import LossFailsafe
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import Done, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
+from mav_tasks.services.orders import moves
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Watch
 
@@ -223,7 +224,8 @@ class VehicleRequests:
                 # zeros stay behind what setpoints wait; HOLD stops it whatever those say
                 is_command = isinstance(item, m.CommandLong | m.CommandInt)
                 is_first = is_command and self.control.phase is Phase.STOPPING
-                self._outlet.send(item, self._source, first=is_first)
+                until = now + self._watch.motion_fresh if moves(item) else inf
+                self._outlet.send(item, self._source, first=is_first, until=until)
         for answer in answers:
             self._dispatch(answer, now=now)
         return bool(setpoints)

@@ -85,7 +85,7 @@ class LineWriter:
 
     def _digest(self, packets: Sequence[Outgoing]) -> str:
         parts: list[bytes] = []
-        for link, peer, data, is_first in packets:
+        for link, peer, data, is_first, _ in packets:
             parts += (self._way(link, peer), b"!" if is_first else b".", data)
         return blake2b(b"".join(parts), digest_size=DIGEST).hexdigest()
 

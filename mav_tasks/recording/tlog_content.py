@@ -61,7 +61,7 @@ class TlogContent:
         """Give what stands in the log of the packets of one turn."""
         when = self._when(now)
         told: dict[bytes, tuple[str, Peer]] = {}
-        for link, peer, data, _ in packets:
+        for link, peer, data, *_ in packets:
             if link in self._vehicle_links or self._is_news(data, (link, peer), told):
                 yield when + data
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
-from mav_tasks.mavlink.messages import CommandInt, CommandLong, SetPositionTargetLocalNed
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetPositionTargetLocalNed
 from mav_tasks.services.mission_item import NOT_GIVEN
 from mav_tasks.services.persona import Persona
 
@@ -106,3 +106,12 @@ class Orders:
         self, command: MavCmd, param1: float, param2: float = 0.0, param3: float = 0.0
     ) -> CommandLong:
         return CommandLong(*self._target, command, 0, param1, param2, param3, 0, 0, 0, 0)
+
+
+def moves(message: Message) -> bool:
+    """Whether it sets a vehicle in motion, or makes it ready for that: nothing to come late."""
+    if isinstance(message, SetPositionTargetLocalNed):
+        return any((message.vx, message.vy, message.vz, message.yaw_rate))
+    if isinstance(message, CommandLong) and message.command == MavCmd.COMPONENT_ARM_DISARM:
+        return message.param1 != 0.0
+    return False

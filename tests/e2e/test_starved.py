@@ -2,7 +2,7 @@
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
@@ -45,12 +45,25 @@ class Tap(LossyUdp):
             self.setpoints.append(Passed(monotonic(), moves))
 
 
+def stop_anywhere(server: int, flag: Path) -> None:
+    os.kill(server, signal.SIGSTOP)
+
+
+def stop_before_a_setpoint_leaves(server: int, flag: Path) -> None:
+    """Have it made and not sent: the worst moment there is."""
+    flag.touch()
+    wait_until(lambda: not flag.exists(), within=5, what="a setpoint to be made")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("persona", ["ardupilot", "px4"])
+@pytest.mark.parametrize("stop", [stop_anywhere, stop_before_a_setpoint_leaves])
 def test_a_server_that_stood_still_for_5_s_sends_no_old_setpoint_and_holds_the_task(
-    tmp_path: Path, persona: str
+    tmp_path: Path, persona: str, stop: Callable[[int, Path], None]
 ) -> None:
     taps: list[Tap] = []
+    flag = tmp_path / "stop"
+    module = ("tests.kit.suspended", str(flag))
 
     @contextmanager
     def tapped(rover_port: int) -> Iterator[str]:
@@ -61,14 +74,14 @@ def test_a_server_that_stood_still_for_5_s_sends_no_old_setpoint_and_holds_the_t
         finally:
             tap.close()
 
-    with stand(tmp_path, persona=persona, way=tapped) as running:
+    with stand(tmp_path, persona=persona, way=tapped, module=module) as running:
         (tap,) = taps
         link = running.connect()
         assert command_long(link, MOVE, 50.0, FAST, 0, 7).result == 0
         wait_until(lambda: running.speed() > 0.9 * FAST, within=20, what="the rover at speed")
         server = running.server.popen.pid
 
-        os.kill(server, signal.SIGSTOP)
+        stop(server, flag)
         stopped_at, was_at = monotonic(), running.truth()[-1]
         wait_until(lambda: running.speed() < 0.01, within=STOPPED, what="the rover to stand")
         stood_at = running.truth()[-1]

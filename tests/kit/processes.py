@@ -180,18 +180,20 @@ def stand(
     serve_store: str = ":memory:",
     client_options: str = "",
     rover_options: tuple[str, ...] = (),
+    module: tuple[str, ...] = ("mav_tasks.cli",),
     way: Callable[[int], AbstractContextManager[str]] = udp_to,
 ) -> Iterator[Stand]:
     """Run a server and a rover of that make on ports of their own.
 
-    ``way`` makes of the rover's UDP port the URL by which the server is to reach it,
-    ``client_options`` stand behind the URL for clients.
+    ``module`` is what runs the server, with its arguments before ``serve``. ``way`` makes of the
+    rover's UDP port the URL by which the server is to reach it, ``client_options`` stand behind the
+    URL for clients.
     """
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", body, "--persona", persona]
     rover += ["--truth", str(truth), *rover_options]
-    serve = ["-m", "mav_tasks.cli", "serve"]
+    serve = ["-m", *module, "serve"]
     serve += ["--client", f"udpin:127.0.0.1:{client_port}{client_options}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]
     serve += ["--store", serve_store, *serve_options]

@@ -1,9 +1,13 @@
 """What is lost on the way, or stops making sense: the rover stops, and nothing is guessed."""
 
+from math import inf
+
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -12,6 +16,8 @@ from tests.kit.client import MOVE
 from tests.kit.world import World, near_pose
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
+SETPOINT, COMMAND = 84, 76
+ARM_DISARM, SET_MODE = common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_DO_SET_MODE
 INTERVAL = common.MAV_CMD_SET_MESSAGE_INTERVAL
 
 
@@ -250,6 +256,38 @@ def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: fl
     world.until(world.stands, within=3)
     world.run(2)
     assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(world: World) -> None:
+    server, left = world.server, list[tuple[common.MAVLink_message, float]]()
+    take_packets = server.engine.take_packets
+
+    def taken() -> list[Outgoing]:
+        packets = take_packets()
+        for packet in packets:
+            if packet.link == VEHICLE_LINK:
+                message = common.MAVLink(None).decode(bytearray(packet.data))
+                left.append((message, packet.until - world.now))
+        return packets
+
+    server.engine.take_packets = taken  # type: ignore[method-assign]
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    world.client.stop()
+    world.run(3)
+    late = Settings().watch.motion_fresh
+    moving = [until for each, until in left if each.get_msgId() == SETPOINT and each.vx]
+    zeros = [until for each, until in left if each.get_msgId() == SETPOINT and not each.vx]
+    commands = [each for each in left if each[0].get_msgId() == COMMAND]
+    arming = [until for each, until in commands if each.command == ARM_DISARM and each.param1 == 1]
+    others = [until for each, until in commands if each.command == SET_MODE]
+    assert len(moving) > 10
+    assert arming
+    assert [*moving, *arming] == pytest.approx([late] * len([*moving, *arming]))
+    assert len(zeros) > 10
+    assert len(others) > 1  # ours, and HOLD
+    assert set(zeros + others) == {inf}
 
 
 def test_a_client_that_wakes_a_late_server_does_not_make_it_drive_on(driving: World) -> None:

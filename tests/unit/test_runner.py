@@ -366,6 +366,45 @@ def test_who_goes_while_the_engine_is_told_of_others_is_gone_before_anybody_come
     ]
 
 
+class Slow(Recorder):
+    """An engine whose packets are old when it gives them."""
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Nothing is due."""
+
+    def take_packets(self) -> list[Outgoing]:
+        if not any(isinstance(item, Packets) for item in self.inputs):
+            return []
+        self.inputs.clear()
+        old, now = (asyncio.get_running_loop().time() + wait for wait in (-1e-3, 60.0))
+        packets = [
+            Outgoing("stream", "peer", b"zero"),
+            Outgoing("stream", "peer", b"on", until=old),
+        ]
+        return [*packets, Outgoing("stream", "peer", b"faster", until=now)]
+
+
+def test_what_was_made_before_the_process_stood_still_does_not_leave() -> None:
+    link = FakeStream()
+
+    async def run() -> None:
+        engine = Slow()
+        running = asyncio.create_task(
+            Runner(engine, MemoryStore(), clients=[], vehicles=[link]).run()
+        )
+        await asyncio.sleep(0)
+        link.comes([], b"word")
+        while not link.sent:
+            await asyncio.wait_for(link.tends.get(), 10)
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.02)
+        await asyncio.wait_for(running, 10)
+
+    asyncio.run(run())
+    assert link.sent == [b"zero", b"faster"]
+
+
 class Broken(Recorder):
     """An engine that fails when somebody comes, with a setpoint not yet sent."""
 
