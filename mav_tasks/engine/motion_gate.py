@@ -10,6 +10,7 @@ from math import isfinite
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.orders import moves
 
 #: drive the vehicle: pass only for a client that has control of it
 MOTION = (
@@ -21,6 +22,9 @@ MOTION = (
     m.MissionItem,  # with current = 2 it is ArduPilot's "go to"
     m.MissionItemInt,
 )
+#: of them, what comes again and again, each for a moment
+STREAMED = (m.SetPositionTargetLocalNed, m.SetPositionTargetGlobalInt, m.SetAttitudeTarget)
+NO_PLACE = 7  # type_mask of what ignores x, y and z
 #: the same, of kinds that are no messages here: inputs of a radio or of a simulator, of which it is
 #: not looked at what they say
 RAW_MOTION = frozenset(
@@ -51,9 +55,21 @@ RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 
 
-def may_pass(vehicle: Vehicle, client: Hashable, packet: Packet, message: m.Message | None) -> bool:
-    """Whether a client's packet may be passed on to the vehicle; then ``passed`` is called."""
+def may_pass(
+    vehicle: Vehicle,
+    client: Hashable,
+    packet: Packet,
+    message: m.Message | None,
+    *,
+    is_old: bool = False,
+) -> bool:
+    """Whether a client's packet may be passed on to the vehicle; then ``passed`` is called.
+
+    ``is_old``: it may have waited for us while the vehicle stopped by itself.
+    """
     if _moves(packet, message):
+        if is_old and isinstance(message, STREAMED) and not _asks_to_stand(message):
+            return False
         return (message is None or _is_finite(message)) and vehicle.may_move(client)
     return packet.message_id in MOTIONLESS or not vehicle.tasks.is_stopped
 
@@ -80,6 +96,15 @@ def _moves(packet: Packet, message: m.Message | None) -> bool:
     if isinstance(message, m.MissionItem | m.MissionItemInt):
         return message.current in GO_TO  # or else it is part of an upload
     return isinstance(message, MOTION)
+
+
+def _asks_to_stand(message: m.Message) -> bool:
+    return (
+        isinstance(message, m.SetPositionTargetLocalNed)
+        and message.type_mask & NO_PLACE == NO_PLACE
+        and not moves(message)
+        and not any((message.afx, message.afy, message.afz))
+    )
 
 
 def _is_finite(message: m.Message) -> bool:

@@ -64,7 +64,8 @@ class Passing:
                 if refusal is not None:
                     client.outlet.send(refusal, vehicle.server_address)
         for vehicles in behind.values():
-            if all(may_pass(vehicle, client.key, packet, message) for vehicle in vehicles):
+            is_old = self._vehicles.is_old_news(now=now)
+            if all(may_pass(v, client.key, packet, message, is_old=is_old) for v in vehicles):
                 for vehicle in vehicles:
                     passed(vehicle, packet, message, now=now)
                 vehicles[0].requests.forward(packet)

@@ -26,6 +26,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 
+OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
 MAX_PEERS = 256  # endpoints on one vehicle link
 BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
 
@@ -86,6 +87,7 @@ class VehicleSide:
         self._links: dict[str, _Link] = {}
         self._router = Router()
         self._agenda = Agenda()
+        self._old_until = -inf
         self._noted: set[str] = set()
         self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
         #: heartbeats of a known vehicle's id from another place: when the first one came
@@ -239,11 +241,16 @@ class VehicleSide:
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
-        if self._agenda.next_deadline() + self._settings.watch.late_tick >= now:
+        if self.next_deadline() + self._settings.watch.late_tick >= now:
             return
+        self._old_until = now + OLD_NEWS
         for vehicle in self:
             self._agenda.touch(vehicle)
             vehicle.check_late(now=now)
+
+    def is_old_news(self, *, now: float) -> bool:
+        """Whether what is read now may have waited while this process stood still."""
+        return now < self._old_until
 
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do; inf: never, as things are."""

@@ -150,6 +150,53 @@ def test_a_go_to_is_now_only_at_the_autopilot_with_a_change_of_mode(
     assert [world.state(i)[0] for i in (1, 2)] == [S.EXECUTING, S.QUEUED]
 
 
+def test_what_a_client_said_while_the_server_stood_still_moves_no_rover(world: World) -> None:
+    takes_control(world)
+    world.observer.expects_gaps = True
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(2)
+    assert world.truth.forward_speed > 0.4
+    world.leave(world.server)
+    world.run(1)
+    world.client.end_streams()
+    world.until(world.stands, within=6)  # by its own time-out
+    world.run(1)
+    stood_at = world.pose()
+    world.join(world.server)
+    world.run(3)
+    assert world.pose() == stood_at
+
+
+def test_a_client_that_drives_on_while_the_server_stands_still_drives_after_it(
+    world: World,
+) -> None:
+    takes_control(world)
+    world.observer.expects_gaps = True
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(2)
+    world.suspend_server(5)
+    world.run(0.25)
+    assert world.truth.forward_speed < 0.01
+    world.run(2)
+    assert world.truth.forward_speed > 0.4
+
+
+def test_that_a_rover_is_to_stand_is_passed_on_however_late(world: World) -> None:
+    takes_control(world)
+    world.observer.expects_gaps = True
+    world.client.stream(setpoint(0.5), rate=20)
+    world.run(2)
+    world.leave(world.server)
+    world.run(1.7)
+    world.client.end_streams()
+    world.client.send(setpoint(0.0))
+    world.run(0.1)
+    assert world.truth.forward_speed > 0.4
+    world.join(world.server)
+    world.run(1.2)
+    assert world.stands()  # its own time-out would be later
+
+
 @pytest.mark.parametrize("seconds", [1.0, 4.0])
 def test_tasks_wait_as_long_as_is_set_after_a_clients_setpoints(
     make_world: MakeWorld, seconds: float

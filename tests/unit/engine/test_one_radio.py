@@ -38,6 +38,7 @@ class Rig:
         self.now += 0.1
         seq = round(self.now * 10) % 256
         data = self.packer.pack(message, source, seq=seq)
+        self.engine.handle_deadline(now=self.now)
         self.engine.handle(Packets(link, [(peer, data)]), now=self.now)
 
     def says(self, system_id: int, mode: int, armed: int) -> None:
