@@ -47,7 +47,7 @@ from mav_tasks.plan_files import (
 )
 from mav_tasks.services.mission_item import Item
 from mav_tasks.tasks.goal import Drive, Move, Rotate
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import ACTIVE, WAITING, TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 DEFAULT_LINK = "udpout:127.0.0.1:14560"
@@ -290,11 +290,12 @@ class Client:
                 current = await self.status(running, vehicle=system_id)
             except Refused:
                 current = None  # over, and forgotten, in between
-        waiting = sum(overview.counts[1:4])
+        waiting = sum(overview.counts[state] for state in WAITING)
+        begun = sum(overview.counts[state] for state in ACTIVE)
         tasks: dict[int, TaskStatus] = {}
         for first in range(0, min(waiting, limit), PAGE):
             count = min(PAGE, waiting - first)
-            page = await self._ask.page(system_id, first, count, known=tasks)
+            page = await self._ask.page(system_id, first, count, begun=begun, known=tasks)
             tasks |= {task.id: task for task in page}
         return queue_status_of(overview, system_id, tuple(tasks.values())[:limit], current)
 

@@ -174,21 +174,23 @@ class Asker:
                 return await self._shown(future, request, f"the queue of rover {vehicle}")
 
     async def page(
-        self, vehicle: int, first: int, count: int, *, known: Container[int]
+        self, vehicle: int, first: int, count: int, *, begun: int, known: Container[int]
     ) -> list[TaskStatus]:
         """Ask for waiting tasks by their place; if some are lost on the way, again.
 
-        ``known`` are those of earlier pages, which may still come.
+        ``begun`` is how many tasks have begun: a position counts them, the place in the queue does
+        not. ``known`` are those of earlier pages, which may still come.
         """
         found: dict[int, TaskStatus] = {}
-        places = range(first, first + count)
+        # any number of them may end meanwhile, and one may begin
+        positions = range(first, first + count + begun + 1)
         whole = asyncio.Event()
 
         def take(status: TaskStatus) -> None:
             if status.vehicle != vehicle or not status.is_waiting or status.id in known:
                 return
             is_unplaced = status.position is None and status.state is not TaskState.QUEUED
-            if is_unplaced or status.position in places:
+            if is_unplaced or status.position in positions:
                 found[status.id] = status
                 if len(found) >= count:
                     whole.set()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks import Refused, SyncClient, TaskState, read_plan
+from mav_tasks import Drive, Refused, SyncClient, TaskState, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, surroundings
 from tests.kit.processes import Stand, stand, wait_until
@@ -198,6 +198,19 @@ def test_each_goal_becomes_what_it_says(server: str, client: SyncClient) -> None
         (task,) = called("submit", *goal, "--json", server=server).objects
         assert task["what"] == what
     assert client.queue().waiting_count == len(goals)
+
+
+def test_a_queue_lists_each_waiting_task_once_and_in_order_while_one_runs(
+    server: str, client: SyncClient
+) -> None:
+    running = client.submit(Wait(60.0)).id
+    ids = [client.submit(Drive(0.0, 0.5, 0.1 + n / 1000)).id for n in range(40)]
+    wait_until(lambda: client.queue().running == running, within=10, what="a task that runs")
+    (queue,) = called("queue", "--json", server=server).objects
+    assert (queue["running"], queue["waiting_count"]) == (running, 40)
+    assert [task["id"] for task in queue["waiting"]] == ids
+    table = called("queue", server=server)
+    assert [int(line.split()[0]) for line in table.lines[3:]] == [running, *ids]
 
 
 def test_what_is_out_of_range_is_no_task(server: str, client: SyncClient) -> None:

@@ -501,6 +501,28 @@ def test_a_queue_is_told_whole_and_in_its_order_over_a_bad_link(
     world.run(script())
 
 
+@pytest.mark.parametrize("suspended", [False, True])
+def test_a_queue_is_told_whole_while_a_task_runs(world: RoverWorld, suspended: bool) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            running = await client.submit(Wait(100.0))
+            await asyncio.sleep(3.0)
+            if suspended:
+                await (await client.submit(Wait(200.0))).modify(preemptive=True)
+                await asyncio.sleep(1.0)
+            assert running.status is not None
+            assert running.status.state is (S.PAUSED if suspended else S.EXECUTING)
+            ids = [(await client.submit(short(n), priority=0)).id for n in range(40)]
+            asked_at = world.now
+            queue = await client.queue()
+            waiting = [task.id for task in queue.waiting if task.id in ids]
+            assert waiting == ids
+            assert queue.waiting_count == len(ids)
+            assert world.now - asked_at < 0.5, "nothing was asked for twice"
+
+    world.run(script())
+
+
 def test_plans_that_nobody_waits_for_are_not_uploaded_later(world: RoverWorld) -> None:
     async def script() -> None:
         async with world.client() as client:
