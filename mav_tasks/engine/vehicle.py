@@ -618,7 +618,7 @@ class Vehicle:
         self.pause(actor=SERVER, now=now)
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
-        """Let task and queue stand; zeros leave in this very step.
+        """Let task and queue stand, also when there is no task; zeros leave in this very step.
 
         A vehicle that moves without a task is stopped as by HOLD; so is one that was taken over.
         """
@@ -626,10 +626,11 @@ class Vehicle:
         self.forget_start()
         begun = self.tasks.begun
         is_driven = begun is not None and begun.reason is not TaskReason.TAKEOVER
-        if not is_driven and self.armed and not self.control.is_engaged:
-            return self.hold(client=None, actor=actor, now=now)
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
-        self.step(now=now)
+        if not is_driven and self.armed and not self.control.is_engaged:
+            self.hold(client=None, actor=actor, now=now)
+        else:
+            self.step(now=now)
         return paused
 
     def proceed(self, *, actor: str, now: float) -> TaskId | None:

@@ -1,13 +1,14 @@
 """Pause and continue: zeros at once, and the same end whatever the pattern of pauses."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
 
 import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
+from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, PAUSE_CONTINUE, ROTATE, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -70,6 +71,35 @@ def test_pausing_an_empty_queue_keeps_what_is_submitted_then(world: World) -> No
     assert world.state(1) == (S.QUEUED, R.NONE)
     world.client.proceed()
     world.until_idle(tasks=1)
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
+@pytest.mark.parametrize("has_driven", [False, True])
+def test_pausing_an_idle_armed_rover_keeps_what_is_submitted_then(
+    make_world: MakeWorld, persona: Persona, has_driven: bool
+) -> None:
+    world = make_world(persona=replace(persona, announces_changes=True))
+    before = []
+    world.operator_mode(Mode.HOLD)
+    world.client.arm()
+    world.until(lambda: world.rover.autopilot.armed, within=5)
+    if has_driven:
+        before.append(world.client.move(0.5))
+        world.until_idle(tasks=1)
+    assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (True, Mode.HOLD)
+    paused = world.client.pause()
+    world.run(2)
+    assert paused.answer == (ACCEPTED, 0)
+    assert world.paused() is R.OPERATOR
+    where, sent = world.pose(), world.client.move(1)
+    world.run(5)
+    assert world.state(sent.task_id) == (S.QUEUED, R.NONE)
+    assert world.client.statuses(sent.task_id)[-1].why == (S.QUEUED, R.QUEUE_PAUSED)
+    assert near_pose(world.pose(), where)
+
+    world.client.proceed()
+    world.until_idle(tasks=len(before) + 1)
+    assert world.state(sent.task_id)[0] is S.COMPLETED
 
 
 def test_neither_0_nor_1_is_denied(world: World) -> None:
