@@ -10,7 +10,7 @@ from mav_tasks.engine.goals import MAX_DELAY, flag, number, whole
 from mav_tasks.engine.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.enums import MavCmd, MavSeverity, TaskProperty
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -68,6 +68,12 @@ class TaskControl:
             vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: Asked, *, now: float) -> int:
+        """Call one task off; a copy gets the first one's answer, and calls off no other."""
+        first = asked.receiver.answer_to_counted_copy(asked.command, now=now)
+        if first is not None and first.result == MavResult.ACCEPTED:
+            return first.result_param2
+        if first is not None:
+            raise Rejection(R(first.result_param2), "refused a moment ago; send it anew if meant")
         task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
         kill = flag(asked.command, 2, "kill")
         begun = asked.vehicle.tasks.begun

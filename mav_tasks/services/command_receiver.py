@@ -13,6 +13,7 @@ from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Mess
 
 SAME_PACKET = 5.0  # s, the very same packet again: the same answer
 REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
+COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
 REMEMBERED = 256  # packets of one client
 
 
@@ -110,6 +111,19 @@ class CommandReceiver:
                 continue
             if _equal(pending.command, command):
                 return answer
+        return None
+
+    def answer_to_counted_copy(self, command: Command, *, now: float) -> Answer | None:
+        """Return how an equal command was answered of which this one says that it is a copy.
+
+        A copy says so by a ``confirmation`` above 0; each one keeps the memory of the first alive.
+        """
+        if command.confirmation == 0:
+            return None
+        for pending in reversed(self._packets.values()):
+            is_late = now - pending.at > COPIED
+            if pending.answer is not None and not is_late and _equal(pending.command, command):
+                return pending.answer
         return None
 
     def older_copy(self, command: Command, *, before: float, now: float) -> bool:

@@ -44,6 +44,37 @@ def test_the_running_task_is_cancelled_once_the_rover_stands(world: World, task:
     assert world.client.statuses(1)[-1].why == (S.CANCELLED, R.CANCELLED)
 
 
+@pytest.mark.parametrize("repeats_after", [0.5, 3.0])  # s; QGroundControl repeats after 3
+def test_counted_copies_cancel_one_task_and_get_the_first_ones_answer(
+    world: World, repeats_after: float
+) -> None:
+    driving(world)
+    for confirmation in range(4):
+        world.client.command(CANCEL, 0, confirmation=confirmation)
+        world.run(repeats_after)
+    assert world.client.acks_of(CANCEL) == [(ACCEPTED, 1)] * 4
+    world.until_idle(tasks=3)
+    assert [t.state for t in world.tasks()] == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
+
+
+def test_a_copy_of_a_refused_cancel_cancels_nothing_that_has_begun_since(world: World) -> None:
+    world.client.command(CANCEL, 0)
+    world.client.move(1)
+    world.until_state(1, S.EXECUTING)
+    world.client.command(CANCEL, 0, confirmation=1)
+    world.run(0.1)
+    assert world.client.acks_of(CANCEL) == [(DENIED, R.NOT_FOUND)] * 2
+    world.client.command(CANCEL, 0)  # a new decision
+    world.until_state(1, S.CANCELLED, within=4)
+
+
+def test_a_counted_copy_whose_first_one_was_lost_counts(world: World) -> None:
+    driving(world)
+    sent = world.client.command(CANCEL, 0, confirmation=2)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, 1)
+
+
 def test_a_kill_is_zero_and_hold_at_once_and_no_latch(world: World) -> None:
     driving(world)
     at = world.now
