@@ -1,7 +1,8 @@
 """Fence and rally items ↔ what the task domain makes of them. Pure functions.
 
 MAVLink common.xml, MAV_CMD_NAV_FENCE_*: the corners of a polygon are as many items one after the
-other as param1 of each says. A return point is kept for the vehicle and not used here.
+other as param1 of each says. A return point is kept for the vehicle and not used here. A circle of
+radius 0 is none: MAVSDK's programs say "no circle" so.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ def check_fence_item(item: Item, seq: int, *, count: int) -> None:
             raise bad(f"item {seq}: param1 {item.param1:g} corners", param=1)
     elif item.command in CIRCLES:
         _place(item)
-        if not 0.0 < item.param1 <= MAX_RADIUS:
+        if not 0.0 <= item.param1 <= MAX_RADIUS:
             raise bad(f"item {seq}: param1 radius {item.param1:g} m", param=1)
     else:
         raise _unsupported(item, seq, "a fence")
@@ -71,7 +72,7 @@ def fence_of(items: Sequence[Item]) -> Fence:
             zones.append(Polygon(places, CORNERS[MavCmd(item.command)], _group(item, seq)))
             seq += number
             continue
-        if item.command in CIRCLES:
+        if item.command in CIRCLES and not _is_no_circle(item):
             is_inclusion = CIRCLES[MavCmd(item.command)]
             zones.append(Circle(_place(item), item.param1, is_inclusion, _group(item, seq)))
         seq += 1
@@ -82,9 +83,18 @@ def fence_of(items: Sequence[Item]) -> Fence:
     return fence
 
 
+def fence_for_vehicle(items: Sequence[Item]) -> tuple[Item, ...]:
+    """Return the items of a fence that a vehicle is sent: autopilots refuse what is no circle."""
+    return tuple(item for item in items if not _is_no_circle(item))
+
+
 def rally_of(items: Sequence[Item]) -> tuple[GlobalPlace, ...]:
     """Give the places of rally points."""
     return tuple(_place(item) for item in items)
+
+
+def _is_no_circle(item: Item) -> bool:
+    return item.command in CIRCLES and item.param1 == 0.0
 
 
 def _place(item: Item) -> GlobalPlace:

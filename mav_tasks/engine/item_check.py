@@ -29,7 +29,7 @@ class ItemCheck:
         self._settings = settings
         self._read_by: tuple[int, Manner] | None = None  # length of the plan, and the manner
         self._read: list[tuple[Item, Step]] = []  # each item is read once: that takes its time
-        self._why = ""
+        self._refusal: Rejection | None = None
 
     def __repr__(self) -> str:
         return f"ItemCheck({len(self._read)} items read)"
@@ -38,10 +38,10 @@ class ItemCheck:
         """Take new settings."""
         self._settings = settings
 
-    def take_why(self) -> str:
-        """Give in words why an item was refused, "" if none was since the last call."""
-        why, self._why = self._why, ""
-        return why
+    def take_refusal(self) -> Rejection | None:
+        """Return why an item was refused, None if none was since the last call."""
+        refusal, self._refusal = self._refusal, None
+        return refusal
 
     def __call__(self, kind: int, seq: int, item: Item, count: int) -> MavMissionResult | None:
         """Whether an item can be part of a plan; the ones before it were asked about."""
@@ -57,7 +57,7 @@ class ItemCheck:
                 if isinstance(step, GoTo):
                     self._check_place(step, seq)
         except Rejection as refusal:
-            self._why = refusal.text
+            self._refusal = refusal
             return result_of(refusal)
         return None
 

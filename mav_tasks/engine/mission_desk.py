@@ -28,6 +28,7 @@ from mav_tasks.services.mission_sender import MissionSender
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TaskReason
 
 #: what clients speak the mission protocol with
 MESSAGES = (
@@ -126,6 +127,9 @@ class MissionDesks:
         match message:
             case m.MissionCount() if message.mission_type not in STORED:
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+                words = f"upload: plans of kind {message.mission_type} are not supported"
+                unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
+                self._uploads.refused(sender, vehicle, unknown, now=now)
             case m.MissionCount():
                 desk.uploads.receiver.count(message, sender, now=now)
             case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
@@ -183,7 +187,7 @@ class MissionDesks:
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
                 self._answers.ack(sender, kind, MavMissionResult.DENIED)
-                self._answers.tell(sender, vehicle, refusal.text, now=now)
+                self._uploads.refused(sender, vehicle, refusal, now=now)
             return True
         return False
 

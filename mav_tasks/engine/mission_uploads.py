@@ -10,7 +10,7 @@ from functools import partial
 from hashlib import blake2b
 from zlib import crc32
 
-from mav_tasks.engine.fence_items import fence_of
+from mav_tasks.engine.fence_items import fence_for_vehicle, fence_of
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.item_check import ItemCheck
@@ -26,7 +26,13 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavSeverity
 from mav_tasks.services.mission_item import packed
-from mav_tasks.services.mission_receiver import MissionReceiver, Sender, Upload
+from mav_tasks.services.mission_receiver import (
+    CAPACITY,
+    GIVE_UP,
+    MissionReceiver,
+    Sender,
+    Upload,
+)
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Plan
@@ -34,6 +40,21 @@ from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
 
 R = TaskReason
+
+#: why the receiver itself has ended an upload, by its answer
+ENDED = {
+    MavMissionResult.DENIED: Rejection(R.NOT_ALLOWED, "upload: another client is at it: wait"),
+    MavMissionResult.NO_SPACE: Rejection(R.QUEUE_FULL, f"upload: more than {CAPACITY} items"),
+    MavMissionResult.OPERATION_CANCELLED: Rejection(
+        R.WRONG_STATE, f"upload: no item came for {GIVE_UP:g} s: upload it again"
+    ),
+}
+
+
+def refusal_of(result: int) -> Rejection:
+    """Return why an upload ended with this MAV_MISSION_RESULT, where nothing else says so."""
+    unreadable = Rejection(R.BAD_PARAMETER, "upload: an item cannot be read")
+    return ENDED.get(MavMissionResult(result), unreadable)
 
 
 class UploadDesk:
@@ -65,14 +86,24 @@ class MissionUploads:
         self._answers = answers
         self._write_through = write_through
 
-    def flush(self, desk: UploadDesk, vehicle: Vehicle, *, now: float) -> None:
-        """Send what a desk has to say, and decide about the plans that are whole."""
+    def flush(
+        self,
+        desk: UploadDesk,
+        vehicle: Vehicle,
+        *,
+        refusal: Rejection | None = None,
+        now: float,
+    ) -> None:
+        """Send what a desk has to say, and decide about the plans that are whole.
+
+        ``refusal`` is why the plan was refused that has just been decided about.
+        """
         outgoing, uploads = desk.receiver.take()
         for told in outgoing:
             self._answers.send(told)
-            why = desk.check.take_why() if isinstance(told.message, m.MissionAck) else ""
-            if why:
-                self._answers.tell(told.sender, vehicle, why, now=now)
+            if isinstance(told.message, m.MissionAck) and told.message.type:
+                why = refusal or desk.check.take_refusal() or refusal_of(told.message.type)
+                self.refused(told.sender, vehicle, why, now=now)
         for upload in uploads:
             self._vehicles.touch(vehicle)
             self._decide(desk, vehicle, upload, now=now)
@@ -90,7 +121,7 @@ class MissionUploads:
             else:
                 self._take_in(desk, vehicle, upload, now=now)
         except Rejection as refusal:
-            self._refuse(desk, vehicle, upload.sender, refusal, now=now)
+            self._refuse(desk, vehicle, refusal, now=now)
 
     def _check_not_begun(self, vehicle: Vehicle) -> None:
         task = self._plans.task(vehicle)
@@ -172,18 +203,19 @@ class MissionUploads:
         if task.terms.is_staged:
             self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
         refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
-        self._refuse(desk, vehicle, sender, refusal, now=now)
+        self._refuse(desk, vehicle, refusal, now=now)
 
     def _replace(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         """Fence and rally points, which the vehicle keeps as well, and the empty mission."""
         if upload.mission_type == MISSION:
             self._store(desk, vehicle, upload, now=now)
             return
-        if upload.mission_type == MavMissionType.FENCE:
-            fence_of(upload.items)  # a Rejection leaves the one before in force
-        store = partial(self._store, desk, vehicle, upload)
-        refuse = partial(self._refuse, desk, vehicle, upload.sender)
         kind, items = upload.mission_type, upload.items
+        if kind == MavMissionType.FENCE:
+            fence_of(items)  # a Rejection leaves the one before in force
+            items = fence_for_vehicle(items)
+        store = partial(self._store, desk, vehicle, upload)
+        refuse = partial(self._refuse, desk, vehicle)
         self._write_through.write(vehicle, kind, items, store, refuse, now=now)
 
     def _store(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
@@ -203,15 +235,18 @@ class MissionUploads:
         def give_up(*, now: float) -> None:
             self._plans.keep(vehicle, kind, before, actor=actor, now=now)
             refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: as it was before")
-            self._refuse(desk, vehicle, sender, refusal, now=now)
+            self._refuse(desk, vehicle, refusal, now=now)
 
         self._submissions.when_durable(accept, give_up, now=now)
 
     def _refuse(
-        self, desk: UploadDesk, vehicle: Vehicle, sender: Sender, refusal: Rejection, *, now: float
+        self, desk: UploadDesk, vehicle: Vehicle, refusal: Rejection, *, now: float
     ) -> None:
         desk.receiver.finish(result_of(refusal), opaque_id=0, now=now)
-        self.flush(desk, vehicle, now=now)
+        self.flush(desk, vehicle, refusal=refusal, now=now)
+
+    def refused(self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, now: float) -> None:
+        """Say why an upload was refused: to its client, and in the log."""
         client = self._answers.client(sender)
         if client is not None and not client.may_be_refused(now=now):
             return  # a flood of them fills neither disk nor net
@@ -219,7 +254,7 @@ class MissionUploads:
         self._book.record(
             SubmissionRefused(
                 vehicle.system_id,
-                MavCmd.MISSION_START,
+                0,
                 TaskReason(refusal.reason),
                 refusal.text,
                 str(sender.address),

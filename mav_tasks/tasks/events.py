@@ -145,7 +145,7 @@ class TaskWithdrawn:
 
 @dataclass(frozen=True, slots=True)
 class SubmissionRefused:
-    """A submission refused, for the audit log."""
+    """A submission refused, for the audit log; ``command`` is 0 of an upload of a plan."""
 
     vehicle: int
     command: int
@@ -155,7 +155,8 @@ class SubmissionRefused:
     at: float
 
     def __str__(self) -> str:
-        return f"command {self.command} of {self.actor} refused: {self.text}"
+        what = f"command {self.command}" if self.command else "upload"
+        return f"{what} of {self.actor} refused: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Driving, Settings, Watch
+from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -71,7 +72,7 @@ def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
     "items",
     [
         YARD[:2],
-        [Item(CIRCLE_IN, **at(0, 0), param1=0.0, frame=0)],
+        [Item(CIRCLE_IN, **at(0, 0), param1=-1.0, frame=0)],
         [Item(WAYPOINT, **at(0, 0), frame=0)],
         [*YARD[:3], *POND],
         corners(INCLUSION, (0, 0), (1, 0), (2, 0)),
@@ -85,6 +86,41 @@ def test_a_fence_that_is_none_is_refused_and_the_one_before_stays(
     assert result is not None
     assert result > 0, "an answer, and no time-out"
     assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
+
+
+@pytest.mark.parametrize("command", [CIRCLE_IN, CIRCLE_OUT])
+def test_a_circle_of_radius_0_is_none_as_mavsdk_has_it(world: World, command: int) -> None:
+    no_circle = Item(command, x=0, y=0, param1=0.0, frame=0)
+    assert fenced(world, *YARD, no_circle) == 0
+    assert len(world.rover.autopilot.missions.stored(FENCE)) == len(YARD), "as it refuses such"
+    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
+    assert go_to(world, 2, 1) == (ACCEPTED, 1)
+    download = Download(world.client, kind=FENCE)
+    world.until(lambda: download.is_done, within=5)
+    assert len(download.items) == len(YARD) + 1
+
+
+@pytest.mark.parametrize(
+    ("items", "why"),
+    [
+        ([Item(CIRCLE_IN, **at(0, 0), param1=-1.0, frame=0)], "item 0: param1 radius -1 m"),
+        ([*YARD[:3], *POND], "item 0: a polygon of 4 corners has others between them"),
+    ],
+)
+def test_a_refused_upload_is_in_the_log_with_its_reason(
+    world: World, items: list[Item], why: str
+) -> None:
+    fenced(world, *items)
+    (refused,) = world.events(SubmissionRefused)
+    assert str(refused) == f"upload of 255/190 refused: {why}"
+    assert world.client.texts().count(why) == 1
+
+
+def test_an_upload_that_nothing_more_comes_of_is_in_the_log(world: World) -> None:
+    world.client.send(common.MAVLink_mission_count_message(1, 1, 4, FENCE))
+    world.run(3)
+    (refused,) = world.events(SubmissionRefused)
+    assert "no item came for 2.3 s" in refused.text
 
 
 def test_an_item_outside_or_behind_an_exclusion_is_refused_as_it_comes(world: World) -> None:
