@@ -56,6 +56,22 @@ WAITS_FOR = {
     R.DISARMED: "disarmed; arm, or continue",
 }
 
+#: why a task or a queue does not go on: as somebody has asked, or nothing that needs a hand
+CALM = frozenset(
+    {
+        R.VEHICLE_SILENT,  # of which a warning has told
+        R.OTHER_CONTROLLER,
+        R.NO_POSITION,
+        R.OPERATOR,
+        R.PREEMPTED,
+        R.CANCELLED,
+        R.CLEARED,
+        R.REPLACED,
+        R.SKIPPED,
+        R.STOP,
+    }
+)
+
 UNIT_NONE = 0  # TASK_UNIT
 UNIT_METRES = 1
 UNIT_RADIANS = 2
@@ -153,12 +169,15 @@ def queue_status(
 
 
 def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
-    """Give (vehicle, severity, words) for the people at ground stations, or None."""
+    """Return (vehicle, severity, words) for the people at ground stations, or None.
+
+    What went as asked is INFO; WARNING and ERROR are for what needs a hand.
+    """
     match event:
         case TaskChanged(new=TaskState.EXECUTING):
             return event.vehicle, MavSeverity.INFO, f"Task {event.task_id} started"
         case TaskChanged(new=TaskState.COMPLETED):
-            return event.vehicle, MavSeverity.NOTICE, f"Task {event.task_id} done"
+            return event.vehicle, MavSeverity.INFO, f"Task {event.task_id} done"
         case TaskChanged(
             new=TaskState.FAILED | TaskState.HELD | TaskState.EXPIRED as new, reason=reason
         ):
@@ -166,13 +185,13 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             return event.vehicle, MavSeverity.ERROR, text
         case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
-            return event.vehicle, MavSeverity.NOTICE, text
+            return event.vehicle, _severity(event.reason), text
         case TaskWaits(task_id=task_id, reason=reason):
-            return event.vehicle, MavSeverity.NOTICE, f"Task {task_id} waits: {WAITS_FOR[reason]}"
+            return event.vehicle, _severity(reason), f"Task {task_id} waits: {WAITS_FOR[reason]}"
         case QueuePaused(reason=TaskReason.STOPPED):
             return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"
-        case QueuePaused():
-            return event.vehicle, MavSeverity.NOTICE, f"Queue paused: {words_of(event.reason)}"
+        case QueuePaused(reason=reason):
+            return event.vehicle, _severity(reason), f"Queue paused: {words_of(reason)}"
         case QueueContinued():
             return event.vehicle, MavSeverity.INFO, "Queue continued"
         case VehicleSeen(text=text):
@@ -180,6 +199,14 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         case VehicleNoted(text=text):
             return event.vehicle, MavSeverity.WARNING, f"Vehicle {event.vehicle} {text}"
     return None
+
+
+def _severity(reason: TaskReason) -> MavSeverity:
+    """Return how a station says that a task or a queue does not go on.
+
+    QGroundControl shows NOTICE and worse in red, and its megaphone stays a warning triangle.
+    """
+    return MavSeverity.INFO if reason in CALM else MavSeverity.WARNING
 
 
 def message_id_of(command: Command) -> int:

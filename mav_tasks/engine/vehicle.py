@@ -251,9 +251,12 @@ class Vehicle:
         self._note_failsafe(now=now)
 
     def _note_failsafe(self, *, now: float) -> None:
-        news = self.requests.loss_failsafe.take_news()
-        if news:
+        failsafe = self.requests.loss_failsafe
+        news = failsafe.take_news()
+        if news and (failsafe.is_unknown or failsafe.why_off):
             self._note(news, now=now)
+        elif news:
+            self._book.record(VehicleSeen(self.system_id, news, now))
 
     def _receive_of_frame(self, message: Seen, *, now: float) -> None:
         self.where.frame.receive(message, now=now)
@@ -287,8 +290,10 @@ class Vehicle:
     def _use_profile(self, *, now: float) -> None:
         """Go by what was measured of it; setpoints do not change their kind while it is driven."""
         news = self.known.take_news()
-        if news:
+        if news and self.known.chosen is None:
             self._note(news, now=now)
+        elif news:
+            self._book.record(VehicleSeen(self.system_id, news, now))
         self.tasks.brakes(self.known.stop)
         persona = self.known.persona
         if persona != self.persona and not self.control.is_engaged:

@@ -259,7 +259,7 @@ class SignaturesSeen:
 
 @dataclass(frozen=True, slots=True)
 class VehicleSeen:
-    """A vehicle was found, or is heard again."""
+    """A vehicle was found, is heard again, or has said something that is as it should be."""
 
     vehicle: int
     text: str

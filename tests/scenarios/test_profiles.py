@@ -7,7 +7,7 @@ import pytest
 
 from mav_tasks.probe.profile import profile_of
 from mav_tasks.settings import Driving, Settings, VehicleProfile
-from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4
@@ -44,7 +44,12 @@ def known(*profiles: VehicleProfile) -> Settings:
 
 
 def noted(world: World) -> list[str]:
-    return [event.text for event in world.events(VehicleNoted) if "profile" in event.text]
+    events: list[VehicleNoted | VehicleSeen] = [
+        *world.events(VehicleNoted),
+        *world.events(VehicleSeen),
+    ]
+    events.sort(key=lambda event: event.at)
+    return [event.text for event in events if "profile" in event.text]
 
 
 def rotate(world: World, angle: float = 90.0) -> tuple[int, int] | None:

@@ -5,6 +5,7 @@ import re
 import pytest
 
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
 from tests.kit.client import REQUEST, TASK_STATUS
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -47,9 +48,49 @@ def test_each_change_has_its_severity(world: World) -> None:
     said = {m.text: m.severity for m in world.client.of_type("STATUSTEXT")}
     assert said["Task 1 queued: move 1 m"] == INFO
     assert said["Task 1 started"] == INFO
-    assert said["Task 1 done"] == NOTICE
+    assert said["Task 1 done"] == INFO
     assert next(s for text, s in said.items() if text.startswith("Task 3 expired")) == ERROR
     assert not any(text.endswith("\t") for text in said)
+
+
+def severities(world: World) -> dict[str, int]:
+    """Give what the task server has said, with the severity of each."""
+    return {m.text: m.severity for m in world.client.of_type("STATUSTEXT")}
+
+
+def test_what_went_as_asked_is_no_warning(world: World) -> None:
+    world.client.move(2)
+    world.until_state(1, S.EXECUTING)
+    world.client.move(1, nonce=2)
+    world.client.pause()
+    world.run(3)
+    world.client.proceed()
+    world.run(3)
+    world.client.command(54010, 1)
+    world.until_idle(tasks=2)
+    world.run(0.2)
+    said = severities(world)
+    assert {"Task 1 paused: operator", "Queue paused: operator", "Queue continued"} <= set(said)
+    assert {"Task 1 cancelled: cancelled", "Task 2 done", "Vehicle 1 found (ardupilot)"} <= set(
+        said
+    )
+    assert set(said.values()) == {INFO}
+
+
+def test_what_needs_a_hand_is_a_warning(world: World) -> None:
+    world.client.move(2)
+    world.until_state(1, S.EXECUTING)
+    world.operator_mode(Mode.MANUAL)
+    world.run(1)
+    world.client.proceed()  # refused, with the reason
+    world.client.stop()
+    world.run(1)
+    said = severities(world)
+    assert said["Task 1 paused: takeover"] == said["Queue paused: takeover"] == WARNING
+    assert said["STOP: nothing runs until continued"] == WARNING
+    assert said["cannot go on: wrong mode"] == WARNING
+    assert said["Task 1 killed: stop"] == INFO
+    assert NOTICE not in said.values()
 
 
 def test_a_status_says_from_which_link_a_task_came(world: World) -> None:
