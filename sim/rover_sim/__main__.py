@@ -19,7 +19,7 @@ from mav_tasks.errors import KeyRingError
 from mav_tasks.key_ring.ring_file import load, path_of_ring
 from mav_tasks.mavlink.signing import Key
 from rover_sim.body import Body, Pose
-from rover_sim.bullet import BulletBody
+from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
 from rover_sim.errors import MissingExtra, SimulatedCrash
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PERSONAS, Persona
@@ -47,7 +47,7 @@ class Options:
     port: int
     insecure: bool
     count: int
-    body: str  # "bullet" or "kinematic"
+    body: str  # "auto", "bullet" or "kinematic"
     persona: Persona
     system_id: int  # of the first rover
     seed: int | None
@@ -87,7 +87,7 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     add("--count", type=int, default=1, help="number of rovers, with ids in a row")
     add("--system-id", type=int, default=1, help="MAVLink system id of the first rover")
     bodies = ("auto", "bullet", "kinematic")
-    add("--body", choices=bodies, default="auto", help="physics; auto is bullet")
+    add("--body", choices=bodies, default="auto", help="physics; auto is bullet if installed")
     add(
         "--persona",
         choices=tuple(PERSONAS),
@@ -131,7 +131,7 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         port=values.port,
         insecure=values.insecure,
         count=values.count,
-        body="bullet" if values.body == "auto" else values.body,
+        body=values.body,
         persona=_persona(values.persona, honours_yaw_rate=values.honours_yaw_rate),
         system_id=values.system_id,
         seed=values.seed,
@@ -152,6 +152,7 @@ def _persona(name: str, *, honours_yaw_rate: bool) -> Persona:
 
 def run(options: Options, stack: ExitStack) -> None:
     """Set everything up, then drive the rovers until a signal."""
+    options = _with_body(options)
     key = _key(options)
     stop = _stop_signals(stack)
     server = _open_socket(options, stack)
@@ -178,6 +179,16 @@ def run(options: Options, stack: ExitStack) -> None:
         sys.stdout.write(f"rover_sim: rover {number} ({what}) on {where}\n")
     sys.stdout.flush()
     drive(server, stop, vehicles, clock, truth)
+
+
+def _with_body(options: Options) -> Options:
+    """Return the options with a body that there is; pybullet's own window needs pybullet."""
+    if options.body != "auto":
+        return options
+    if options.gui or has_pybullet():
+        return replace(options, body="bullet")
+    sys.stderr.write(f"rover_sim: {NO_PYBULLET}\n")
+    return replace(options, body="kinematic")
 
 
 def _key(options: Options) -> Key | None:

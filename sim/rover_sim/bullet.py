@@ -21,6 +21,11 @@ from typing import Any
 from rover_sim.body import BodyState, Pose, wrap_angle
 from rover_sim.errors import MissingExtra
 
+#: what is said where the kinematic body takes its place
+NO_PYBULLET = (
+    "pybullet is not installed, so the rover is the kinematic one: no wheels, no friction"
+    " (pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64)"
+)
 PHYSICS_RATE = 240  # Hz, pybullet's own default; stepping and sub-stepping alike
 GRAVITY = 9.81  # m/s²
 SOLVER_ITERATIONS = 20  # turns within 8 % of 150 iterations, at 1.5 times the speed of 50
@@ -174,6 +179,15 @@ def _wheel_frictions(friction: float, variation: float, seed: int | None) -> lis
     return [ground * draw.uniform(1.0 - WHEEL_SPREAD, 1.0 + WHEEL_SPREAD) for _ in LEFT_RIGHT]
 
 
+def has_pybullet() -> bool:
+    """Return whether pybullet can be imported here."""
+    try:
+        _pybullet()
+    except MissingExtra:
+        return False
+    return True
+
+
 def _pybullet() -> Any:
     """Import pybullet late, so that everything else of the simulator works without it."""
     try:
@@ -181,8 +195,8 @@ def _pybullet() -> Any:
             import pybullet  # noqa: PLC0415
     except ImportError as error:
         raise MissingExtra(
-            'the pybullet rover needs pybullet: pip install "mav-tasks[sim]"'
-            " (wheels exist for Python 3.10 and 3.11)"
+            "the pybullet rover needs pybullet: pip install pybullet numpy"
+            " (its wheels are for Python 3.11 at most, on Linux x86-64)"
         ) from error
     return pybullet
 

@@ -145,10 +145,11 @@ def test_who_arms_must_be_known() -> None:
     assert_one_clear_line(run("serve", "--arming", "anybody"), "anybody", "operator")
 
 
-def test_a_missing_pybullet_is_named_with_the_extra(tmp_path: Path) -> None:
+def test_a_missing_pybullet_that_is_asked_for_is_named(tmp_path: Path) -> None:
     (tmp_path / "pybullet.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
-    result = run("sim", "--port", "0", environment={"PYTHONPATH": str(tmp_path)})
-    assert_one_clear_line(result, "mav-tasks[sim]", "--body kinematic")
+    bullet = ("--port", "0", "--body", "bullet")
+    result = run("sim", *bullet, environment={"PYTHONPATH": str(tmp_path)})
+    assert_one_clear_line(result, "pip install pybullet numpy", "--body kinematic")
 
 
 def test_help_names_the_commands() -> None:

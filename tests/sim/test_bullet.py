@@ -175,5 +175,5 @@ def test_missing_pybullet_is_one_line_that_says_how_to_get_it(
     monkeypatch.setattr(builtins, "__import__", blocked)
     with pytest.raises(MissingExtra) as caught:
         bullet.BulletBody(start=Pose())
-    assert 'pip install "mav-tasks[sim]"' in str(caught.value)
+    assert "pip install pybullet numpy" in str(caught.value)
     assert "\n" not in str(caught.value)

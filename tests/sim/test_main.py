@@ -34,11 +34,11 @@ def environment(**extra: str) -> dict[str, str]:
 
 
 @contextmanager
-def simulator(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+def simulator(*arguments: str, **extra: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """Run it on a free port; give the process and the port."""
     process = subprocess.Popen(
         command("--port", "0", *arguments),
-        env=environment(),
+        env=environment(**extra),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -239,12 +239,27 @@ def test_an_open_address_needs_to_be_asked_for() -> None:
     assert "--insecure" in refused("--host", "0.0.0.0")
 
 
-def test_missing_pybullet_is_one_clear_line(tmp_path: Path) -> None:
-    (tmp_path / "pybullet.py").write_text('raise ImportError("not installed")\n')
-    path = os.pathsep.join((str(tmp_path), str(ROOT), str(ROOT / "sim")))
-    line = refused("--port", "0", PYTHONPATH=path)
-    assert 'pip install "mav-tasks[sim]"' in line
-    assert "--body kinematic" in line
+def test_pybullet_that_is_missing_and_asked_for_is_one_clear_line(tmp_path: Path) -> None:
+    for options in (("--body", "bullet"), ("--gui",)):
+        line = refused("--port", "0", *options, PYTHONPATH=without_pybullet(tmp_path))
+        assert "pip install pybullet numpy" in line
+        assert "--body kinematic" in line
+
+
+def test_without_pybullet_the_rover_is_the_kinematic_one_and_says_so(tmp_path: Path) -> None:
+    with simulator(PYTHONPATH=without_pybullet(tmp_path)) as (process, _):
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(LIMIT) == 0
+        assert process.stderr.read() == ""
+    assert said.startswith("rover_sim: pybullet is not installed, so the rover is the kinematic")
+
+
+def without_pybullet(folder: Path) -> str:
+    """Give a path for imports on which pybullet cannot be had."""
+    (folder / "pybullet.py").write_text('raise ImportError("not installed")\n')
+    return os.pathsep.join((str(folder), str(ROOT), str(ROOT / "sim")))
 
 
 @pytest.mark.parametrize(
