@@ -82,6 +82,23 @@ def test_a_part_that_cannot_run_is_named_at_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(60)
+def test_without_matplotlib_and_pybullet_it_runs_without_a_picture_and_says_so(
+    tmp_path: Path,
+) -> None:
+    for name in ("matplotlib", "pybullet"):
+        (tmp_path / f"{name}.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = demo("--fast", "--output", str(tmp_path), environment=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = [line for line in done.stdout.splitlines() if line.startswith("demo: ")]
+    kinematic, no_picture, last = lines
+    assert "the rover is the kinematic one" in kinematic
+    assert no_picture.endswith("not installed (pip install matplotlib)")
+    assert last == "demo: all as it should be"
+    assert not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.timeout(60)
 @pytest.mark.parametrize("after", [0.3, 4.0])
 def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
     running = subprocess.Popen(

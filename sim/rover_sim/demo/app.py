@@ -6,12 +6,12 @@ measured movement are all as they should be; 1 if not; 2 if it cannot be run.
 """
 
 import argparse
-from importlib.util import find_spec
 from pathlib import Path
 
 from rich.console import Console
 
 from mav_tasks.errors import RecordError
+from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.demo import fast, real
 from rover_sim.demo.report import draw, print_table, problems
 from rover_sim.demo.screen import Screen
@@ -23,10 +23,9 @@ PICTURE = "track.png"
 
 PIPE_WIDTH = 110  # columns, where there is no terminal to fit
 
-NO_PYBULLET = (
-    "demo: pybullet is not installed, so the rover is the kinematic one: no wheels, no friction.\n"
-    "      There are wheels for Python 3.11 on Linux x86-64: install mav-tasks[sim] there; in the\n"
-    "      sources, with python3.11 (or uv) installed, remove .venv and run tools/demo again."
+NO_PICTURE = (
+    "demo: no picture of the track: it needs matplotlib, which is not installed"
+    " (pip install matplotlib)"
 )
 NO_WINDOW = "demo: --gui is pybullet's window: it needs pybullet, and goes without --fast"
 
@@ -37,9 +36,9 @@ def main() -> int:
     console = Console()
     if not console.is_terminal:
         console = Console(width=PIPE_WIDTH)
-    body = options.body or ("bullet" if find_spec("pybullet") else "kinematic")
+    body = options.body or ("bullet" if has_pybullet() else "kinematic")
     if options.body is None and body == "kinematic":
-        _say(console, NO_PYBULLET)
+        _say(console, f"demo: {NO_PYBULLET}")
     if options.gui and (options.fast or body != "bullet"):
         _say(console, NO_WINDOW)
         return 2
@@ -64,8 +63,12 @@ def _drive(
 def _conclude(console: Console, party: ThirdParty, track: list[Place], picture: Path | None) -> int:
     print_table(console, party)
     if picture is not None and track:
-        draw(track, picture)
-        _say(console, f"picture of the track: {picture}")
+        try:
+            draw(track, picture)
+        except ImportError:
+            _say(console, NO_PICTURE)
+        else:
+            _say(console, f"picture of the track: {picture}")
     wrong = problems(party)
     for problem in wrong:
         _say(console, f"WRONG: {problem}")

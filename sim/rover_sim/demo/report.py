@@ -70,7 +70,7 @@ def print_table(console: Console, party: ThirdParty) -> None:
 
 
 def draw(track: list[Place], path: Path) -> None:
-    """Write a picture of the driven track, north up."""
+    """Write a picture of the driven track, north up; raise ImportError without matplotlib."""
     import matplotlib as mpl  # noqa: PLC0415  (more than a second to import)
 
     mpl.use("Agg")
