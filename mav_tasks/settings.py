@@ -37,6 +37,8 @@ class Watch:
     late_tick: float = 0.5  # a setpoint tick later than this holds the task, LATE
     start_timeout: float = 8.0  # from STARTING to in control; PX4 takes four heartbeats
     ask_vehicle: float = 1.0  # arm and mode requests are repeated for at most this long
+    #: a vehicle that is not ready, restarting or refusing to arm, is waited for so long
+    ready_timeout: float = 600.0
     lost_timeout: float = 30.0  # paused LINK_LOST or POSITION_LOST for longer than this fails
     fresh_before_resume: float = 2.0  # of good data, before a lost task resumes by itself
     stuck: float = 10.0  # commanded without progress for this long fails, STUCK

@@ -1,6 +1,7 @@
 """Commands that steer what is there: cancel, clear, stop, pause, resume, modify, release."""
 
 import sys
+from contextlib import suppress
 from typing import Annotated, get_args
 
 import typer
@@ -92,10 +93,18 @@ async def pause(common: Common) -> None:
 async def resume(common: Common) -> None:
     """Go on after a pause, a STOP or a takeover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.cli.words import line_of  # noqa: PLC0415
+    from mav_tasks.errors import ClientError  # noqa: PLC0415
+    from mav_tasks.tasks.lifecycle import TaskState  # noqa: PLC0415
 
+    words = "goes on"
     async with opened(common) as client:
         await client.resume()
-    _done(common, "resume", "goes on")
+        with suppress(ClientError):  # it is resumed all the same
+            first = (await client.queue(limit=0)).current
+            if first is not None and first.state is TaskState.HELD:
+                words += f" after {line_of(first)}"
+    _done(common, "resume", words)
 
 
 @command

@@ -9,7 +9,12 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
 UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}
 #: a task with one of these waits until the queue is continued
-UNTIL_RESUMED = (TaskReason.QUEUE_PAUSED, TaskReason.OPERATOR, TaskReason.TAKEOVER)
+UNTIL_RESUMED = (
+    TaskReason.QUEUE_PAUSED,
+    TaskReason.OPERATOR,
+    TaskReason.TAKEOVER,
+    TaskReason.RESTARTED,
+)
 
 
 def state_of(status: TaskStatus) -> str:
@@ -30,7 +35,8 @@ def why_of(status: TaskStatus) -> str:
 
 def way_on_of(status: TaskStatus) -> str:
     """Give what lets it go on, nothing if that is not for the operator to say."""
-    if status.state is TaskState.HELD:
+    is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released, and waits to begin
+    if status.state is TaskState.HELD and not is_decided:
         return f"decide: mav-tasks release {status.id} again|remainder|skip"
     return "to go on: mav-tasks resume" if status.reason in UNTIL_RESUMED else ""
 

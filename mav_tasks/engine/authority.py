@@ -3,13 +3,24 @@ elsewhere; this is the memory of who did what to it.
 """
 
 from collections.abc import Hashable
+from dataclasses import dataclass
 from math import inf
 
 from mav_tasks.services.persona import Persona
+from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
 
 STREAM_GAP = 0.5  # s between setpoints that are a stream: the least for OFFBOARD is 2 Hz
 BY_CLIENT = 2.0  # s after a client asked for a mode, in which a change to it is its doing
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """How things were when a heartbeat came that shows the vehicle disarmed."""
+
+    at: float
+    may_arm: bool
+    paused: TaskReason  # why the queue stood
 
 
 class Authority:
@@ -27,6 +38,9 @@ class Authority:
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
         #: until somebody disarms or changes the mode
         self.may_arm = may_arm
+        #: whether a restart of the vehicle has withdrawn the permission, and nobody has
+        self.is_withdrawn_by_restart = False
+        self._before: Before | None = None  # the last disarming; None: somebody has acted since
 
     def __repr__(self) -> str:
         return f"Authority(may_arm={self.may_arm}, mode_is_ours={self._mode_is_ours})"
@@ -38,6 +52,24 @@ class Authority:
 
     def withdraw_arming(self) -> None:
         """Somebody else has a hand on the vehicle: arm it no more."""
+        self.may_arm = self.is_withdrawn_by_restart = False
+        self._before = None
+
+    def note_disarmed(self, before: Before) -> None:
+        """The vehicle shows that it is disarmed, not by us: by somebody, or by a restart."""
+        self._before = before
+
+    def take_disarmed(self, *, since: float) -> Before | None:
+        """Return how things were before the vehicle was seen disarmed, if that was after ``since``.
+
+        A restart at that time explains it, unless somebody has acted after it.
+        """
+        before, self._before = self._before, None
+        return before if before is not None and before.at >= since else None
+
+    def restarted(self, *, was_allowed: bool) -> None:
+        """The vehicle has restarted under us: arm it only after a person's word, any person's."""
+        self.is_withdrawn_by_restart = was_allowed
         self.may_arm = False
 
     def moved(self, *, may_arm: bool) -> None:
@@ -48,6 +80,8 @@ class Authority:
     def restore_arming(self) -> None:
         """A person said that all is well."""
         self.may_arm = self._arming_allowed
+        self.is_withdrawn_by_restart = False
+        self._before = None
 
     def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
         """A client's mode request goes to the vehicle; our own mode counts as set by us then.

@@ -109,7 +109,10 @@ class TaskControl:
         if how == SKIP:
             asked.vehicle.skip(task, actor=asked.actor, now=now)
         else:
-            asked.vehicle.release(task, again=how == AGAIN, actor=asked.actor, now=now)
+            may_restore = asked.rights.reach(OPERATOR)
+            asked.vehicle.release(
+                task, again=how == AGAIN, may_restore=may_restore, actor=asked.actor, now=now
+            )
         return task.id
 
     def _modify(self, asked: Asked, *, now: float) -> int:

@@ -195,9 +195,9 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         case QueueContinued():
             return event.vehicle, MavSeverity.INFO, "Queue continued"
         case VehicleSeen(text=text):
-            return event.vehicle, MavSeverity.INFO, f"Vehicle {event.vehicle} {text}"
+            return event.vehicle, MavSeverity.INFO, f"Rover {event.vehicle} {text}"
         case VehicleNoted(text=text):
-            return event.vehicle, MavSeverity.WARNING, f"Vehicle {event.vehicle} {text}"
+            return event.vehicle, MavSeverity.WARNING, f"Rover {event.vehicle} {text}"
     return None
 
 

@@ -8,7 +8,7 @@ from collections.abc import Hashable
 from dataclasses import replace
 from math import inf
 
-from mav_tasks.engine.authority import Authority
+from mav_tasks.engine.authority import Authority, Before
 from mav_tasks.engine.components import Components
 from mav_tasks.engine.frame_monitor import Seen
 from mav_tasks.engine.hold_before import HoldBefore
@@ -45,6 +45,8 @@ REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
 #: s in which a vehicle that was told to move and says that it stands may be stopping all the same
 UNSEEN_STOP = 3.0
+#: a station's buttons for a held task
+BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -94,6 +96,7 @@ class Vehicle:
         self._authority = Authority(persona, may_arm=may_arm)
         self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
+        self._restarted_at = -inf
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
         #: a HOLD that a "go to" may undo
@@ -220,7 +223,7 @@ class Vehicle:
             # read after a delay, it may have come at any time since
             self.where.motion.receive(message, now=min(now, self._clock.next_at))
             if self.where.motion.rebooted:
-                self._rebooted(now=now)
+                self._rebooted(booted_at=now - message.time_boot_ms / 1000, now=now)
             self._receive_of_frame(message, now=now)
             if not self._clock.is_running and not self.tasks.is_idle:
                 self.step(now=now)
@@ -267,6 +270,7 @@ class Vehicle:
 
     def _receive_heartbeat(self, heartbeat: m.Heartbeat, *, now: float) -> None:
         was_armed, was_mode = self._monitor.armed, self._monitor.custom_mode
+        before = Before(now, self._authority.may_arm, self.tasks.paused)
         self._monitor.receive(heartbeat, now=now)
         armed, mode = self._monitor.armed, self._monitor.custom_mode
         self.control.heard(armed=armed, mode=mode, now=now)
@@ -275,7 +279,7 @@ class Vehicle:
         if mode != was_mode:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
-            self._disarmed(now=now)
+            self._disarmed(before, now=now)
         by_hand = not self.persona.manual_modes.isdisjoint((was_mode, mode))
         by_client = self._authority.armed_by_client(now=now)
         if armed and by_hand and not by_client and self.control.is_asking_mode:
@@ -314,7 +318,7 @@ class Vehicle:
         if self.tasks.is_stopped:
             self._mode_changed_in_spite_of_stop(mode, now=now)
         elif mode == booting:
-            self._rebooted(now=now)
+            self._rebooted(booted_at=now, now=now)
         elif not ours and was_mode != booting:
             self._authority.withdraw_arming()
             may_be_lost = self.control.is_streaming and mode == self.persona.hold_mode
@@ -331,26 +335,46 @@ class Vehicle:
         if now - self.stopped_at <= LATE_REQUESTS and not self.control.is_engaged:
             self._begin_stop(now=now)
 
-    def _disarmed(self, *, now: float) -> None:
+    def _disarmed(self, before: Before, *, now: float) -> None:
         if self.control.phase is Phase.STOPPING or self.control.may_have_disarmed(now=now):
+            return
+        if self._restarted_at == now:  # this heartbeat has told of that as well: nobody did it
+            self._authority.restarted(was_allowed=before.may_arm)
             return
         self._authority.withdraw_arming()
         self._zero_what_is_kept()
         self._take_over("disarmed", now=now)
+        self._authority.note_disarmed(before)  # a restart may turn out to have done it
 
-    def _rebooted(self, *, now: float) -> None:
-        """Its frame may be another one now, and nothing of ours is in force there."""
+    def _rebooted(self, *, booted_at: float, now: float) -> None:
+        """Its frame may be another one now, and nothing of ours is in force there.
+
+        A restart disarms: what was seen since ``booted_at`` was no person's doing.
+        """
+        self._restarted_at = now
         self.where.forget()
         self.requests.ask_which_again()
         self.requests.intervals.ask_all_again()
         self.requests.loss_failsafe.forget()
         self.forget_start()
-        self._note("restarted", now=now)
-        if not self.tasks.is_stopped:
-            if self.control.is_engaged:
-                self._authority.withdraw_arming()
-            self.control.lose()
-            self.tasks.hold(TaskReason.FRAME_RESET, now=now)
+        before = self._authority.take_disarmed(since=booted_at)
+        if self.tasks.is_stopped:
+            self._note("restarted", now=now)
+            return
+        if before is not None:
+            self._authority.restarted(was_allowed=before.may_arm)
+        elif self.control.is_engaged:
+            self._authority.restarted(was_allowed=self._authority.may_arm)
+        self.control.lose()
+        self.hold_before.forget()
+        self.requests.end_performing()
+        was_paused = self.tasks.paused if before is None else before.paused
+        self.tasks.restarted(was_paused=was_paused, now=now)
+        held = self.tasks.held
+        words = "restarted"
+        if held is not None:
+            words += f": task {held.id} is on hold. Release it ({BUTTONS}), then continue"
+        self._note(words, now=now)
 
     def _take_over(self, what: str, *, now: float) -> None:
         """Somebody else has the vehicle: let go, and let the queue stand if a task has begun."""
@@ -360,6 +384,7 @@ class Vehicle:
         self.forget_start()
         self.control.lose()
         self.requests.end_performing()
+        self.tasks.forget_release()
         begun = self.tasks.begun
         if begun is None:
             return
@@ -594,10 +619,22 @@ class Vehicle:
         """Change the terms of a task."""
         self.tasks.modify(task, terms, actor=actor, now=now)
 
-    def release(self, task: Task, *, again: bool, actor: str, now: float) -> None:
-        """Let a held task go on; Rejection while it could not take the vehicle."""
+    def release(
+        self, task: Task, *, again: bool, may_restore: bool, actor: str, now: float
+    ) -> None:
+        """Let a held task go on; raise Rejection while it could not take the vehicle.
+
+        After a restart of the vehicle this is a person's word that all is well, and restores
+        the permission to arm if the person may give it (``may_restore``). What somebody has
+        disarmed stays so until a continue.
+        """
         seen = self.view(now=now)
+        restores = may_restore and self._authority.is_withdrawn_by_restart
+        if restores:
+            seen = replace(seen, may_arm=self._authority.may_arm_again)
         self.tasks.release(task, again=again, seen=seen, actor=actor, now=now)
+        if restores:
+            self._authority.restore_arming()
         self.wake(now=now)
 
     def skip(self, task: Task, *, actor: str, now: float) -> None:
@@ -615,6 +652,7 @@ class Vehicle:
 
     def operator_lost(self, *, now: float) -> None:
         """No ground station is heard any more: nothing runs unseen."""
+        self.tasks.forget_release()
         begun = self.tasks.begun
         is_running = begun is not None and begun.state in RUNNING
         if self.tasks.is_empty or (self.tasks.paused and not is_running):
@@ -639,14 +677,19 @@ class Vehicle:
         return paused
 
     def proceed(self, *, actor: str, now: float) -> TaskId | None:
-        """Release STOP, takeover and pause; arming is allowed again.
+        """Release STOP, takeover and pause; arming is allowed again. A held task stays held.
 
-        Raises Rejection, and changes nothing, while the begun task could not take the vehicle.
+        Raise Rejection, and change nothing, while the begun task could not take the vehicle.
         """
         self.hold_before.forget()
-        seen = replace(self.view(now=now), may_arm=self._authority.may_arm_again)
-        going_on = self.tasks.proceed(seen, actor=actor, now=now)
+        may_arm = self._authority.may_arm_again
+        seen = replace(self.view(now=now), may_arm=may_arm)
+        allows = may_arm and not self._authority.may_arm
+        going_on = self.tasks.proceed(seen, allows=allows, actor=actor, now=now)
         self._authority.restore_arming()
+        held = self.tasks.held
+        if held is not None:
+            self._note(f"has task {held.id} on hold: release it ({BUTTONS})", now=now)
         self.wake(now=now)
         return going_on
 
@@ -733,6 +776,7 @@ class Vehicle:
         return VehicleView(
             heard=self.is_heard(now=now),
             mode=self._authority.kind_of(self._monitor.custom_mode),
+            is_booting=self._monitor.custom_mode == self.persona.booting_mode,
             armed=self._monitor.armed,
             may_arm=self._authority.may_arm,
             in_control=self.control.in_control,

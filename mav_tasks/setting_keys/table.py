@@ -325,6 +325,11 @@ _WATCH = (
     ),
     _key("watch.ask_vehicle", _seconds(0.3, 5), "arm and mode requests are repeated for so long"),
     _key(
+        "watch.ready_timeout",
+        _seconds(0, 3600),
+        "a rover that restarts, or refuses to arm, is waited for so long",
+    ),
+    _key(
         "watch.lost_timeout",
         _seconds(3, 3600),
         "without the rover, or its position, for so long a task fails",

@@ -54,6 +54,8 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
             return R.WAITING_FOR_START if task.terms.is_staged else R.DEPENDENCY
         case S.QUEUED:
             return _why_queued(tasks, task)
+        case S.HELD:
+            return tasks.blocker_of(task.id) or task.reason
         case _:
             return task.reason
 

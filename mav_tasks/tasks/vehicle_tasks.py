@@ -7,7 +7,7 @@ One task at a time has the vehicle. Others may have begun and be set aside: pre-
 """
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Driving, Settings
@@ -20,6 +20,7 @@ from mav_tasks.tasks.events import (
     QueuePaused,
     TaskWaits,
     VehicleIdentified,
+    VehicleNoted,
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
@@ -38,6 +39,20 @@ from mav_tasks.tasks.waiting_room import WaitingRoom
 from mav_tasks.tasks.way_back import is_off_line
 
 R, S = TaskReason, TaskState
+
+#: of a vehicle that restarts: what a release waits for
+OF_RESTART = frozenset({R.VEHICLE_SILENT, R.NO_POSITION})
+
+
+@dataclass(frozen=True, slots=True)
+class _Release:
+    """A held task that a person has released, and that goes on when the vehicle is up."""
+
+    task_id: TaskId
+    again: bool
+    actor: str
+    until: float
+    waits_for: TaskReason
 
 
 class VehicleTasks:
@@ -65,6 +80,7 @@ class VehicleTasks:
         self._begun_at = 0.0
         self._blocker = R.NONE  # why the next task does not begin
         self._blocked: TaskId | None = None  # which task that was
+        self._release: _Release | None = None  # waits until the vehicle has restarted
 
     def __repr__(self) -> str:
         return f"VehicleTasks({self.vehicle}, {self._queue!r}, {self._paused.name}, {self.begun!r})"
@@ -155,13 +171,23 @@ class VehicleTasks:
         return self._room.due_at(task)
 
     def blocker_of(self, task_id: TaskId) -> TaskReason:
-        """Give what keeps the next task from beginning; NONE for others."""
+        """Give what keeps the next task, or a released one, from beginning; NONE for others."""
+        if self._release is not None and self._release.task_id == task_id:
+            return self._release.waits_for
         return self._blocker if self._blocked == task_id else R.NONE
 
     def timing_of(self, task: Task) -> Timing | None:
         """Give how evenly a task's setpoints have left, None if it was not driven."""
         begun = self.begun
         return self._executor.timing if begun is not None and begun.id == task.id else task.timing
+
+    @property
+    def held(self) -> Task | None:
+        """The task that somebody must decide about; None: there is none, or it is decided."""
+        begun = self.begun
+        if begun is not None and begun.state is S.HELD:
+            return begun if self._release is None else None
+        return next((task for task in self.aside if task.state is S.HELD), None)
 
     @property
     def is_held_ahead(self) -> bool:
@@ -233,6 +259,7 @@ class VehicleTasks:
         self._may_be_another(now=now)
 
     def _may_be_another(self, *, now: float) -> None:
+        self._release = None
         if self.is_driving or self._room.count(self.vehicle):
             self._executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
@@ -334,7 +361,8 @@ class VehicleTasks:
     ) -> None:
         """Let a held task go on from here: all of it again, or its remainder.
 
-        Rejection, and nothing is changed, while it could not take the vehicle.
+        Raise Rejection, and change nothing, while it could not take the vehicle. While a vehicle
+        that has restarted is not up yet, the task waits for that, until something halts it.
         """
         if self.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
@@ -342,7 +370,9 @@ class VehicleTasks:
         if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
             words = f"task {begun.id} is {begun.state.name.lower()}"
             raise Rejection(R.WRONG_STATE, words)
-        self._check_start(seen, goal_of(task), now=now)
+        waits_for = self._waits_for_restart(task, seen, now=now)
+        if not waits_for:
+            self._check_start(seen, goal_of(task), now=now)
         if not again:
             self._check_remainder(task, seen)
         if begun is not None and begun.id != task.id:
@@ -351,8 +381,58 @@ class VehicleTasks:
             self._aside.pop(task.id, None)
             self._executor.adopt(task)
         self._of_earlier_run.discard(task.id)
+        if waits_for:
+            until = now + self._settings.watch.ready_timeout
+            self._release = _Release(task.id, again, actor, until, waits_for)
+            self._book.record(TaskWaits(task.id, self.vehicle, waits_for, now))
+            return
+        self._begin_released(again=again, actor=actor, now=now)
+
+    def _begin_released(self, *, again: bool, actor: str, now: float) -> None:
+        self._release = None
         self._executor.release(again=again, actor=actor, now=now)
         self._begun_at = now
+
+    def _waits_for_restart(self, task: Task, seen: VehicleView, *, now: float) -> TaskReason:
+        """Return what a held task waits for, NONE unless the vehicle restarts and is not up."""
+        if task.reason is not R.FRAME_RESET:
+            return R.NONE
+        if seen.heard and seen.is_booting:  # and shows another mode for a moment
+            return R.NO_POSITION
+        goal = goal_of(task)
+        blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
+        return blocker if blocker in OF_RESTART else R.NONE
+
+    def forget_release(self) -> None:
+        """A released task that has not begun is held as before: something has halted it."""
+        self._release = None
+
+    def _try_released(self, seen: VehicleView, *, now: float) -> None:
+        """Let a released task begin when the vehicle is up, or hold it as before."""
+        release, task = self._release, self.begun
+        if release is None:
+            return
+        if task is None or task.id != release.task_id or task.state is not S.HELD:
+            self._release = None
+            return
+        waits_for = self._waits_for_restart(task, seen, now=now)
+        if not waits_for:
+            try:
+                self._check_start(seen, goal_of(task), now=now)
+            except Rejection as refusal:
+                self._note_held(task, refusal.text, now=now)
+            else:
+                self._begin_released(again=release.again, actor=release.actor, now=now)
+        elif now >= release.until:
+            self._note_held(task, f"waited too long: {words_of(waits_for)}", now=now)
+        elif waits_for is not release.waits_for:
+            self._release = replace(release, waits_for=waits_for)
+            self._book.record(TaskWaits(task.id, self.vehicle, waits_for, now))
+
+    def _note_held(self, task: Task, why: str, *, now: float) -> None:
+        self._release = None
+        words = f"task {task.id} is on hold, release it again: {why}"
+        self._book.record(VehicleNoted(self.vehicle, words, now))
 
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:
         """What is left must be known: measured along its line, or counted until it was held."""
@@ -397,6 +477,7 @@ class VehicleTasks:
         What was to run at once and has not begun waits as any other. Where somebody else has the
         vehicle, nobody waits for it to stand before a cancelled task is over.
         """
+        self._release = None
         self._executor.pause(reason, actor=actor, now=now)
         self._pause_queue(reason, actor=actor, now=now)
         if self._urgent is not None and self._urgent in self._queue:
@@ -411,17 +492,24 @@ class VehicleTasks:
                 begun = None
         return None if begun is None else begun.id
 
-    def proceed(self, seen: VehicleView, *, actor: str, now: float) -> TaskId | None:
+    def proceed(
+        self, seen: VehicleView, *, allows: bool = False, actor: str, now: float
+    ) -> TaskId | None:
         """Release the STOP latch or any other pause; gives the task that goes on, if one does.
 
         A task that could not take the vehicle now is not resumed: Rejection says what is in its
-        way, and everything stays as it is. A held task keeps the queue standing all the same.
+        way, and everything stays as it is. A held task keeps the queue standing all the same; if
+        that is all that makes it stand, and arming is not what is allowed again (``allows``),
+        there is nothing to continue: Rejection.
         """
         begun = self.begun
-        resumes = begun is not None and begun.state is S.PAUSED
-        held = next((t for t in (begun, *self.aside) if t is not None and t.state is S.HELD), None)
-        if held is not None and not self.is_stopped:
-            words = f"task {held.id} is held ({words_of(held.reason)}): release it first"
+        held = self.held
+        resumes = begun is not None and begun.state is S.PAUSED and held is None
+        if held is not None and not self._paused and not allows:
+            words = (
+                f"task {held.id} is held ({words_of(held.reason)}): release it first, again,"
+                " remainder or skip"
+            )
             raise Rejection(R.WRONG_STATE, words)
         if resumes:
             assert begun is not None
@@ -434,12 +522,13 @@ class VehicleTasks:
             assert begun is not None
             self._resume(begun, seen, actor=actor, now=now)
         begun = self.begun
-        return None if begun is None or begun.state is S.HELD else begun.id
+        return None if begun is None or held is not None else begun.id
 
     def _check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
         if blocker:
-            raise Rejection(blocker, f"cannot go on: {words_of(blocker)}")
+            way_on = "; continue, or arm it" if blocker is R.DISARMED else ""
+            raise Rejection(blocker, f"cannot go on: {words_of(blocker)}{way_on}")
         if seen.drives_on:
             words = "cannot go on: the rover would drive on without setpoints"
             raise Rejection(R.NOT_ALLOWED, words)
@@ -470,6 +559,21 @@ class VehicleTasks:
                 if task.state is S.PAUSED and task.progress.anchor is not None:
                     self._book.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
 
+    def restarted(self, *, was_paused: TaskReason, now: float) -> None:
+        """The vehicle has restarted: hold what has begun, and let the queue stand until continued.
+
+        ``was_paused`` is why the queue stood before the vehicle was seen disarmed: that was the
+        restart, and no takeover.
+        """
+        self._release = None
+        begun = self.begun
+        if begun is not None and begun.state is S.CANCELLING:
+            self._executor.let_go(actor=SERVER, now=now)
+            self._ended(begun.id, now=now)
+        self.hold(R.FRAME_RESET, now=now)
+        if self.is_driving and not was_paused:
+            self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
+
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """Kill the begun task and latch; with ``clear`` all others are cancelled too."""
         killed = self._executor.kill(R.STOP, actor=actor, now=now)
@@ -498,6 +602,7 @@ class VehicleTasks:
             if not seen.still:
                 return view.HALT
             self._is_halting = False
+        self._try_released(seen, now=now)
         before = self.begun
         demand = self._executor.step(seen, now=now)
         if before is not None and self.begun is None:

@@ -40,6 +40,7 @@ class VehicleView:
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
     turns_on_spot: bool = True  # and reverses; else it is steered by course
     is_unknown: bool = False  # it has yet to say whether it is the one whose tasks these are
+    is_booting: bool = False  # it shows that it is, and takes no mode yet
     drives_on: bool = False  # it is known not to stop by itself when nothing is asked of it
 
     @property

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks import Drive, Refused, SyncClient, TaskState, Wait, read_plan
+from mav_tasks import Drive, Move, Refused, SyncClient, TaskState, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, surroundings
-from tests.kit.processes import Stand, stand, wait_until
+from tests.kit.processes import Stand, process, stand, wait_until
 
 NOBODY = "udpout:127.0.0.1:9"
 WAY = """QGC WPL 110
@@ -211,6 +211,31 @@ def test_a_queue_lists_each_waiting_task_once_and_in_order_while_one_runs(
     assert [task["id"] for task in queue["waiting"]] == ids
     table = called("queue", server=server)
     assert [int(line.split()[0]) for line in table.lines[3:]] == [running, *ids]
+
+
+def test_after_a_restart_of_the_rover_it_is_said_how_to_go_on_and_that_works(
+    tmp_path: Path,
+) -> None:
+    with stand(tmp_path) as there, SyncClient(f"udpout:127.0.0.1:{there.client_port}") as client:
+        server = f"udpout:127.0.0.1:{there.client_port}"
+        task = client.submit(Move(1.0))
+        wait_until(lambda: there.speed() > 0.3, within=15, what="the rover at speed")
+        there.rover.popen.kill()
+        there.rover.popen.wait()
+        rover = ("-m", "rover_sim", "--port", str(there.rover_port), "--body", "kinematic")
+        with process(*rover, folder=tmp_path, name="rover again"):
+            wait_until(
+                lambda: client.status(task.id).state is TaskState.HELD,
+                within=15,
+                what="a task that is held",
+            )
+            (queue,) = called("queue", "--json", server=server).objects
+            assert queue["paused"] == "restarted"
+            (said,) = called("resume", server=server).lines
+            assert said.startswith(f"goes on after task {task.id}: move 1 m: held")
+            assert said.endswith(f"decide: mav-tasks release {task.id} again|remainder|skip")
+            assert called("release", str(task.id), "remainder", server=server).status == 0
+            assert task.done(timeout=30.0).state is TaskState.COMPLETED
 
 
 def test_what_is_out_of_range_is_no_task(server: str, client: SyncClient) -> None:

@@ -147,7 +147,7 @@ def change(it: MavProxy, name: str, value: float) -> None:
 
 def restart(it: MavProxy) -> None:
     it.ask("reboot", "PREFLIGHT_REBOOT_SHUTDOWN: ACCEPTED")
-    it.wait_for("AP: Vehicle 1 restarted")
+    it.wait_for("AP: Rover 1 restarted")
     it.wait_for_mode("MANUAL")
     it.ask("mode GUIDED", "DO_SET_MODE: ACCEPTED")
     it.wait_for_mode("GUIDED")

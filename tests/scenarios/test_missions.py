@@ -336,7 +336,7 @@ def test_what_the_rover_will_not_do_of_a_plan_is_told_and_the_plan_goes_on(world
     uploaded(world, HOME, place(1, 0), Item(PICTURE, frame=2, param4=0.0), place(1.5, 0, hold=0.1))
     start(world)
     world.until_state(1, S.COMPLETED, within=60)
-    assert "Vehicle 1 command 2000 of a plan: refused, result 3" in world.client.texts()
+    assert "Rover 1 command 2000 of a plan: refused, result 3" in world.client.texts()
 
 
 def test_moves_and_turns_can_be_items(world: World) -> None:
@@ -597,5 +597,5 @@ def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
     upload = Upload(direct, (place(1, 0), place(2, 0)))
     world.until(lambda: upload.result is not None, within=5)
     world.run(5)
-    words = "Vehicle 1 carries 2 mission items of its own: see its mission mode"
+    words = "Rover 1 carries 2 mission items of its own: see its mission mode"
     assert world.client.texts().count(words) == 1

@@ -135,7 +135,13 @@ def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> No
     restart(world, path)
     sent = world.client.proceed()
     world.run(0.1)
-    assert sent.answer == (DENIED, R.WRONG_STATE)
+    assert sent.answer == (ACCEPTED, 0), "the queue goes on when that is decided"
+    assert any("has task 1 on hold: release it" in text for text in world.client.texts())
+    world.run(3)
+    assert (world.state(1)[0], world.stands()) == (S.HELD, True)
+    again = world.client.proceed()
+    world.run(0.1)
+    assert again.answer == (DENIED, R.WRONG_STATE)
     assert any("release it first" in text for text in world.client.texts())
 
 

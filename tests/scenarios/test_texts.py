@@ -71,9 +71,7 @@ def test_what_went_as_asked_is_no_warning(world: World) -> None:
     world.run(0.2)
     said = severities(world)
     assert {"Task 1 paused: operator", "Queue paused: operator", "Queue continued"} <= set(said)
-    assert {"Task 1 cancelled: cancelled", "Task 2 done", "Vehicle 1 found (ardupilot)"} <= set(
-        said
-    )
+    assert {"Task 1 cancelled: cancelled", "Task 2 done", "Rover 1 found (ardupilot)"} <= set(said)
     assert set(said.values()) == {INFO}
 
 

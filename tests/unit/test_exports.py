@@ -137,6 +137,7 @@ def test_every_setting_is_known_by_name() -> None:
             "late_tick",
             "start_timeout",
             "ask_vehicle",
+            "ready_timeout",
             "lost_timeout",
             "fresh_before_resume",
             "stuck",

@@ -1,0 +1,240 @@
+"""A rover restarts under a task: a person decides, in any order, and the task goes on."""
+
+from dataclasses import replace
+
+import pytest
+
+from mav_tasks.settings import Roles, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode, Persona
+from tests.kit import px4
+from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
+from tests.kit.world import PROMPT, World, near_pose
+from tests.scenarios.conftest import MakeWorld
+
+RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
+POSITION = 32
+MAKES = {"ardupilot": PROMPT, "px4": px4.PROMPT_PX4}
+UP = 6.0  # s, until a rover that restarts has shown everything
+
+
+@pytest.fixture(params=MAKES)
+def persona(request: pytest.FixtureRequest) -> Persona:
+    return MAKES[request.param]
+
+
+@pytest.fixture
+def driving(make_world: MakeWorld, persona: Persona) -> World:
+    """A world in which a task drives and another waits."""
+    world = make_world(persona=persona)
+    world.client.move(4)
+    world.client.move(0.5, nonce=2)
+    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    return world
+
+
+def restart(world: World, *, up: float = UP) -> None:
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(up)
+
+
+def release(world: World, how: int) -> Sent:
+    sent = world.client.command(RELEASE, 0, how)
+    world.run(0.1)
+    return sent
+
+
+def proceed(world: World) -> Sent:
+    sent = world.client.proceed()
+    world.run(0.1)
+    return sent
+
+
+def test_it_is_told_what_to_do(driving: World) -> None:
+    world = driving
+    restart(world)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert world.paused() is R.RESTARTED, "nobody took it over"
+    texts = world.client.texts()
+    assert "Queue paused: restarted" in texts
+    assert (
+        "Rover 1 restarted: task 1 is on hold. Release it"
+        ' ("Held: rest", "Held: again" or "Held: skip"), then continue'
+    ) in texts
+
+
+@pytest.mark.parametrize("how", [AGAIN, REMAINDER])
+def test_release_and_continue(driving: World, how: int) -> None:
+    world = driving
+    restart(world)
+    where = world.truth.north
+    left = 4.0 if how == AGAIN else 4.0 - where
+    assert release(world, how).answer == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED)
+    assert world.truth.north == pytest.approx(where + left, abs=0.15)
+    world.run(3)
+    assert world.state(2) == (S.QUEUED, R.NONE), "the queue waits for the word"
+    assert proceed(world).result == ACCEPTED
+    world.until_idle(tasks=2)
+    assert world.state(2)[0] is S.COMPLETED
+
+
+@pytest.mark.parametrize("how", [AGAIN, REMAINDER])
+def test_continue_and_release(driving: World, how: int) -> None:
+    world = driving
+    restart(world)
+    where = world.pose()
+    assert proceed(world).result == ACCEPTED
+    assert any("has task 1 on hold: release it" in text for text in world.client.texts())
+    world.run(5)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert near_pose(world.pose(), where), "what is held moves nothing"
+    assert release(world, how).answer == (ACCEPTED, 1)
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_release_and_continue_at_once(driving: World) -> None:
+    world = driving
+    restart(world)
+    assert release(world, REMAINDER).result == ACCEPTED
+    assert proceed(world).result == ACCEPTED
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_skip_and_continue(driving: World) -> None:
+    world = driving
+    restart(world)
+    assert release(world, SKIP).result == ACCEPTED
+    world.run(3)
+    assert not world.rover.autopilot.armed
+    assert proceed(world).result == ACCEPTED
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.CANCELLED, S.COMPLETED]
+
+
+def test_a_release_at_the_moment_that_it_is_held_waits_for_the_rover(driving: World) -> None:
+    world = driving
+    world.rover.autopilot.reboot(now=world.now)
+    world.until_state(1, S.HELD, within=3)
+    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
+    world.until_state(1, S.COMPLETED)
+
+
+@pytest.mark.parametrize("order", ["release first", "continue between"])
+def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str) -> None:
+    world = driving
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    restart(world, up=4)
+    world.until_state(1, S.HELD, within=3)
+    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
+    if order == "continue between":
+        assert proceed(world).result == ACCEPTED
+    world.run(10)
+    assert world.state(1)[0] is S.HELD
+    assert "Task 1 waits: no position" in world.client.texts()
+    world.client.request_status(1)
+    world.run(0.1)
+    assert world.client.statuses(1)[-1].why == (S.HELD, R.NO_POSITION)
+    world.fault(Faults())
+    world.until_state(1, S.COMPLETED)
+
+
+def test_a_release_that_waits_too_long_is_to_be_given_again(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    settings = Settings()
+    settings = replace(settings, watch=replace(settings.watch, ready_timeout=5.0))
+    world = make_world(persona=persona, settings=settings)
+    world.client.move(4)
+    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    restart(world, up=4)
+    world.until_state(1, S.HELD, within=3)
+    release(world, REMAINDER)
+    world.run(6)
+    assert any("task 1 is on hold, release it again" in text for text in world.client.texts())
+    where = world.pose()
+    world.fault(Faults())
+    world.run(10)
+    assert (world.state(1), world.pose()) == ((S.HELD, R.FRAME_RESET), where)
+    assert release(world, REMAINDER).result == ACCEPTED
+    world.until_state(1, S.COMPLETED)
+
+
+HALTS = {
+    "pause": lambda w: w.client.pause(),
+    "STOP": lambda w: w.client.stop(),
+    "cancel": lambda w: w.client.command(54010, 1),
+    "a restart": lambda w: w.rover.autopilot.reboot(now=w.now),
+    "another mode": lambda w: w.operator_mode(Mode.AUTO),
+}
+
+
+@pytest.mark.parametrize("halt", HALTS)
+def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
+    world = driving
+    world.fault(Faults(withheld=frozenset({POSITION})))
+    restart(world, up=4)
+    world.until_state(1, S.HELD, within=3)
+    release(world, AGAIN)
+    where, at = world.pose(), world.now
+    HALTS[halt](world)
+    world.run(4)
+    world.fault(Faults())
+    world.run(10)
+    assert near_pose(world.pose(), where)
+    assert "arm" not in world.observer.sent_since(at)
+    assert world.state(1)[0] in (S.HELD, S.KILLED, S.CANCELLED)
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_first: bool) -> None:
+    world = driving
+    if is_first:
+        world.operator_arm(False)
+        world.run(2)
+        restart(world)
+    else:
+        restart(world)
+        world.operator_mode(Mode.HOLD)
+        world.run(1)
+        world.operator_mode(Mode.MANUAL)
+        world.run(1)
+    at = world.now
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    refused = release(world, REMAINDER)
+    assert refused.answer == (TEMPORARILY_REJECTED, R.DISARMED)
+    assert "cannot go on: disarmed; continue, or arm it" in world.client.texts()
+    world.run(3)
+    assert "arm" not in world.observer.sent_since(at)
+    assert proceed(world).result == ACCEPTED
+    assert release(world, REMAINDER).result == ACCEPTED
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_who_may_not_continue_arms_nothing_by_a_release(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    settings = Settings(roles=Roles(unsigned="submitter"))
+    world = make_world(persona=persona, settings=settings)
+    world.client.move(4)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    restart(world)
+    at = world.now
+    assert release(world, REMAINDER).answer == (TEMPORARILY_REJECTED, R.DISARMED)
+    world.run(3)
+    assert "arm" not in world.observer.sent_since(at)
+
+
+def test_nothing_to_continue_is_told_with_what_to_do(driving: World) -> None:
+    world = driving
+    restart(world)
+    proceed(world)
+    world.run(4)
+    assert proceed(world).answer == (DENIED, R.WRONG_STATE)
+    assert any("release it first" in text for text in world.client.texts())
