@@ -29,8 +29,12 @@ def what_of(status: TaskStatus) -> str:
 
 
 def why_of(status: TaskStatus) -> str:
-    """Give the reason of its state, nothing if there is none."""
-    return words_of(status.reason) if status.reason else ""
+    """Give the reason of its state, with the rover's own words; nothing if there is none."""
+    if not status.reason:
+        return ""
+    why = words_of(status.reason)
+    _, colon, says = status.words.partition(f"({why}: ")  # it may be cut short
+    return f"{why}: {says.removesuffix(')')}" if colon else why
 
 
 def way_on_of(status: TaskStatus) -> str:

@@ -54,6 +54,7 @@ WAITS_FOR = {
     R.WRONG_MODE: "wrong mode, set HOLD",
     R.NO_POSITION: "no position",
     R.DISARMED: "disarmed; arm, or continue",
+    R.NOT_READY: "the rover is not ready to arm",
 }
 
 #: why a task or a queue does not go on: as somebody has asked, or nothing that needs a hand
@@ -62,6 +63,7 @@ CALM = frozenset(
         R.VEHICLE_SILENT,  # of which a warning has told
         R.OTHER_CONTROLLER,
         R.NO_POSITION,
+        R.NOT_READY,
         R.OPERATOR,
         R.PREEMPTED,
         R.CANCELLED,
@@ -129,7 +131,7 @@ def task_status(
         submitter_system=task.submitter.system_id,
         submitter_component=task.submitter.component_id,
         submitter_link=link_number,
-        text=_words(task, reason).encode()[:50],
+        text=_words(task, reason, tasks.words_of_blocker(task.id)).encode()[:50],
     )
 
 
@@ -187,7 +189,9 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
             return event.vehicle, _severity(event.reason), text
         case TaskWaits(task_id=task_id, reason=reason):
-            return event.vehicle, _severity(reason), f"Task {task_id} waits: {WAITS_FOR[reason]}"
+            words = f": {event.words}" if event.words else ""
+            text = f"Task {task_id} waits: {WAITS_FOR[reason]}{words}"
+            return event.vehicle, _severity(reason), text
         case QueuePaused(reason=TaskReason.STOPPED):
             return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"
         case QueuePaused(reason=reason):
@@ -274,6 +278,8 @@ def _step_count(goal: Goal) -> int:
     return len(goal.steps) if isinstance(goal, Plan) else leg_count(goal)
 
 
-def _words(task: Task, reason: TaskReason) -> str:
+def _words(task: Task, reason: TaskReason, says: str) -> str:
+    """Give a task, its state and the reason in words; ``says``: the vehicle's own about that."""
     state = task.state.name.lower()
-    return f"{describe(task.goal)}: {state}" + (f" ({words_of(reason)})" if reason else "")
+    why = words_of(reason) + (f": {says}" if says else "")
+    return f"{describe(task.goal)}: {state}" + (f" ({why})" if reason else "")

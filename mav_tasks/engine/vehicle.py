@@ -8,6 +8,7 @@ from collections.abc import Hashable
 from dataclasses import replace
 from math import inf
 
+from mav_tasks.engine.arming_texts import ArmingTexts
 from mav_tasks.engine.authority import Authority, Before
 from mav_tasks.engine.components import Components
 from mav_tasks.engine.frame_monitor import Seen
@@ -97,6 +98,7 @@ class Vehicle:
         self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
         self._restarted_at = -inf
+        self._arming_texts = ArmingTexts()
         self._is_closing = False
         self.stopped_at = -inf  # the last STOP
         #: a HOLD that a "go to" may undo
@@ -233,6 +235,9 @@ class Vehicle:
             self.requests.receive_of_plan(message, now=now)
         elif isinstance(message, m.MissionCurrent):
             self._receive_own_mission(message.total, now=now)
+        elif isinstance(message, m.Statustext):
+            sender = Address(self.system_id, component_id)
+            self._arming_texts.receive(sender, message, now=now)
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.AutopilotVersion):
@@ -352,6 +357,7 @@ class Vehicle:
         A restart disarms: what was seen since ``booted_at`` was no person's doing.
         """
         self._restarted_at = now
+        self._arming_texts = ArmingTexts()
         self.where.forget()
         self.requests.ask_which_again()
         self.requests.intervals.ask_all_again()
@@ -781,6 +787,8 @@ class Vehicle:
             may_arm=self._authority.may_arm,
             in_control=self.control.in_control,
             refusal=REFUSALS[self.control.refused],
+            is_not_ready=self.control.is_not_ready,
+            why_not_ready=self._arming_texts.latest(now=now),
             motion=self.where.motion.latest(),
             still=self.where.motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,

@@ -63,6 +63,8 @@ class Phase(Enum):
     STOPPING = auto()
 
 
+#: results of an arm request by a vehicle that may arm later: ArduPilot's, PX4's of two versions
+NOT_READY = frozenset({MavResult.FAILED, MavResult.TEMPORARILY_REJECTED, MavResult.DENIED})
 #: control is being taken
 TAKING = frozenset({Phase.ASKING_HOLD, Phase.ASKING_ARM, Phase.LEADING_IN, Phase.ASKING_MODE})
 STREAMING = frozenset({Phase.ASKING_ARM, Phase.LEADING_IN, Phase.CONTROL})
@@ -106,6 +108,7 @@ class OffboardControl:
         self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
         self.phase = Phase.IDLE
         self.refused: Refused | None = None
+        self._arm_result: int | None = None  # of the last arm request; None: no answer
         self.we_armed = False
 
     def __repr__(self) -> str:
@@ -115,6 +118,11 @@ class OffboardControl:
     def in_control(self) -> bool:
         """Whether a non-zero setpoint may be sent."""
         return self.phase is Phase.CONTROL and self._armed and self._in_our_mode
+
+    @property
+    def is_not_ready(self) -> bool:
+        """Return whether arming was refused in words that do not say "never"."""
+        return self.refused is Refused.ARM and self._arm_result in NOT_READY
 
     @property
     def is_engaged(self) -> bool:
@@ -212,6 +220,8 @@ class OffboardControl:
         }
         if asked.get(self.phase) == answer.command:
             self._ask_again_at = now + ASK_REPEAT
+            if self.phase is Phase.ASKING_ARM:
+                self._arm_result = None if answer.ack is None else answer.ack.result
         elif self.phase is Phase.DISARMING and answer.command == MavCmd.COMPONENT_ARM_DISARM:
             self.phase = Phase.IDLE
 

@@ -120,15 +120,20 @@ class TaskModified:
 
 @dataclass(frozen=True, slots=True)
 class TaskWaits:
-    """The next task of a vehicle cannot begin, for a reason that was not there before."""
+    """The next task of a vehicle cannot begin, for a reason that was not there before.
+
+    ``words`` are the vehicle's own about it, "" if there are none.
+    """
 
     task_id: TaskId
     vehicle: int
     reason: TaskReason
     at: float
+    words: str = ""
 
     def __str__(self) -> str:
-        return f"task {self.task_id} waits: {words_of(self.reason)}"
+        words = f": {self.words}" if self.words else ""
+        return f"task {self.task_id} waits: {words_of(self.reason)}{words}"
 
 
 @dataclass(frozen=True, slots=True)

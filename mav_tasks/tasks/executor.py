@@ -13,7 +13,7 @@ from mav_tasks.tasks.astray import AstrayWatch
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.events import SERVER, VehicleNoted
+from mav_tasks.tasks.events import SERVER, TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import Move, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
@@ -32,6 +32,7 @@ S, R = TaskState, TaskReason
 
 #: times that a vehicle may drive past a place that its turning circle keeps it from
 MISSES = 3
+ASK_AGAIN = 4.0  # s, from the end of a try to arm to the next one, while a vehicle is not ready
 #: interruptions that end by themselves when the vehicle is back
 LOSSES = frozenset({R.LINK_LOST, R.POSITION_LOST})
 
@@ -57,6 +58,10 @@ class Executor:
         self._resumes_by_itself = False
         self._is_coming_back = False  # from outside the fence
         self._meter: TimingMeter | None = None  # while EXECUTING
+        self._taking_since = 0.0  # while STARTING
+        self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
+        #: what a STARTING task waits for, and that in the vehicle's own words
+        self.waits_for: tuple[TaskReason, str] = (R.NONE, "")
 
     def __repr__(self) -> str:
         return f"Executor({self.task!r})"
@@ -215,6 +220,9 @@ class Executor:
     def _start(self, task: Task, seen: VehicleView, now: float) -> Demand:
         if self._pause_if_lost(seen, now):
             return view.HOLD
+        is_waited_for = now - self._since < self._settings.watch.ready_timeout
+        if seen.refusal and seen.is_not_ready and is_waited_for:
+            return self._wait_until_ready(task, seen, now)
         if seen.refusal:
             self._finish(S.FAILED, seen.refusal, actor=SERVER, now=now)
             return view.HOLD
@@ -222,7 +230,7 @@ class Executor:
             self._finish(S.FAILED, R.NOT_ALLOWED, actor=SERVER, now=now)
             return view.HOLD
         if not seen.in_control:
-            if now - self._since > self._settings.watch.start_timeout:
+            if now - self._taking_since > self._settings.watch.start_timeout:
                 self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
                 return view.HOLD
             return view.TAKE
@@ -243,6 +251,19 @@ class Executor:
             self._way_back = way_back(goal, progress, motion, turns_on_spot=turns)
         self._change(S.EXECUTING, R.NONE, actor=SERVER, now=now, progress=progress)
         return view.STAND
+
+    def _wait_until_ready(self, task: Task, seen: VehicleView, now: float) -> Demand:
+        """The vehicle would not arm: stand by, and have it asked again after a while."""
+        words = seen.why_not_ready
+        if self._ask_again_at is None:  # a try has just ended: what it was refused with is told
+            self._ask_again_at = now + ASK_AGAIN
+            if self.waits_for != (R.NOT_READY, words):
+                self._book.record(TaskWaits(task.id, task.vehicle, R.NOT_READY, now, words))
+        self.waits_for = (R.NOT_READY, words)
+        if now < self._ask_again_at:
+            return view.STAND
+        self._ask_again_at, self._taking_since = None, now
+        return view.TAKE
 
     def _set_out(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
@@ -479,7 +500,8 @@ class Executor:
             self._executed_before += now - self._since
             progress = replace(old.progress, execution_time=self._executed_before)
             timing, self._meter = self.timing, None
-        self._since = now
+        self._since = self._taking_since = now
+        self._ask_again_at, self.waits_for = None, (R.NONE, "")
         self._book.change(
             self._task_id,
             new,

@@ -57,6 +57,7 @@ class TaskReason(IntEnum):
     OTHER_CONTROLLER = 10
     HELD_AHEAD = 11
     RESTARTED = 12
+    NOT_READY = 13
     # paused
     OPERATOR = 30
     PREEMPTED = 31

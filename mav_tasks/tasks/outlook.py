@@ -54,7 +54,7 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
             return R.WAITING_FOR_START if task.terms.is_staged else R.DEPENDENCY
         case S.QUEUED:
             return _why_queued(tasks, task)
-        case S.HELD:
+        case S.HELD | S.STARTING:
             return tasks.blocker_of(task.id) or task.reason
         case _:
             return task.reason

@@ -171,10 +171,18 @@ class VehicleTasks:
         return self._room.due_at(task)
 
     def blocker_of(self, task_id: TaskId) -> TaskReason:
-        """Give what keeps the next task, or a released one, from beginning; NONE for others."""
+        """Give what keeps the next task, or a begun one, from being driven; NONE for others."""
         if self._release is not None and self._release.task_id == task_id:
             return self._release.waits_for
+        begun = self.begun
+        if begun is not None and begun.id == task_id:
+            return self._executor.waits_for[0]
         return self._blocker if self._blocked == task_id else R.NONE
+
+    def words_of_blocker(self, task_id: TaskId) -> str:
+        """Return what the vehicle itself says of what keeps a task from beginning, or ""."""
+        begun = self.begun
+        return self._executor.waits_for[1] if begun is not None and begun.id == task_id else ""
 
     def timing_of(self, task: Task) -> Timing | None:
         """Give how evenly a task's setpoints have left, None if it was not driven."""

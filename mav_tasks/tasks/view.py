@@ -40,6 +40,8 @@ class VehicleView:
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
     turns_on_spot: bool = True  # and reverses; else it is steered by course
     is_unknown: bool = False  # it has yet to say whether it is the one whose tasks these are
+    is_not_ready: bool = False  # the refusal is of arming, and may be another one later
+    why_not_ready: str = ""  # in the vehicle's own words, as far as it has said lately
     is_booting: bool = False  # it shows that it is, and takes no mode yet
     drives_on: bool = False  # it is known not to stop by itself when nothing is asked of it
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -102,8 +102,9 @@ def test_a_task_that_waits_says_when_the_rover_falls_silent(world: World) -> Non
     [(Faults(refuse_arm=True), R.ARM_REFUSED), (Faults(refuse_mode=True), R.MODE_REFUSED)],
 )
 def test_a_refusal_fails_the_task_in_about_a_second_and_the_queue_goes_on(
-    world: World, faults: Faults, reason: R
+    make_world: MakeWorld, faults: Faults, reason: R
 ) -> None:
+    world = make_world(settings=Settings(watch=Watch(ready_timeout=0.0)))
     world.fault(faults)
     at = world.now
     world.client.move(0.3)

@@ -143,9 +143,29 @@ def test_a_task_in_one_line_says_what_it_is_and_why_it_ended() -> None:
     assert words.line_of(stuck) == "task 12: rotate 90 deg: failed (stuck), in 12.3s"
 
 
+def test_why_it_waits_has_the_rovers_own_words() -> None:
+    starting = replace(RUNNING, state=TaskState.STARTING, reason=TaskReason.NOT_READY)
+    said = replace(starting, words="move 2 m: starting (not ready: PreArm: no fix)")
+    cut = replace(starting, words="move 2 m: starting (not ready: PreArm: GPS 1: Bad")
+    silent = replace(starting, words="move 2 m: starting (not ready)")
+    assert words.why_of(said) == "not ready: PreArm: no fix"
+    assert words.why_of(cut) == "not ready: PreArm: GPS 1: Bad"
+    assert words.why_of(silent) == "not ready"
+
+
+def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
+    assert "decide: mav-tasks release 12" in words.line_of(HELD)
+    released = replace(HELD, reason=TaskReason.NO_POSITION)
+    assert words.way_on_of(released) == ""
+
+
 @pytest.mark.parametrize(
     ("task", "line"),
     [
+        (
+            replace(WAITING, reason=TaskReason.RESTARTED),
+            "task 13: move 2 m: queued (restarted); to go on: mav-tasks resume",
+        ),
         (
             replace(WAITING, reason=TaskReason.QUEUE_PAUSED),
             "task 13: move 2 m: queued (queue paused); to go on: mav-tasks resume",
