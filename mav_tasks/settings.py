@@ -2,7 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from math import radians
+
+
+class Turning(Enum):
+    """How a vehicle can turn."""
+
+    #: skid-steered or differential: also while it stands
+    ON_SPOT = "on-spot"
+    #: as a car: only while it rolls, on a circle
+    STEERED = "steered"
+
+
+#: m, of a car whose own is not known. ArduPilot's simulated one (4.6.3) could do 0.9; asked for 1.4
+#: its steering, too slow with default gains, reached 2.8
+DEFAULT_TURNING_RADIUS = 1.5
 
 #: who may arm a vehicle
 ARMING = ("auto", "server", "operator")
@@ -24,6 +39,8 @@ class Driving:
     arrival_distance: float = 0.01  # m, a move is done within this of its end
     arrival_angle: float = radians(0.5)  # rad, a rotation is done within this of its end
     acceptance_radius: float = 0.5  # m, a plan's place that names none is passed within this
+    #: m, the least of a vehicle that steers as a car, where neither profile nor vehicle says it
+    turning_radius: float = DEFAULT_TURNING_RADIUS
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +167,8 @@ class VehicleProfile:
     probed: str = ""  # when, UTC
     yaw_rate: str = ""  # "honoured", also on the spot, or "ignored"
     reverse: str = ""  # "yes" or "no"
+    turning: str = ""  # value of a Turning
+    turning_radius: float | None = None  # m, the least, of one that steers as a car
     #: velocity setpoints that it has followed: "BODY_NED 0x05C7"
     setpoints: tuple[str, ...] = ()
     loss_stop: str = ""  # whether it stops by itself when setpoints stop: "yes" or "no"

@@ -17,7 +17,7 @@ from mav_tasks.config import toml_file
 from mav_tasks.errors import ConfigError, SettingError
 from mav_tasks.setting_keys.literals import literal
 from mav_tasks.setting_keys.shapes import HIGHEST_ID, Choice, Number, Shape, Text, Texts
-from mav_tasks.settings import VehicleProfile
+from mav_tasks.settings import Turning, VehicleProfile
 
 NONE = "none"
 SUFFIX = ".toml"
@@ -33,6 +33,8 @@ _SHAPES: Mapping[str, Shape] = {
     "probed": Text("a time, UTC"),
     "yaw_rate": Choice(("honoured", "ignored")),
     "reverse": _YES_NO,
+    "turning": Choice(tuple(turning.value for turning in Turning)),
+    "turning_radius": Number(0.1, 50, "m"),
     "setpoints": Texts("a list of setpoints"),
     "loss_stop": _YES_NO,
     "setpoint_timeout": Number(0, 60, "s"),
@@ -46,6 +48,8 @@ _MEANINGS = {
     "firmware": "and with this firmware only",
     "yaw_rate": "whether it turns at a yaw rate, also on the spot",
     "reverse": "whether it drives backwards",
+    "turning": "whether it turns on the spot, or steers as a car",
+    "turning_radius": "m, the least, of one that steers as a car",
     "setpoints": "velocity setpoints that it followed: frame and mask",
     "loss_stop": "whether it stopped by itself when setpoints stopped",
     "setpoint_timeout": "s, from the last setpoint until it slowed down",

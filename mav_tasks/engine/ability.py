@@ -1,39 +1,89 @@
-"""What a vehicle that is steered by course cannot drive: refused when it is asked for, by name."""
+"""What a vehicle cannot drive, by its set-points or its steering: refused when it is asked for."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
+from mav_tasks.services.persona import Persona
+from mav_tasks.settings import Turning
 from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, Move, Rotate, SingleGoal
 from mav_tasks.tasks.lifecycle import TaskReason
 
-TURNS = "this rover does not turn on the spot, nor at a rate"
-REVERSES = "this rover does not reverse"
+
+class Ability(NamedTuple):
+    """How a vehicle moves; ``rover`` is its name in refusals."""
+
+    honours_yaw_rate: bool = True
+    turning: Turning = Turning.ON_SPOT
+    rover: str = "this rover"
+
+    @classmethod
+    def of(cls, persona: Persona, *, rover: str = "this rover") -> "Ability":
+        """Return that of a vehicle."""
+        return cls(persona.honours_yaw_rate, persona.turning, rover)
+
+    @property
+    def why_no_turn(self) -> str:
+        """Return in words why it does not turn while it stands."""
+        if self.turning is Turning.STEERED:
+            return f"{self.rover} steers as a car and cannot turn on the spot"
+        return f"{self.rover} does not turn on the spot, nor at a rate"
+
+    @property
+    def why_no_rate(self) -> str:
+        """Return in words why it does not turn at a rate."""
+        if self.turning is Turning.STEERED:
+            return f"{self.rover} is steered by course and does not turn at a rate"
+        return self.why_no_turn
+
+    @property
+    def why_no_reverse(self) -> str:
+        """Return in words why it does not drive backwards."""
+        return f"{self.rover} does not reverse"
 
 
-def as_driven(goal: SingleGoal, *, turns_on_spot: bool) -> SingleGoal:
-    """Give a goal as such a vehicle drives it; Rejection when it cannot.
+def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
+    """Return a goal as such a vehicle drives it. Raise Rejection if it cannot.
 
     A heading at the end of a way is left out, as its autopilot does: clients name one without
     meaning it.
     """
-    if turns_on_spot:
-        return goal
+    if isinstance(goal, GoTo):
+        turns = ability.honours_yaw_rate and ability.turning is Turning.ON_SPOT
+        return goal if turns or goal.yaw is None else replace(goal, yaw=None)
+    if ability.turning is Turning.STEERED:
+        _check_rolls(goal, ability)
+    if not ability.honours_yaw_rate:
+        _check_course(goal, ability)
+    return goal
+
+
+def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
+    """A car turns only while it rolls."""
     match goal:
         case Rotate() | Face():
-            raise _cannot(TURNS)
-        case Move(distance=distance) if distance < 0:
-            raise _cannot(f"param1 distance {distance:g}: {REVERSES}", param=1)
-        case Drive(forward=forward) if forward < 0:
-            raise _cannot(f"param1 forward speed {forward:g}: {REVERSES}", param=1)
-        case Drive(yaw_rate=yaw_rate) if yaw_rate:
-            raise _cannot(f"param2 yaw rate: {TURNS}", param=2)
-        case Head(forward=forward) if forward < 0:
-            raise _cannot(f"param2 speed {forward:g}: {REVERSES}", param=2)
+            raise _cannot(ability.why_no_turn)
+        case Drive(forward=0.0, yaw_rate=yaw_rate) if yaw_rate:
+            raise _cannot(f"param2 yaw rate: {ability.why_no_turn}", param=2)
         case Head(forward=0.0):
-            raise _cannot(f"param2 speed 0: {TURNS}", param=2)
-        case GoTo():
-            return replace(goal, yaw=None)
-    return goal
+            raise _cannot(f"param2 speed 0: {ability.why_no_turn}", param=2)
+
+
+def _check_course(goal: SingleGoal, ability: Ability) -> None:
+    """What is steered by speed and course has neither a turn rate nor a way back."""
+    match goal:
+        case Rotate() | Face():
+            raise _cannot(ability.why_no_turn)
+        case Move(distance=distance) if distance < 0:
+            raise _cannot(f"param1 distance {distance:g}: {ability.why_no_reverse}", param=1)
+        case Drive(forward=forward) if forward < 0:
+            raise _cannot(f"param1 forward speed {forward:g}: {ability.why_no_reverse}", param=1)
+        case Drive(yaw_rate=yaw_rate) if yaw_rate:
+            raise _cannot(f"param2 yaw rate: {ability.why_no_rate}", param=2)
+        case Head(forward=forward) if forward < 0:
+            raise _cannot(f"param2 speed {forward:g}: {ability.why_no_reverse}", param=2)
+        case Head(forward=0.0):
+            raise _cannot(f"param2 speed 0: {ability.why_no_turn}", param=2)
 
 
 def _cannot(words: str, *, param: int = 0) -> Rejection:

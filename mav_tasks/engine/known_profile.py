@@ -4,8 +4,8 @@ A profile is of one unique id and one firmware: any other is told, and not used.
 """
 
 from mav_tasks.services.identity import VehicleIdentity
-from mav_tasks.services.persona import Persona, with_yaw_rate
-from mav_tasks.settings import VehicleProfile
+from mav_tasks.services.persona import Persona, with_turning, with_yaw_rate
+from mav_tasks.settings import Turning, VehicleProfile
 
 
 class KnownProfile:
@@ -25,10 +25,7 @@ class KnownProfile:
     @property
     def persona(self) -> Persona:
         """How it wants to be spoken to, as far as that is known."""
-        known = "" if self.chosen is None else self.chosen.yaw_rate
-        if not known or (known == "honoured") == self._by_default.turns_on_spot:
-            return self._by_default
-        return with_yaw_rate(self._by_default, is_honoured=known == "honoured")
+        return self._turning_as_known(self._read_as_known())
 
     @property
     def stop(self) -> tuple[float, float] | None:
@@ -62,6 +59,18 @@ class KnownProfile:
             return ""
         self._told = words
         return words or "no profile is used any more"
+
+    def _read_as_known(self) -> Persona:
+        known = "" if self.chosen is None else self.chosen.yaw_rate
+        if not known or (known == "honoured") == self._by_default.honours_yaw_rate:
+            return self._by_default
+        return with_yaw_rate(self._by_default, is_honoured=known == "honoured")
+
+    def _turning_as_known(self, persona: Persona) -> Persona:
+        if self.chosen is None or not self.chosen.turning:
+            return persona
+        radius = self.chosen.turning_radius
+        return with_turning(persona, Turning(self.chosen.turning), radius=radius)
 
     def _choose(self) -> None:
         fitting = [each for each in self._profiles if not self._why_not(each)]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from math import inf, isnan
 from typing import NamedTuple
 
-from mav_tasks.engine.ability import as_driven
+from mav_tasks.engine.ability import Ability, as_driven
 from mav_tasks.engine.goals import (
     KNOWN_FRAMES,
     MAX_DELAY,
@@ -84,13 +84,13 @@ class Manner(NamedTuple):
     """By what items are read: the ways of a vehicle, and the server's limits."""
 
     has_home: bool  # the first one is home, as ArduPilot has it
-    turns_on_spot: bool
+    ability: Ability
     driving: Driving
 
     @classmethod
     def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "Manner":
         """Give that of a vehicle; ``is_staged``: the plan is for the autopilot itself."""
-        return cls(persona.has_home_item and is_staged, persona.turns_on_spot, driving)
+        return cls(persona.has_home_item and is_staged, Ability.of(persona), driving)
 
 
 class Wanted(NamedTuple):
@@ -114,7 +114,7 @@ def step_of(item: Item, seq: int, *, count: int, manner: Manner) -> Step:
         return Nothing()
     step = _step_of(item, seq, count=count, driving=manner.driving)
     if isinstance(step, SingleGoal):
-        return as_driven(step, turns_on_spot=manner.turns_on_spot)
+        return as_driven(step, manner.ability)
     return step
 
 

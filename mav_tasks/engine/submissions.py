@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from mav_tasks.engine.ability import as_driven
+from mav_tasks.engine.ability import Ability, as_driven
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_client import GcsClient
@@ -80,7 +80,8 @@ class Submissions:
         # zeros. A nonce, or NaN for none, comes from somebody who knows these commands.
         is_ours = command.command in OURS
         asked.client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
-        goal = as_driven(wish.goal, turns_on_spot=vehicle.persona.turns_on_spot)
+        rover = f"rover {vehicle.system_id}"
+        goal = as_driven(wish.goal, Ability.of(vehicle.persona, rover=rover))
         self._check_reach(vehicle, goal)
         draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)
         known = self._recollection.known(

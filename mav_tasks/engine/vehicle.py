@@ -795,7 +795,9 @@ class Vehicle:
             frame=self.where.frame.frame(),
             home=self.where.home,
             is_fence_unknown=self.where.is_fence_unknown,
-            turns_on_spot=self.persona.turns_on_spot,
+            honours_yaw_rate=self.persona.honours_yaw_rate,
+            turning=self.persona.turning,
+            turning_radius=self.persona.turning_radius or self._settings.driving.turning_radius,
             is_unknown=self.tasks.has_uid and not self.requests.is_identified,
             drives_on=bool(self.why_drives_on),
         )

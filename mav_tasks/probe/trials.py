@@ -40,7 +40,7 @@ class Kind:
         self.name = f"{frame.name} 0x{mask:04X}"
         self.persona = replace(
             persona,
-            turns_on_spot=not by_course,
+            honours_yaw_rate=not by_course,
             setpoint_mask=mask,
             setpoint_frame=frame,
         )

@@ -46,7 +46,7 @@ class Orders:
     def velocity(self, wanted: Speeds) -> SetPositionTargetLocalNed:
         """Give a setpoint; zeros for what such a vehicle cannot do."""
         vx, vy, yaw_rate = wanted.forward, 0.0, wanted.yaw_rate
-        if not self._persona.turns_on_spot:
+        if not self._persona.honours_yaw_rate:
             speed = 0.0 if wanted.course is None else max(wanted.forward, 0.0)
             course = wanted.course or 0.0
             vx, vy, yaw_rate = speed * cos(course), speed * sin(course), 0.0

@@ -71,6 +71,7 @@ PARAMETERS: Mapping[str, Parameter] = {
         ("TSK_TURN_MAX", "driving.max_turn_rate_deg"),
         ("TSK_ACCEL", "driving.acceleration"),
         ("TSK_ACC_RAD", "driving.acceptance_radius"),
+        ("TSK_TURN_RAD", "driving.turning_radius"),
         ("TSK_DIST_MAX", "driving.max_distance"),
         ("TSK_QUEUE_MAX", "queueing.capacity"),
         ("TSK_QUOTA", "queueing.quota"),

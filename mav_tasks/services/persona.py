@@ -9,6 +9,7 @@ from math import isnan
 
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, MavModeFlag, PositionTargetTypemask
 from mav_tasks.mavlink.messages import Heartbeat
+from mav_tasks.settings import Turning
 
 T = PositionTargetTypemask
 
@@ -45,10 +46,13 @@ class Persona:
     #: what it does when setpoints stop is up to its parameters; when they return, so does our
     #: mode, by itself, and with what it was told last
     has_loss_failsafe: bool
-    #: it turns at a rate, also on the spot, and reverses; else it is steered by where to go
-    turns_on_spot: bool
+    #: its set-points are speed and yaw rate, and it reverses; else they are speed and course, and
+    #: it does not
+    honours_yaw_rate: bool
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
+    turning: Turning = Turning.ON_SPOT  # whichever way its set-points are read
+    turning_radius: float | None = None  # m, at the least, of one that is STEERED; None: not known
 
     def __repr__(self) -> str:
         return f"Persona({self.name})"
@@ -110,7 +114,7 @@ ARDUPILOT = Persona(
     is_held_before_places=False,
     starts_when_armed=False,
     has_loss_failsafe=False,  # it stops after 3 s (observed on 4.6.3)
-    turns_on_spot=True,
+    honours_yaw_rate=True,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
     setpoint_frame=MavFrame.BODY_NED,
 )
@@ -153,7 +157,7 @@ PX4 = Persona(
     is_held_before_places=True,
     starts_when_armed=True,
     has_loss_failsafe=True,
-    turns_on_spot=False,
+    honours_yaw_rate=False,
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
     setpoint_frame=MavFrame.LOCAL_NED,
 )
@@ -174,7 +178,7 @@ def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Perso
     ``honours_yaw_rate``: one that need not, turns at a yaw rate all the same.
     """
     persona = PERSONAS.get(heartbeat.autopilot)
-    if persona is None or persona.turns_on_spot or not honours_yaw_rate:
+    if persona is None or persona.honours_yaw_rate or not honours_yaw_rate:
         return persona
     return with_yaw_rate(persona, is_honoured=True)
 
@@ -184,7 +188,17 @@ def with_yaw_rate(persona: Persona, *, is_honoured: bool) -> Persona:
     like = ARDUPILOT if is_honoured else PX4
     return replace(
         persona,
-        turns_on_spot=is_honoured,
+        honours_yaw_rate=is_honoured,
         setpoint_mask=like.setpoint_mask,
         setpoint_frame=like.setpoint_frame,
+    )
+
+
+def with_turning(persona: Persona, turning: Turning, *, radius: float | None = None) -> Persona:
+    """Return the persona of a vehicle that turns so.
+
+    ``radius`` is the least turning radius in m, of one that is STEERED; None: not known.
+    """
+    return replace(
+        persona, turning=turning, turning_radius=radius if turning is Turning.STEERED else None
     )

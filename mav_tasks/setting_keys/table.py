@@ -217,6 +217,11 @@ _DRIVING = (
         Number(0.05, 100, "m"),
         "a plan's place that names no radius is passed within this",
     ),
+    _key(
+        "driving.turning_radius",
+        Number(0.1, 50, "m"),
+        "the least of a rover that steers as a car, where nothing else is known of it",
+    ),
 )
 _RULES = (
     _key(

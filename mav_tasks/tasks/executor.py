@@ -247,8 +247,8 @@ class Executor:
             return view.HOLD
         self._way_back, self._astray = None, AstrayWatch()
         if task.progress.anchor is not None:
-            goal, turns = present_goal(task.goal, progress), seen.turns_on_spot
-            self._way_back = way_back(goal, progress, motion, turns_on_spot=turns)
+            goal, honours = present_goal(task.goal, progress), seen.honours_yaw_rate
+            self._way_back = way_back(goal, progress, motion, honours_yaw_rate=honours)
         self._change(S.EXECUTING, R.NONE, actor=SERVER, now=now, progress=progress)
         return view.STAND
 

@@ -32,7 +32,7 @@ def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -
         progress = begun(goal, progress)
     single = present_goal(goal, progress)
     if progress.anchor is not None:
-        return resumed(single, progress, motion, turns_on_spot=seen.turns_on_spot)
+        return resumed(single, progress, motion, honours_yaw_rate=seen.honours_yaw_rate)
     if not isinstance(single, GoTo):
         done = 0.0 if isinstance(single, Face) else progress.done  # it means a heading, not a way
         anchor = begun_from(single, anchor_of(single, 0, motion.pose, None), done)
@@ -41,7 +41,7 @@ def set_out(goal: Goal, progress: Progress, seen: VehicleView, motion: Motion) -
     if target is None:
         return None
     is_rolling = motion.speed > ROLLING and _bends_gently(motion, target)
-    leg = WAY if is_rolling or not seen.turns_on_spot else FACE
+    leg = WAY if is_rolling or not seen.honours_yaw_rate else FACE
     anchor = anchor_of(single, leg, motion.pose, target)
     return replace(progress, anchor=anchor, frame=seen.frame, target=target, leg=leg, done=0.0)
 
@@ -61,12 +61,12 @@ def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Dri
     """Give the course of the present stage, which may lead on to the next place."""
     single = present_goal(goal, progress)
     if not (isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes):
-        return Course(single, progress, by_course=not seen.turns_on_spot)
+        return Course(single, progress, by_course=not seen.honours_yaw_rate)
     target, anchor = progress.target, progress.anchor
     following = goes_on_to_a_place(goal, progress)
     after = None if following is None else place_of(following, seen)
     if after is None or target is None or anchor is None:
-        return Course(single, progress, by_course=not seen.turns_on_spot)
+        return Course(single, progress, by_course=not seen.honours_yaw_rate)
     here = Pose(target.north, target.east, bearing(anchor, target))
     within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
     speed = corner_speed(_off(here, bearing(here, after)), lead=within)
@@ -75,7 +75,7 @@ def course_of(goal: Goal, progress: Progress, seen: VehicleView, *, driving: Dri
         progress,
         passing=min(driving.max_speed, speed),
         within=within,
-        by_course=not seen.turns_on_spot,
+        by_course=not seen.honours_yaw_rate,
     )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning
 from mav_tasks.tasks.goal import GlobalPlace
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -38,7 +39,9 @@ class VehicleView:
     frame: Frame | None = None  # that positions are in, where it is known
     home: GlobalPlace | None = None  # where it returns to
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
-    turns_on_spot: bool = True  # and reverses; else it is steered by course
+    honours_yaw_rate: bool = True  # and reverses; else it is steered by course
+    turning: Turning = Turning.ON_SPOT
+    turning_radius: float = DEFAULT_TURNING_RADIUS  # m, of one that is STEERED
     is_unknown: bool = False  # it has yet to say whether it is the one whose tasks these are
     is_not_ready: bool = False  # the refusal is of arming, and may be another one later
     why_not_ready: str = ""  # in the vehicle's own words, as far as it has said lately

@@ -41,7 +41,7 @@ def is_off_line(task: Task, pose: Pose) -> bool:
 
 
 def resumed(
-    goal: SingleGoal, progress: Progress, motion: Motion, *, turns_on_spot: bool
+    goal: SingleGoal, progress: Progress, motion: Motion, *, honours_yaw_rate: bool
 ) -> Progress:
     """Give the progress with which to go on from here.
 
@@ -59,13 +59,13 @@ def resumed(
         is_near = progress.leg > WAY and distance(pose, progress.target) <= near_enough
     if is_near:
         return progress
-    leg_again = FACE if turns_on_spot else WAY
+    leg_again = FACE if honours_yaw_rate else WAY
     again = anchor_of(goal, leg_again, pose, progress.target)
     return replace(progress, leg=leg_again, anchor=again, done=0.0)
 
 
 def way_back(
-    goal: SingleGoal, progress: Progress, motion: Motion, *, turns_on_spot: bool
+    goal: SingleGoal, progress: Progress, motion: Motion, *, honours_yaw_rate: bool
 ) -> Course | None:
     """Give the way to where the task can go on exactly, or None if that is here.
 
@@ -77,7 +77,7 @@ def way_back(
     match leg:
         case Move():
             place = _entry(anchor, pose, leg, progress.done)
-            if not turns_on_spot:
+            if not honours_yaw_rate:
                 return None if place is None else _course_there(place, pose)
             if place is None and abs(wrap(anchor.yaw - pose.yaw)) > ALIGNED:
                 place = LocalPlace(pose.north, pose.east)  # turn here, or it would leave the line

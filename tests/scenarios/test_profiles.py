@@ -120,6 +120,18 @@ def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
     assert near_pose(world.pose(), (1, 0, 0), metres=0.05)
 
 
+@pytest.mark.parametrize("ask", [(ROTATE, 90.0), (115, 90.0, 0.0, 1.0, 0.0)])
+def test_a_car_is_not_turned_on_the_spot_and_its_client_reads_why(
+    make_world: MakeWorld, ask: tuple[float, ...]
+) -> None:
+    world = make_world(settings=known(replace(ARDUPILOT_PROFILE, turning="steered")))
+    sent = world.client.command(int(ask[0]), *ask[1:])
+    world.run(0.3)
+    assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    words = "rover 1 steers as a car and cannot turn on the spot"
+    assert any(words in text for text in world.client.texts())
+
+
 def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
     make_world: MakeWorld,
 ) -> None:

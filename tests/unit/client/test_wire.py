@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mav_tasks.client import wire
 from mav_tasks.client.wire import Goal, WishedTerms
 from mav_tasks.engine import goals as engine_goals
+from mav_tasks.engine.ability import Ability
 from mav_tasks.engine.plan_items import Manner, plan_of, steps_of
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
@@ -34,7 +35,7 @@ from mav_tasks.tasks.goal import (
 
 FEW = settings(max_examples=40, deadline=None)
 DRIVING = Driving()
-MANNER = Manner(has_home=False, turns_on_spot=True, driving=DRIVING)
+MANNER = Manner(has_home=False, ability=Ability(), driving=DRIVING)
 HERE = Address(244, 190)
 THERE = Address(1, 191)
 

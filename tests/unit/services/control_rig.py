@@ -104,7 +104,7 @@ class Rig:
             assert (message.target_system, message.target_component) == (1, 1)
             assert message.type_mask == self.persona.setpoint_mask
             assert message.coordinate_frame == self.persona.setpoint_frame
-            if self.persona.turns_on_spot:
+            if self.persona.honours_yaw_rate:
                 moves = message.vx or message.yaw_rate
                 return f"velocity {message.vx:g} {message.yaw_rate:g}" if moves else "zero"
             moves = message.vx or message.vy

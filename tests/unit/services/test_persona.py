@@ -4,7 +4,16 @@ import pytest
 
 from mav_tasks.mavlink.enums import MavAutopilot, MavModeFlag, MavState, MavType
 from mav_tasks.mavlink.messages import Heartbeat
-from mav_tasks.services.persona import ARDUPILOT, GENERIC, PX4, persona_of
+from mav_tasks.services.persona import (
+    ARDUPILOT,
+    GENERIC,
+    PX4,
+    Persona,
+    persona_of,
+    with_turning,
+    with_yaw_rate,
+)
+from mav_tasks.settings import Turning
 
 
 def heartbeat(autopilot: int) -> Heartbeat:
@@ -34,11 +43,21 @@ def test_ardupilot_is_asked_for_velocity_and_yaw_rate() -> None:
 
 
 def test_px4_is_asked_for_a_velocity_over_ground_unless_it_turns_at_a_rate() -> None:
-    assert (PX4.setpoint_mask, PX4.setpoint_frame, PX4.turns_on_spot) == (0x0DC7, 1, False)
+    assert (PX4.setpoint_mask, PX4.setpoint_frame, PX4.honours_yaw_rate) == (0x0DC7, 1, False)
     turning = persona_of(heartbeat(MavAutopilot.PX4), honours_yaw_rate=True)
     assert turning is not None
     assert (turning.setpoint_mask, turning.setpoint_frame) == (0x05C7, 8)
-    assert (turning.turns_on_spot, turning.arms_in_hold) == (True, True)
+    assert (turning.honours_yaw_rate, turning.arms_in_hold) == (True, True)
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=repr)
+def test_how_a_rover_turns_and_how_its_setpoints_are_read_are_two_facts(persona: Persona) -> None:
+    car = with_turning(persona, Turning.STEERED, radius=0.9)
+    assert (car.turning, car.turning_radius) == (Turning.STEERED, 0.9)
+    assert car.honours_yaw_rate is persona.honours_yaw_rate
+    for is_honoured in (False, True):
+        assert with_yaw_rate(car, is_honoured=is_honoured).turning is Turning.STEERED
+    assert with_turning(car, Turning.ON_SPOT) == persona
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ TICK = 0.05
 
 
 def go_on(goal: SingleGoal, progress: Progress, pose: Pose) -> Progress:
-    return resumed(goal, progress, motion(pose, at=0.0), turns_on_spot=True)
+    return resumed(goal, progress, motion(pose, at=0.0), honours_yaw_rate=True)
 
 
 def beside(along: float, across: float, *, turned: float = 0.0) -> Pose:
@@ -34,7 +34,7 @@ def beside(along: float, across: float, *, turned: float = 0.0) -> Pose:
 
 def back(goal: SingleGoal, done: float, pose: Pose) -> Course | None:
     return way_back(
-        goal, Progress(anchor=ANCHOR, done=done), motion(pose, at=0.0), turns_on_spot=True
+        goal, Progress(anchor=ANCHOR, done=done), motion(pose, at=0.0), honours_yaw_rate=True
     )
 
 
