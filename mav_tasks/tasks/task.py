@@ -26,6 +26,17 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
+class Bend:
+    """A piece of a path: ``length`` m on a circle or straight on, negative if driven backwards.
+
+    ``curvature`` in 1/m, positive where driving forwards turns clockwise, 0 = straight.
+    """
+
+    curvature: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """Which local frame coordinates are in: its origin, if known, and when the vehicle booted.
 
@@ -138,7 +149,8 @@ class Progress:
     ``leg`` is the part of the goal that is being driven, ``anchor`` the pose from which it counts
     (None: not begun), ``done`` the metres along the line, the radians turned or the seconds spent
     since then, ``target`` the place that a GoTo means; ``frame`` is the local frame that both are
-    in. ``execution_time`` is the seconds spent EXECUTING, all legs together.
+    in. ``path`` is the way from the anchor to the end of the leg, where the vehicle steers as a
+    car. ``execution_time`` is the seconds spent EXECUTING, all legs together.
 
     Of a plan, ``step`` is the one that is being driven (-1: not begun) and legs are its legs;
     ``jumps`` are pairs of a jump's step and how often it was made, ``pending`` the steps on the way
@@ -157,6 +169,7 @@ class Progress:
     pending: tuple[int, ...] = ()
     pending_for: float = 0.0
     speed: float | None = None
+    path: tuple[Bend, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,179 @@
+"""Paths of bounded curvature: pieces of circles and straights, one after another. Geometry only.
+
+A path counts from a pose, its anchor, and a place on it is given in metres along it, so that the
+anchor, the pieces and one number say how far a vehicle has come. Within one path a vehicle drives
+in one direction, forwards or backwards.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import atan2, cos, hypot, inf, pi, sin, tau
+
+from mav_tasks.tasks.task import Bend, Pose
+
+Path = tuple[Bend, ...]
+
+#: m along a path, to either side of where a vehicle was last seen, in which it is looked for: where
+#: a path crosses itself, the nearest place may be one that is yet to come
+WINDOW = 1.0
+STRAIGHT = 1e-9  # 1/m; less curvature is none
+
+
+@dataclass(frozen=True, slots=True)
+class Follow:
+    """Drive along a path; ``speed`` in m/s, None = default."""
+
+    path: Path
+    speed: float | None = None
+
+    @property
+    def is_reverse(self) -> bool:
+        """Whether it is driven backwards."""
+        return self.path[0].length < 0
+
+
+def moved(pose: Pose, curvature: float, length: float) -> Pose:
+    """Return the pose after ``length`` metres on a circle, or straight on; negative: backwards."""
+    if abs(curvature) < STRAIGHT:
+        north, east = length * cos(pose.yaw), length * sin(pose.yaw)
+        return Pose(pose.north + north, pose.east + east, pose.yaw)
+    yaw = pose.yaw + curvature * length
+    return Pose(
+        pose.north + (sin(yaw) - sin(pose.yaw)) / curvature,
+        pose.east - (cos(yaw) - cos(pose.yaw)) / curvature,
+        yaw,
+    )
+
+
+def path_length(path: Path) -> float:
+    """Return the metres from one end to the other."""
+    return sum(abs(bend.length) for bend in path)
+
+
+def pose_on(anchor: Pose, path: Path, along: float) -> Pose:
+    """Return the pose at a place on a path; before and beyond it straight on."""
+    pose = anchor
+    ahead = _direction(path)
+    if along <= 0:
+        return moved(pose, 0.0, ahead * along)
+    for bend in path:
+        length = abs(bend.length)
+        if along <= length:
+            return moved(pose, bend.curvature, ahead * along)
+        pose = moved(pose, bend.curvature, bend.length)
+        along -= length
+    return moved(pose, 0.0, ahead * along)
+
+
+def curvature_at(path: Path, along: float) -> float:
+    """Return the curvature of the piece at a place in 1/m, clockwise positive; 0 outside."""
+    for bend in path:
+        if 0 <= along < abs(bend.length):
+            return bend.curvature
+        along -= abs(bend.length)
+    return 0.0
+
+
+def nearest(anchor: Pose, path: Path, pose: Pose, *, around: float) -> float:
+    """Return the place on a path that is nearest to a pose, not far from where it last was."""
+    best, least = around, inf
+    for along in _candidates(anchor, path, pose, around=around):
+        if abs(along - around) > WINDOW:
+            continue
+        there = pose_on(anchor, path, along)
+        away = hypot(there.north - pose.north, there.east - pose.east)
+        if away < least:
+            best, least = along, away
+    if least == inf:  # it is nowhere near: as far as one may have come meanwhile
+        return min(max(around, 0.0), path_length(path))
+    return best
+
+
+def beside(anchor: Pose, path: Path, pose: Pose, along: float) -> float:
+    """Return the metres to the right of a place on a path."""
+    there = pose_on(anchor, path, along)
+    east, north = pose.east - there.east, pose.north - there.north
+    return east * cos(there.yaw) - north * sin(there.yaw)
+
+
+def joined(first: Path, second: Path) -> Path:
+    """Return one path after the other, without pieces of no length or that only go on."""
+    pieces: list[Bend] = []
+    for bend in (*first, *second):
+        last = pieces[-1] if pieces else None
+        if abs(bend.length) <= STRAIGHT:
+            continue
+        if last and last.curvature == bend.curvature and last.length * bend.length > 0:
+            pieces[-1] = Bend(bend.curvature, last.length + bend.length)
+        else:
+            pieces.append(bend)
+    return tuple(pieces)
+
+
+def runs_of(path: Path) -> list[Path]:
+    """Return the parts of a way between which a vehicle changes its direction."""
+    runs: list[list[Bend]] = []
+    for bend in path:
+        if runs and (runs[-1][0].length < 0) == (bend.length < 0):
+            runs[-1].append(bend)
+        else:
+            runs.append([bend])
+    return [tuple(run) for run in runs]
+
+
+def _direction(path: Path) -> float:
+    return -1.0 if path and path[0].length < 0 else 1.0
+
+
+def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Iterator[float]:
+    """Give for each piece its place nearest to a pose."""
+    start, begins, ahead = anchor, 0.0, _direction(path)
+    yield min(0.0, ahead * _forward_of(anchor, pose))
+    for bend in path:
+        length = abs(bend.length)
+        if abs(bend.curvature) < STRAIGHT:
+            along = ahead * _forward_of(start, pose)
+        else:
+            along = _on_circle(start, bend.curvature, ahead, pose, around=around - begins)
+        yield begins + min(max(along, 0.0), length)
+        start, begins = moved(start, bend.curvature, bend.length), begins + length
+    yield begins + max(0.0, ahead * _forward_of(start, pose))
+
+
+def _forward_of(start: Pose, pose: Pose) -> float:
+    north, east = pose.north - start.north, pose.east - start.east
+    return north * cos(start.yaw) + east * sin(start.yaw)
+
+
+def _on_circle(start: Pose, curvature: float, ahead: float, pose: Pose, *, around: float) -> float:
+    """Return how far along a circle a pose is; of its turns the one nearest to ``around``."""
+    north = start.north - sin(start.yaw) / curvature
+    east = start.east + cos(start.yaw) / curvature
+    yaw = atan2(curvature * (pose.north - north), -curvature * (pose.east - east))
+    round_once = tau / abs(curvature)
+    along = ahead * (yaw - start.yaw) / curvature
+    return along + round_once * round((around - along) / round_once)
+
+
+def turn_of(yaw: float, to: float, side: float) -> float:
+    """Return the angle from a heading to another, by that side only (1 clockwise), 0 to 2 pi."""
+    turn = (side * (to - yaw)) % tau
+    return 0.0 if tau - turn < 1e-9 else turn
+
+
+#: rad; pieces of a circle that are looked at as straights: those of 2 m leave it by 1 cm
+CHORD = pi / 15
+
+
+def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pose]:
+    """Give the corners of a way along a path; ``outside`` m further out in its bends."""
+    start = anchor
+    for bend in path:
+        turn = abs(bend.curvature * bend.length)
+        parts = 1 + int(turn / CHORD)
+        out = 0.0 if abs(bend.curvature) < STRAIGHT else -outside if bend.curvature > 0 else outside
+        for part in range(parts + 1):
+            pose = moved(start, bend.curvature, bend.length * part / parts)
+            north, east = -out * sin(pose.yaw), out * cos(pose.yaw)
+            yield Pose(pose.north + north, pose.east + east, pose.yaw)
+        start = moved(start, bend.curvature, bend.length)
