@@ -58,6 +58,13 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     return goal
 
 
+def left_out(wish: SingleGoal, ability: Ability) -> str:
+    """Return in words what of a goal a car leaves out; "": nothing."""
+    if ability.turning is not Turning.STEERED or not isinstance(wish, GoTo) or wish.yaw is None:
+        return ""
+    return f"{ability.rover} steers as a car: its heading at the place is as it comes"
+
+
 def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
     """A car turns only while it rolls."""
     match goal:

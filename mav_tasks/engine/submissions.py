@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from mav_tasks.engine.ability import Ability, as_driven
+from mav_tasks.engine.ability import Ability, as_driven, left_out
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_client import GcsClient
@@ -81,7 +81,8 @@ class Submissions:
         is_ours = command.command in OURS
         asked.client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         rover = f"rover {vehicle.system_id}"
-        goal = as_driven(wish.goal, Ability.of(vehicle.persona, rover=rover))
+        ability = Ability.of(vehicle.persona, rover=rover)
+        goal = as_driven(wish.goal, ability)
         self._check_reach(vehicle, goal)
         draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)
         known = self._recollection.known(
@@ -98,6 +99,9 @@ class Submissions:
         else:
             task = vehicle.tasks.submit(draft, now=now)
         self._await_commit(asked, task, now=now)
+        words = left_out(wish.goal, ability)
+        if words:
+            asked.tell(words, MavSeverity.INFO, now=now)
 
     def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
         """Take in a task that runs at once; Rejection says why not."""

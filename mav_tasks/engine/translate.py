@@ -25,6 +25,7 @@ from mav_tasks.tasks.itinerary import goal_of
 from mav_tasks.tasks.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
+from mav_tasks.tasks.path import Follow
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -251,7 +252,7 @@ def _unit(leg: Leg | None) -> int:
     match leg:
         case None:
             return UNIT_NONE
-        case Move():
+        case Move() | Follow():
             return UNIT_METRES
         case Rotate():
             return UNIT_RADIANS

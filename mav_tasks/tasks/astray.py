@@ -9,6 +9,7 @@ from math import copysign, hypot, radians
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.guidance import Motion, Velocity, cross_track, wrap
+from mav_tasks.tasks.path import Follow, beside
 from mav_tasks.tasks.way_back import OFF_LINE
 
 WRONG_WAY = 0.5  # m, driven in another direction than it points, or reverses, in
@@ -72,10 +73,15 @@ class AstrayWatch:
     ) -> bool:
         """Whether it has got away from its line by driving; a corrected position is not that."""
         anchor = course.progress.anchor
-        if anchor is None or not isinstance(course.leg, Move):
+        leg = course.leg
+        if anchor is None or not isinstance(leg, Move | Follow):
             self._least = None
             return False
-        before, self._beside = self._beside, abs(cross_track(anchor, motion.pose))
+        before = self._beside
+        if isinstance(leg, Follow):
+            self._beside = abs(beside(anchor, leg.path, motion.pose, course.progress.done))
+        else:
+            self._beside = abs(cross_track(anchor, motion.pose))
         if self._least is None or last is None or self._is_turning(motion):
             self._least = self._beside
         elif _hop(last, motion) > CORRECTED + 2 * motion.speed * elapsed:

@@ -17,6 +17,8 @@ from mav_tasks.tasks.goal import (
     Step,
 )
 from mav_tasks.tasks.legs import distance
+from mav_tasks.tasks.path import pose_on, rest_of
+from mav_tasks.tasks.planner import is_allowed
 from mav_tasks.tasks.task import Pose, Progress
 
 
@@ -52,7 +54,7 @@ class Bounds:
     def allows_stage(
         self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
     ) -> bool:
-        """Whether the straight way of a goal that begins, or goes on, here stays where it may be.
+        """Whether the way of a goal that begins, or goes on, here stays where it may be.
 
         From outside it may lead back in. What has no place to end at is watched while it drives.
         """
@@ -61,6 +63,10 @@ class Bounds:
         if fence is None or end is None:
             return True
         start = LocalPlace(pose.north, pose.east)
+        if progress.path and progress.anchor is not None:
+            left = rest_of(progress.path, progress.done)
+            on_path = pose_on(progress.anchor, progress.path, progress.done)
+            return is_allowed(on_path, left, fence)
         return fence.allows_way(start, end) or fence.escapes(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:

@@ -5,12 +5,18 @@ from math import copysign
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
-from mav_tasks.tasks.goal import GoTo, Head, Move, SingleGoal, Wait
+from mav_tasks.tasks.follow import steer_along
+from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
 from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
 from mav_tasks.tasks.legs import FACE, WAY, anchor_of, distance, leg_count, leg_of, length_of
+from mav_tasks.tasks.path import Follow
+from mav_tasks.tasks.planner import Steering, set_out_to
 from mav_tasks.tasks.task import Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
+TURNED_ROUND = (
+    0.1  # m from the end of a run after which a car changes its direction: as good as there
+)
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
 
 
@@ -25,8 +31,11 @@ class Course:
         passing: float = 0.0,
         within: float = 0.0,
         by_course: bool = False,
+        steering: Steering | None = None,
     ) -> None:
         self.goal = goal
+        #: of a vehicle that steers as a car; None: it turns on the spot
+        self.steering = steering
         self.progress = progress
         #: whether the vehicle neither turns on the spot nor reverses
         self.by_course = by_course
@@ -55,6 +64,12 @@ class Course:
         """Whether the present leg ends without standing."""
         return self.passing > 0.0 and self.progress.leg == WAY
 
+    @property
+    def _near_enough(self) -> float:
+        """Metres from a place, within which it is reached."""
+        radius = self.goal.radius if isinstance(self.goal, GoTo) else None
+        return max(radius or 0.0, BESIDE)
+
     def has_passed(self, motion: Motion) -> bool:
         """Whether the place is near enough to go on to the next."""
         target = self.progress.target
@@ -80,12 +95,14 @@ class Course:
         remaining = self.remaining
         if self.is_passing:
             return False
+        if self.progress.leg == FACE and isinstance(self.leg, Follow):
+            return remaining <= TURNED_ROUND
         if isinstance(self.goal, GoTo) and self.progress.leg == WAY:
             if remaining < -BESIDE:
                 return True  # it stops, and faces the place again from there
             if self.goal.radius:
                 return abs(remaining) <= self.goal.radius
-        if self.by_course and isinstance(self.leg, Move):
+        if self.by_course and isinstance(self.leg, Move | Follow):
             remaining = max(remaining, 0.0)  # what it drove too far it cannot drive back
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
@@ -96,15 +113,33 @@ class Course:
         """
         following = self.progress.leg + 1
         target = self.progress.target
-        if isinstance(self.goal, GoTo) and self.progress.leg == WAY and target is not None:
-            near_enough = max(self.goal.radius or 0.0, BESIDE)
-            if distance(motion.pose, target) > near_enough:
-                following = WAY if self.by_course else FACE
-                self.misses += 1
+        if self.steering is not None and target is not None and following <= WAY + 1:
+            if self._sets_out_again(motion, target, self.steering):
+                return True
+        elif self._has_missed(motion):
+            following = WAY if self.by_course else FACE
+            self.misses += 1
         if following >= leg_count(self.goal):
             return False
         anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
-        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0)
+        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=())
+        return True
+
+    def _has_missed(self, motion: Motion) -> bool:
+        """Whether it stands beside the place that it drove to."""
+        target = self.progress.target
+        if target is None or self.progress.leg != WAY:
+            return False
+        return distance(motion.pose, target) > self._near_enough
+
+    def _sets_out_again(self, motion: Motion, target: LocalPlace, steering: Steering) -> bool:
+        """Begin the next run to a place, unless it is reached."""
+        before = self.progress.leg
+        if before == WAY and not self._has_missed(motion):
+            return False
+        self.progress = set_out_to(self.progress, motion.pose, target, steering)
+        if self.progress.leg <= before:  # a run that should have been the last was not
+            self.misses += 1
         return True
 
     def steer(self, motion: Motion, *, driving: Driving, speed: float | None) -> Velocity:
@@ -112,7 +147,7 @@ class Course:
         anchor = self.progress.anchor
         assert anchor is not None, "a course has an anchor"
         leg = self.leg
-        if speed is not None and isinstance(leg, Move):
+        if speed is not None and isinstance(leg, Move | Follow):
             leg = replace(leg, speed=speed)
         elif speed is not None and isinstance(leg, Head):
             leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)
@@ -121,6 +156,19 @@ class Course:
         remaining = self.remaining
         if self.is_passing and remaining > 0:
             remaining = max(remaining - self.within, 0.0)
+        if isinstance(leg, Follow):
+            assert self.steering is not None, "a path is driven by what steers as a car"
+            return steer_along(
+                leg,
+                anchor,
+                motion,
+                along=self.progress.done,
+                remaining=remaining,
+                driving=driving,
+                radius=self.steering.radius,
+                passing=self.passing if self.is_passing else 0.0,
+                by_course=self.by_course,
+            )
         return guidance.steer(
             leg,
             anchor,
@@ -129,4 +177,5 @@ class Course:
             driving=driving,
             passing=self.passing if self.is_passing else 0.0,
             by_course=self.by_course,
+            radius=None if self.steering is None else self.steering.radius,
         )

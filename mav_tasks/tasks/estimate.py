@@ -6,6 +6,7 @@ from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate
 from mav_tasks.tasks.guidance import Leg
 from mav_tasks.tasks.legs import first_leg, leg_of, length_of
+from mav_tasks.tasks.path import Follow
 from mav_tasks.tasks.task import Progress
 
 SETTLING = 1.5  # s from one task's end to motion, and from near its end to a measured standstill
@@ -28,7 +29,7 @@ def time_left(goal: Goal, progress: Progress, driving: Driving) -> float:
 
 def _seconds(leg: Leg, left: float, driving: Driving) -> float:
     match leg:
-        case Move(speed=speed):
+        case Move(speed=speed) | Follow(speed=speed):
             return _ramped(left, speed or driving.speed, driving.acceleration)
         case Rotate(rate=rate):
             return _ramped(left, rate or driving.turn_rate, driving.turn_acceleration)

@@ -14,14 +14,20 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER, TaskWaits, VehicleNoted
-from mav_tasks.tasks.goal import Move, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import Face, Move, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited, within_fence
 from mav_tasks.tasks.scheduler import start_blocker
-from mav_tasks.tasks.stage import course_of, look_on_the_way, may_go_on_rolling, set_out
+from mav_tasks.tasks.stage import (
+    course_of,
+    look_on_the_way,
+    may_go_on_rolling,
+    set_out,
+    steering_of,
+)
 from mav_tasks.tasks.stuck import StuckWatch
 from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.timing import Timing, TimingMeter
@@ -123,7 +129,7 @@ class Executor:
             progress = Progress(execution_time=progress.execution_time)
         elif task.reason in (R.FRAME_RESET, R.OFF_LINE):
             # its line is lost, or left for good: what was driven counts, where it began does not
-            progress = replace(progress, anchor=None, frame=None, target=None)
+            progress = replace(progress, anchor=None, frame=None, target=None, path=())
         self._change(S.STARTING, R.NONE, actor=actor, now=now, progress=progress)
 
     def set_speed(self, speed: float | None) -> None:
@@ -248,7 +254,13 @@ class Executor:
         self._way_back, self._astray = None, AstrayWatch()
         if task.progress.anchor is not None:
             goal, honours = present_goal(task.goal, progress), seen.honours_yaw_rate
-            self._way_back = way_back(goal, progress, motion, honours_yaw_rate=honours)
+            self._way_back = way_back(
+                goal,
+                progress,
+                motion,
+                honours_yaw_rate=honours,
+                steering=steering_of(seen, self._bounds),
+            )
         self._change(S.EXECUTING, R.NONE, actor=SERVER, now=now, progress=progress)
         return view.STAND
 
@@ -269,7 +281,11 @@ class Executor:
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> Progress | None:
         """Set the course of a stage that begins here; None: it cannot, the task is interrupted."""
-        here = set_out(task.goal, progress, seen, motion)
+        steering = steering_of(seen, self._bounds)
+        if steering is not None and isinstance(present_goal(task.goal, progress), Rotate | Face):
+            self._finish(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE, actor=SERVER, now=now)
+            return None
+        here = set_out(task.goal, progress, seen, motion, steering=steering)
         if here is None:
             self.pause(R.POSITION_LOST, actor=SERVER, now=now)
             return None
@@ -283,7 +299,8 @@ class Executor:
             self._refuse_stage(task, now=now)
             return None
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
-        self._course = course_of(task.goal, here, seen, driving=self._settings.driving)
+        driving = self._settings.driving
+        self._course = course_of(task.goal, here, seen, driving=driving, steering=steering)
         self._begin_leg(now=now)
         return here
 
@@ -303,7 +320,10 @@ class Executor:
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
         if self._course is None:  # another step is gone on with
-            if not seen.still and not may_go_on_rolling(task.goal, task.progress, seen, motion):
+            steering = steering_of(seen, self._bounds)
+            if not seen.still and not may_go_on_rolling(
+                task.goal, task.progress, seen, motion, steering=steering
+            ):
                 return view.STAND
             if not self._go_on(task, task.progress, seen, motion, now=now):
                 return view.HOLD
@@ -373,7 +393,7 @@ class Executor:
         """The end of a leg: the next one, the next step, back to the task itself, or all done."""
         self._begin_leg(now=now)
         if course.advance(motion):
-            if course.by_course and course.misses > MISSES:
+            if (course.by_course or course.steering) and course.misses > MISSES:
                 self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
                 return
             if course is self._course:

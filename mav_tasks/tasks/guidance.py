@@ -9,10 +9,11 @@ from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
+from mav_tasks.tasks.path import Follow, nearest
 from mav_tasks.tasks.task import Pose
 
 #: what can be steered; every goal comes down to these (``legs``)
-Leg = Move | Rotate | Drive | Head | Wait
+Leg = Move | Rotate | Drive | Head | Wait | Follow
 
 APPROACH_GAIN = 1.2  # 1/s, of the last centimetres: speed = gain * remaining
 CREEP_SPEED = 0.02  # m/s, the least that a skid-steered vehicle still moves at
@@ -26,6 +27,9 @@ PIVOT_ERROR = pi / 4  # rad, pointing further off than this it turns on the spot
 #: m/s, at the most, while a vehicle that is steered by course points further off than that: it may
 #: turn on the spot by itself, or in a bow
 BOW_SPEED = 0.2
+#: of the curvature that a car is known to drive, as much may be asked for: with default gains
+#: ArduPilot's steering reaches half of what is asked for (4.6.3, SITL)
+MORE_CURVATURE = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +96,8 @@ def done_so_far(
         case Rotate(angle=angle):
             turned = copysign(1.0, angle) * (pose.yaw - anchor.yaw)
             return before + wrap(turned - before)
+        case Follow(path=path):
+            return nearest(anchor, path, pose, around=before)
         case Drive() | Head() | Wait():
             return before + elapsed
 
@@ -106,7 +112,7 @@ def cross_track(anchor: Pose, pose: Pose) -> float:
 def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) -> bool:
     """Whether the measured place is the leg's end; ``within`` is a factor on the tolerance."""
     match leg:
-        case Move():
+        case Move() | Follow():
             return abs(remaining) <= within * driving.arrival_distance
         case Rotate():
             return abs(remaining) <= within * driving.arrival_angle
@@ -123,16 +129,18 @@ def steer(
     driving: Driving,
     passing: float = 0.0,
     by_course: bool = False,
+    radius: float | None = None,
 ) -> Velocity:
-    """Give the velocity that brings the vehicle nearer to the leg's end.
+    """Give the velocity that brings the vehicle nearer to the leg's end, but for ``follow``'s legs.
 
     ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
     ``passing`` is the speed that a move has at its end, m/s, when another follows. ``by_course``:
-    the vehicle neither turns on the spot nor reverses.
+    the vehicle neither turns on the spot nor reverses. ``radius``: the least in m, of one that
+    steers as a car.
     """
     match leg:
         case Move(distance=distance, speed=speed):
-            towards_end = _approach(
+            towards_end = approach(
                 remaining,
                 top=speed or driving.speed,
                 braking=driving.acceleration,
@@ -142,9 +150,9 @@ def steer(
             )
             forward = copysign(towards_end, distance * remaining)
             error = _heading_error(anchor, pose, forward=forward)
-            return _towards(error, forward, pose=pose, by_course=by_course)
+            return _towards(error, forward, pose=pose, by_course=by_course, radius=radius)
         case Rotate(angle=angle, rate=rate):
-            towards_end = _approach(
+            towards_end = approach(
                 remaining,
                 top=rate or driving.turn_rate,
                 braking=driving.turn_acceleration,
@@ -155,17 +163,24 @@ def steer(
         case Drive(forward=forward, yaw_rate=yaw_rate):
             return Velocity(forward, yaw_rate, anchor.yaw if by_course else None)
         case Head(yaw=yaw, forward=forward):
-            return _towards(wrap(yaw - pose.yaw), forward, pose=pose, by_course=by_course)
-        case Wait():
+            error = wrap(yaw - pose.yaw)
+            return _towards(error, forward, pose=pose, by_course=by_course, radius=radius)
+        case Wait() | Follow():
             return ZERO
 
 
-def _towards(heading_error: float, forward: float, *, pose: Pose, by_course: bool) -> Velocity:
+def _towards(
+    heading_error: float, forward: float, *, pose: Pose, by_course: bool, radius: float | None
+) -> Velocity:
     """Drive while pointing about right, and turn on the spot until then; or drive there slowly."""
     if by_course:
         slow = min(forward, BOW_SPEED) if is_far_off(heading_error) else forward
         return Velocity(max(slow, 0.0), 0.0, wrap(pose.yaw + heading_error))
     rate = max(-MAX_STEER_RATE, min(MAX_STEER_RATE, HEADING_GAIN * heading_error))
+    if radius is not None:
+        slow = min(abs(forward), BOW_SPEED) if is_far_off(heading_error) else abs(forward)
+        most = MORE_CURVATURE * slow / radius
+        return Velocity(copysign(slow, forward), max(-most, min(most, rate)))
     return Velocity(0.0 if is_far_off(heading_error) else forward, rate)
 
 
@@ -185,7 +200,7 @@ def corner_speed(turn: float, *, lead: float) -> float:
     return MAX_STEER_RATE * lead / max(tan(bend / 2), 1e-3)
 
 
-def _approach(
+def approach(
     remaining: float,
     *,
     top: float,

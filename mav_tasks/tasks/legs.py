@@ -10,9 +10,11 @@ from math import atan2, copysign, cos, hypot, pi, sin, tau
 
 from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.guidance import Leg, wrap
+from mav_tasks.tasks.path import Follow, path_length
 from mav_tasks.tasks.task import Pose, Progress
 
-#: the legs of a GoTo: face the place, drive there, then what else was asked for
+#: the legs of a GoTo: face the place (as a car: drive to where the last run to it begins), drive
+#: there, then what else was asked for
 FACE, WAY = range(2)
 
 
@@ -62,6 +64,8 @@ def length_of(leg: Leg) -> float:
             return abs(distance)
         case Rotate(angle=angle):
             return abs(angle)
+        case Follow(path=path):
+            return path_length(path)
         case Drive(duration=duration) | Head(duration=duration) | Wait(duration=duration):
             return duration
 
@@ -100,6 +104,8 @@ def distance(pose: Pose, place: LocalPlace) -> float:
 def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
     if progress.leg <= WAY:
         assert progress.target is not None, "the place was found before the task began"
+        if progress.path:
+            return Follow(progress.path, goal.speed)
         if progress.leg == FACE:
             return Rotate(wrap(bearing(anchor, progress.target) - anchor.yaw))
         return Move(distance(anchor, progress.target), goal.speed)

@@ -7,7 +7,7 @@ in one direction, forwards or backwards.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import atan2, cos, hypot, inf, pi, sin, tau
+from math import atan2, copysign, cos, hypot, inf, pi, sin, tau
 
 from mav_tasks.tasks.task import Bend, Pose
 
@@ -74,11 +74,13 @@ def curvature_at(path: Path, along: float) -> float:
     return 0.0
 
 
-def nearest(anchor: Pose, path: Path, pose: Pose, *, around: float) -> float:
+def nearest(
+    anchor: Pose, path: Path, pose: Pose, *, around: float, window: float = WINDOW
+) -> float:
     """Return the place on a path that is nearest to a pose, not far from where it last was."""
     best, least = around, inf
     for along in _candidates(anchor, path, pose, around=around):
-        if abs(along - around) > WINDOW:
+        if abs(along - around) > window:
             continue
         there = pose_on(anchor, path, along)
         away = hypot(there.north - pose.north, there.east - pose.east)
@@ -108,6 +110,17 @@ def joined(first: Path, second: Path) -> Path:
         else:
             pieces.append(bend)
     return tuple(pieces)
+
+
+def rest_of(path: Path, done: float) -> Path:
+    """Return what is left of a path of which ``done`` metres are behind."""
+    left: list[Bend] = []
+    for bend in path:
+        length = abs(bend.length)
+        kept = length - max(0.0, min(done, length))
+        left.append(Bend(bend.curvature, copysign(kept, bend.length)))
+        done -= length
+    return joined((), tuple(left))
 
 
 def runs_of(path: Path) -> list[Path]:

@@ -14,6 +14,7 @@ from math import atan2, hypot, pi, remainder, sqrt, tau
 
 from mav_tasks.tasks.fence import LocalFence
 from mav_tasks.tasks.goal import LocalPlace
+from mav_tasks.tasks.legs import FACE, WAY
 from mav_tasks.tasks.path import (
     STRAIGHT,
     Path,
@@ -24,7 +25,7 @@ from mav_tasks.tasks.path import (
     runs_of,
     turn_of,
 )
-from mav_tasks.tasks.task import Bend, Pose
+from mav_tasks.tasks.task import Bend, Pose, Progress
 
 #: of the turning radius: what is planned leaves something to steer with
 SPARE = 1.15
@@ -81,6 +82,16 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
         mirrored = _dubins(_turned(pose), _turned(goal), steering.planned_radius)
         ways += [_reversed(way) for way in mirrored]
     return _best(pose, ways, steering.fence)
+
+
+def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Steering) -> Progress:
+    """Return the progress with which the first run of the way to a place begins.
+
+    Where no way stays within the fence it is the one that would be driven without.
+    """
+    way = way_to(pose, place, steering) or boldest_way_to(pose, place, steering)
+    first, *others = runs_of(way)
+    return replace(progress, leg=FACE if others else WAY, anchor=pose, path=first, done=0.0)
 
 
 def is_allowed(pose: Pose, path: Path, fence: LocalFence | None, *, clear: float = 0.0) -> bool:

@@ -9,6 +9,7 @@ from math import inf, pi
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.guidance import Velocity, is_far_off, wrap
+from mav_tasks.tasks.path import Follow
 from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
@@ -47,8 +48,8 @@ class StuckWatch:
         forward, turned = self._last
         if self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS:
             self._progressed(now)
-        if isinstance(leg, Move | Rotate):
-            self._commanded += forward if isinstance(leg, Move) else turned
+        if isinstance(leg, Move | Rotate | Follow):
+            self._commanded += turned if isinstance(leg, Rotate) else forward
             left = abs(course.remaining)
             if left < self._best_remaining - PROGRESS:
                 self._best_remaining = left

@@ -19,7 +19,7 @@ TICK = 0.05
 
 
 def go_on(goal: SingleGoal, progress: Progress, pose: Pose) -> Progress:
-    return resumed(goal, progress, motion(pose, at=0.0), honours_yaw_rate=True)
+    return resumed(goal, progress, motion(pose, at=0.0), turns_first=True)
 
 
 def beside(along: float, across: float, *, turned: float = 0.0) -> Pose:
