@@ -14,9 +14,9 @@ from mav_tasks.tasks.planner import Steering, set_out_to
 from mav_tasks.tasks.task import Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
-TURNED_ROUND = (
-    0.1  # m from the end of a run after which a car changes its direction: as good as there
-)
+#: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
+BESIDE_OF_LOOP = 0.4
+TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: near enough
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
 
 
@@ -68,7 +68,8 @@ class Course:
     def _near_enough(self) -> float:
         """Metres from a place, within which it is reached."""
         radius = self.goal.radius if isinstance(self.goal, GoTo) else None
-        return max(radius or 0.0, BESIDE)
+        is_loop_away = self.by_course and self.steering is not None
+        return max(radius or 0.0, BESIDE_OF_LOOP if is_loop_away else BESIDE)
 
     def has_passed(self, motion: Motion) -> bool:
         """Whether the place is near enough to go on to the next."""

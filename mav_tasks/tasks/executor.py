@@ -20,6 +20,7 @@ from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal,
 from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.limits import limited, within_fence
+from mav_tasks.tasks.path import Follow
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.stage import (
     course_of,
@@ -380,7 +381,7 @@ class Executor:
         self, course: Course, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
     ) -> Velocity | None:
         """Slow down before the fence; None: stop. A vehicle that began outside may come back in."""
-        if self._is_coming_back and isinstance(course.leg, Move | Rotate):
+        if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
             self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
             if self._is_coming_back:
                 return wish

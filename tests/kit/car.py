@@ -52,6 +52,10 @@ class Car:
             self._step(seconds)
             left -= seconds
 
+    def shift(self, *, east: float) -> None:
+        """Put it elsewhere, m."""
+        self._pose = replace(self._pose, east=self._pose.east + east)
+
     def close(self) -> None:
         """Nothing is held."""
 

@@ -152,6 +152,24 @@ class TestGoTo:
         assert (rig.state(1), rig.task(1).reason) == (S.FAILED, R.OUTSIDE_FENCE)
         assert rover.pose == NORTHWARDS
 
+    def test_from_outside_the_fence_it_drives_back_in(self) -> None:
+        rig, rover, place = Rig(), car(radians(120)), LocalPlace(9.0, 2.0)
+        rig.tasks.bounds.fence = yard(3.0, -12.0, 15.0, 12.0)
+        rig.submit(GoTo(place))
+        finish(rig, rover)
+        assert rig.state(1) is S.COMPLETED
+        assert off(rover, place) <= 0.10
+
+    def test_one_that_cannot_reverse_drives_no_full_circle_for_what_is_near_enough(self) -> None:
+        rig, rover, place = Rig(), car(by_course=True), LocalPlace(6.0, 0.0)
+        rig.submit(GoTo(place))
+        drive_until(rig, rover, lambda: rig.task(1).progress.done > 5.8)
+        rover.body.shift(east=0.3)  # its position is corrected
+        started = rig.now
+        finish(rig, rover)
+        assert rig.state(1) is S.COMPLETED
+        assert rig.now - started < 10.0
+
     def test_it_is_slow_enough_in_a_bend_and_fast_on_the_straight(self) -> None:
         rig, rover = Rig(), car()
         rig.submit(GoTo(LocalPlace(12.0, 12.0), speed=2.0))
