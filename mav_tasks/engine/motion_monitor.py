@@ -1,7 +1,8 @@
 """A vehicle's own position, heading and standstill, from LOCAL_POSITION_NED and ATTITUDE."""
 
-from math import cos, hypot, isfinite, sin
+from math import cos, hypot, inf, isfinite, sin
 
+from mav_tasks.engine.standstill import Standstill
 from mav_tasks.mavlink.messages import Attitude, LocalPositionNed
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.guidance import Motion
@@ -22,6 +23,9 @@ class MotionMonitor:
         self._moved_at: float | None = None
         self._latest: Motion | None = None  # made of what came last, when it is asked for
         self._last_boot_ms: dict[int, int] = {}
+        #: where it was lately, and what it does at rest
+        self.standstill = Standstill()
+        self._doubted_until = -inf
         self.rebooted = False
 
     def apply(self, watch: Watch) -> None:
@@ -40,7 +44,10 @@ class MotionMonitor:
         else:
             self._attitude, self._attitude_at = message, now
         if self._moved_at is None or not self._is_slow():
-            self._moved_at = max(now, self._moved_at or now)
+            self._moved_at = now
+        motion = self.latest()
+        if motion is not None and isinstance(message, LocalPositionNed):
+            self.standstill.receive(motion, now=now)
 
     def latest(self) -> Motion | None:
         """Give the last measured motion, or None before both messages have come."""
@@ -66,23 +73,29 @@ class MotionMonitor:
 
         That nothing was heard since it moved is no standstill, however long data count as fresh.
         """
-        motion = self.latest()
-        return (
-            motion is not None
-            and self._is_slow()
-            and now - motion.at <= self._watch.motion_fresh
+        motion, watch = self.latest(), self._watch
+        if motion is None or now - motion.at > watch.motion_fresh or now < self._doubted_until:
+            return False
+        if abs(motion.yaw_rate) >= watch.still_turn_rate:  # at rest 1.4 deg/s was the most measured
+            return False
+        says_so = (
+            self._is_slow()
             and self._moved_at is not None
-            and now - self._moved_at >= self._watch.still_time
+            and now - self._moved_at >= watch.still_time
         )
+        if says_so and self.standstill.confirms(watch, now=now):
+            return True
+        return self.standstill.has_stood(watch, now=now)
 
     def doubt(self, *, until: float) -> None:
         """Do not believe before then that it stands, whatever it says."""
-        self._moved_at = until
+        self._doubted_until = until
 
     def forget(self) -> None:
         """Start afresh, as after a restart of the vehicle."""
         self._position = self._attitude = self._latest = None
         self._moved_at = None
+        self.standstill.forget()
         self._last_boot_ms.clear()
         self.rebooted = False
 

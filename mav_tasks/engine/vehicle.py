@@ -289,12 +289,22 @@ class Vehicle:
         by_client = self._authority.armed_by_client(now=now)
         if armed and by_hand and not by_client and self.control.is_asking_mode:
             self._take_over("armed to be driven by hand", now=now)
+        self._note_rest(now=now)
         if not self._clock.is_running:
             self.step(now=now)
         self._ask_for_rates(now=now)
         self.requests.ask_for_failsafe()
         self._note_failsafe(now=now)
         self._use_profile(now=now)
+
+    def _note_rest(self, *, now: float) -> None:
+        """What it measures at rest is learnt while nothing can be telling it to move."""
+        driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
+        follows = (self.persona.hold_mode, self.persona.control_mode)
+        if self.armed and (driven or self._monitor.custom_mode not in follows):
+            self.where.motion.standstill.may_move()
+        else:
+            self.where.motion.standstill.told_to_stand(now=now)
 
     def _use_profile(self, *, now: float) -> None:
         """Go by what was measured of it; setpoints do not change their kind while it is driven."""
@@ -816,6 +826,8 @@ class Vehicle:
                 self.control.take(may_arm=seen.may_arm, now=now)
             case DemandKind.DRIVE:
                 wanted = demand.velocity
+                if not wanted.is_zero:
+                    self.where.motion.standstill.may_move()
                 self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 still = seen.still and not self.hold_before.is_open(now=now)

@@ -115,7 +115,12 @@ def test_it_stands_after_it_was_slow_for_a_while() -> None:
 
 @pytest.mark.parametrize(
     "moving",
-    [position(ms=5000, vx=0.04), position(ms=5000, vy=-0.04), attitude(ms=5000, rate=0.05)],
+    [
+        position(ms=5000, vx=0.12),
+        position(ms=5000, vy=-0.12),
+        position(ms=5000, x=1.05),
+        attitude(ms=5000, yaw=0.05, rate=0.05),
+    ],
 )
 def test_any_motion_ends_standing(moving: Attitude | LocalPositionNed) -> None:
     made = MotionMonitor(WATCH)
