@@ -38,6 +38,9 @@ class Driving:
     turn_acceleration: float = radians(90)  # rad/s², the same for turning
     arrival_distance: float = 0.01  # m, a move is done within this of its end
     arrival_angle: float = radians(0.5)  # rad, a rotation is done within this of its end
+    #: m, within which a move is done that its rover cannot bring nearer to its end
+    settle_distance: float = 0.1
+    settle_angle: float = radians(2)  # rad, the same for a rotation
     acceptance_radius: float = 0.5  # m, a plan's place that names none is passed within this
     #: m, the least of a vehicle that steers as a car, where neither profile nor vehicle says it
     turning_radius: float = DEFAULT_TURNING_RADIUS

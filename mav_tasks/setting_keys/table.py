@@ -213,6 +213,17 @@ _DRIVING = (
         field="arrival_angle",
     ),
     _key(
+        "driving.settle_distance",
+        Number(0.001, 2, "m"),
+        "a move is done this near to its end where the rover can come no nearer",
+    ),
+    _key(
+        "driving.settle_angle_deg",
+        Number(0.05, 20, "deg", DEGREE),
+        "the same for a rotation",
+        field="settle_angle",
+    ),
+    _key(
         "driving.acceptance_radius",
         Number(0.05, 100, "m"),
         "a plan's place that names no radius is passed within this",

@@ -7,7 +7,7 @@ from mav_tasks.settings import Driving
 from mav_tasks.tasks import guidance
 from mav_tasks.tasks.follow import steer_along
 from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
-from mav_tasks.tasks.guidance import ZERO, Leg, Motion, Velocity
+from mav_tasks.tasks.guidance import USUAL, ZERO, Leg, Motion, Slowest, Velocity
 from mav_tasks.tasks.legs import FACE, WAY, anchor_of, distance, leg_count, leg_of, length_of
 from mav_tasks.tasks.path import Follow
 from mav_tasks.tasks.planner import Steering, set_out_to
@@ -90,8 +90,11 @@ class Course:
         if self.is_passing and self.remaining <= 0.0 and not self.has_passed(motion):
             self.passing = 0.0  # missed: it stops, and tries again from there
 
-    def has_arrived(self, *, stands: bool, driving: Driving) -> bool:
-        """Whether to stand here: near the end while moving; anywhere within tolerance at rest."""
+    def has_arrived(self, *, stands: bool, driving: Driving, coast: float = 0.0) -> bool:
+        """Whether to stand here: near the end while moving; anywhere within tolerance at rest.
+
+        ``coast`` is how far it will roll on, m or rad.
+        """
         within = 1.0 if stands else MOVING_TOLERANCE
         remaining = self.remaining
         if self.is_passing:
@@ -105,7 +108,16 @@ class Course:
                 return abs(remaining) <= self.goal.radius
         if self.by_course and isinstance(self.leg, Move | Follow):
             remaining = max(remaining, 0.0)  # what it drove too far it cannot drive back
+        if not stands and 0.0 <= remaining <= coast:
+            return True
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
+
+    def is_settled(self, *, driving: Driving) -> bool:
+        """Whether the end is as near as a rover must come that can come no nearer."""
+        remaining = self.remaining
+        if self.by_course and isinstance(self.leg, Move | Follow):
+            remaining = max(remaining, 0.0)
+        return guidance.is_settled(self.leg, remaining, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
         """Begin the next leg where the vehicle stands; False: there is none.
@@ -143,7 +155,14 @@ class Course:
             self.misses += 1
         return True
 
-    def steer(self, motion: Motion, *, driving: Driving, speed: float | None) -> Velocity:
+    def steer(
+        self,
+        motion: Motion,
+        *,
+        driving: Driving,
+        speed: float | None,
+        slowest: Slowest = USUAL,
+    ) -> Velocity:
         """Give the velocity towards the end of the leg; ``speed`` m/s overrides what it says."""
         anchor = self.progress.anchor
         assert anchor is not None, "a course has an anchor"
@@ -169,6 +188,7 @@ class Course:
                 radius=self.steering.radius,
                 passing=self.passing if self.is_passing else 0.0,
                 by_course=self.by_course,
+                slowest=slowest,
             )
         return guidance.steer(
             leg,
@@ -179,4 +199,5 @@ class Course:
             passing=self.passing if self.is_passing else 0.0,
             by_course=self.by_course,
             radius=None if self.steering is None else self.steering.radius,
+            slowest=slowest,
         )

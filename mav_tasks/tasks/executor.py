@@ -9,6 +9,7 @@ from math import copysign
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
+from mav_tasks.tasks.arrival import Arrival
 from mav_tasks.tasks.astray import AstrayWatch
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
@@ -61,6 +62,7 @@ class Executor:
         self._moved_at = 0.0  # when a velocity other than zero was last asked for
         self._stuck = StuckWatch()
         self._astray = AstrayWatch()
+        self._arrival = Arrival()
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
         self._resumes_by_itself = False
         self._is_coming_back = False  # from outside the fence
@@ -344,7 +346,9 @@ class Executor:
                 return Demand(DemandKind.DRIVE, self._last_velocity)
         self._note_progress(task, now)
         stands = seen.still and self._has_asked_to_stand(now)
-        if course.has_arrived(stands=stands, driving=self._settings.driving):
+        if self._arrival.stands_here(
+            course, self._last_velocity, stands=stands, driving=self._settings.driving, now=now
+        ):
             if stands or isinstance(course.leg, Wait):
                 self._arrive(task, course, seen, motion, now)
             return view.STAND
@@ -358,7 +362,8 @@ class Executor:
             self._set_aside_as_astray(task, now=now)
             return view.HOLD
         speed = None if course is self._way_back else course.progress.speed
-        wish = course.steer(motion, driving=self._settings.driving, speed=speed)
+        slowest = self._arrival.slowest
+        wish = course.steer(motion, driving=self._settings.driving, speed=speed, slowest=slowest)
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
@@ -371,6 +376,7 @@ class Executor:
     def _begin_leg(self, *, now: float) -> None:
         self._stuck.begin(now=now)
         self._astray.begin_leg()
+        self._arrival.begin_leg()
 
     def _set_aside_as_astray(self, task: Task, *, now: float) -> None:
         words = "does not go where it is told to: is its heading right?"

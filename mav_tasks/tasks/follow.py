@@ -7,11 +7,11 @@ from math import atan2, copysign, inf, sqrt
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.guidance import (
-    APPROACH_GAIN,
-    CREEP_SPEED,
     MAX_APPROACH_ANGLE,
     MORE_CURVATURE,
+    USUAL,
     Motion,
+    Slowest,
     Velocity,
     approach,
     wrap,
@@ -41,6 +41,7 @@ def steer_along(
     radius: float,
     passing: float = 0.0,
     by_course: bool = False,
+    slowest: Slowest = USUAL,
 ) -> Velocity:
     """Return the velocity that brings the vehicle along its path, and back to it.
 
@@ -52,8 +53,8 @@ def steer_along(
         remaining,
         top=top,
         braking=driving.acceleration,
-        gain=APPROACH_GAIN,
-        creep=CREEP_SPEED,
+        gain=slowest.gain,
+        creep=slowest.speed,
         at_end=passing,
     )
     if by_course:

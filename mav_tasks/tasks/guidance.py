@@ -6,6 +6,7 @@ pre-emption leaves no error behind. ``limits`` has the last word on what comes o
 
 from dataclasses import dataclass
 from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
+from typing import NamedTuple
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
@@ -16,7 +17,8 @@ from mav_tasks.tasks.task import Pose
 Leg = Move | Rotate | Drive | Head | Wait | Follow
 
 APPROACH_GAIN = 1.2  # 1/s, of the last centimetres: speed = gain * remaining
-CREEP_SPEED = 0.02  # m/s, the least that a skid-steered vehicle still moves at
+#: m/s, the least that is asked for; half of it moved no ArduPilot reliably (its PWM is then 1500)
+CREEP_SPEED = 0.05
 TURN_GAIN = 1.6  # 1/s, the same for turning
 CREEP_RATE = 0.03  # rad/s
 HEADING_GAIN = 1.5  # 1/s, heading error -> turn rate while moving
@@ -73,6 +75,18 @@ class Velocity:
 ZERO = Velocity(0.0, 0.0)
 
 
+class Slowest(NamedTuple):
+    """How the last of a leg is driven by one rover, as ``arrival`` has learnt it."""
+
+    speed: float = CREEP_SPEED  # m/s, the least that moves it
+    rate: float = CREEP_RATE  # rad/s, the same for turning
+    gain: float = APPROACH_GAIN  # 1/s, speed per metre left
+    turn_gain: float = TURN_GAIN  # 1/s, the same for turning
+
+
+USUAL = Slowest()
+
+
 def wrap(angle: float) -> float:
     """Give the same direction within ±pi."""
     return atan2(sin(angle), cos(angle))
@@ -120,6 +134,17 @@ def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) 
             return remaining <= 0.0
 
 
+def is_settled(leg: Leg, remaining: float, *, driving: Driving) -> bool:
+    """Return whether the leg's end is as near as a rover must come that can come no nearer."""
+    match leg:
+        case Move() | Follow():
+            return abs(remaining) <= max(driving.settle_distance, driving.arrival_distance)
+        case Rotate():
+            return abs(remaining) <= max(driving.settle_angle, driving.arrival_angle)
+        case Drive() | Head() | Wait():
+            return remaining <= 0.0
+
+
 def steer(
     leg: Leg,
     anchor: Pose,
@@ -130,6 +155,7 @@ def steer(
     passing: float = 0.0,
     by_course: bool = False,
     radius: float | None = None,
+    slowest: Slowest = USUAL,
 ) -> Velocity:
     """Give the velocity that brings the vehicle nearer to the leg's end, but for ``follow``'s legs.
 
@@ -144,8 +170,8 @@ def steer(
                 remaining,
                 top=speed or driving.speed,
                 braking=driving.acceleration,
-                gain=APPROACH_GAIN,
-                creep=CREEP_SPEED,
+                gain=slowest.gain,
+                creep=slowest.speed,
                 at_end=passing,
             )
             forward = copysign(towards_end, distance * remaining)
@@ -156,8 +182,8 @@ def steer(
                 remaining,
                 top=rate or driving.turn_rate,
                 braking=driving.turn_acceleration,
-                gain=TURN_GAIN,
-                creep=CREEP_RATE,
+                gain=slowest.turn_gain,
+                creep=slowest.rate,
             )
             return Velocity(0.0, copysign(towards_end, angle * remaining))
         case Drive(forward=forward, yaw_rate=yaw_rate):
@@ -212,7 +238,7 @@ def approach(
     """Give the speed at a distance: as fast as one may and can still brake, then gently."""
     left = abs(remaining)
     braked = sqrt(at_end * at_end + 2 * 0.5 * braking * left)
-    return max(creep, min(top, max(gain * left, at_end), braked))
+    return max(min(creep, top), min(top, max(gain * left, at_end), braked))
 
 
 def _heading_error(anchor: Pose, pose: Pose, *, forward: float) -> float:

@@ -37,3 +37,40 @@ class WeakBrakes:
 
     def close(self) -> None:
         """Nothing is held."""
+
+
+class Sticky:
+    """A body whose wheels stand below a speed, and which rolls on freely; implements ``Body``.
+
+    ``least`` m/s moves it, slower does not. On zero it slows down at ``rolling`` m/s².
+    """
+
+    def __init__(self, start: Pose, *, least: float, rolling: float) -> None:
+        self._body: Body = kinematic_body(start)
+        self._least, self._rolling = least, rolling
+        self._wanted = self._given = 0.0
+        self._yaw_rate = 0.0
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last ``advance``."""
+        return self._body.state
+
+    def drive(self, forward_speed: float, yaw_rate: float) -> None:
+        """Demand a motion."""
+        self._wanted, self._yaw_rate = forward_speed, yaw_rate
+
+    def advance(self, duration: float) -> None:
+        """Move on."""
+        wanted = self._wanted if abs(self._wanted) >= self._least else 0.0
+        step = self._rolling * duration
+        if abs(wanted) < abs(self._given) or wanted * self._given < 0.0:
+            towards = max(-step, min(step, wanted - self._given))
+            self._given += towards
+        else:
+            self._given = wanted
+        self._body.drive(self._given, self._yaw_rate)
+        self._body.advance(duration)
+
+    def close(self) -> None:
+        """Nothing is held."""

@@ -77,6 +77,8 @@ def test_every_setting_is_known_by_name() -> None:
             "turn_acceleration",
             "arrival_distance",
             "arrival_angle",
+            "settle_distance",
+            "settle_angle",
             "acceptance_radius",
             "turning_radius",
         ],

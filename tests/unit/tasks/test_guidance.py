@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.guidance import (
+    CREEP_SPEED,
     ZERO,
     Motion,
     Velocity,
@@ -157,7 +158,7 @@ class TestMoving:
         goal = Move(sign * 20.0, speed=speed)
         wish = steer(goal, NORTHWARDS, NORTHWARDS, remaining=remaining, driving=DRIVING)
         can_brake = sqrt(2 * DRIVING.acceleration * remaining)
-        assert abs(wish.forward) <= max(0.02, min(speed, can_brake))
+        assert abs(wish.forward) <= max(CREEP_SPEED, min(speed, can_brake))
         assert wish.forward * sign > 0
 
 

@@ -1,0 +1,166 @@
+"""How the end of a leg is reached as exactly as this rover can.
+
+No rover moves at any speed that it is asked for: below some speed its wheels stand, and at that
+speed it rolls on for a while after zero. Both differ ten times from one rover to the next (0.02 to
+0.5 m/s and 0.1 to 1.7 s were measured), so both are learnt while it drives. Near its end a leg is
+driven at the least speed that moves the rover, and zero is asked for where it will roll to the end.
+Where it then stands is judged: within the tolerance it has arrived. Otherwise it is corrected, but
+not for ever: within the settling distance what it cannot do better is good enough, and the error
+that remains is in the task's status.
+"""
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.course import Course
+from mav_tasks.tasks.goal import Move, Rotate
+from mav_tasks.tasks.guidance import (
+    APPROACH_GAIN,
+    CREEP_RATE,
+    CREEP_SPEED,
+    TURN_GAIN,
+    Slowest,
+    Velocity,
+)
+
+CORRECTIONS = 2  # times that the end is corrected from a standstill
+STALLED = 4.0  # s without getting nearer, within the settling distance, after which it stands
+NEARER = 0.005  # m or rad, less than this is not getting nearer
+ASKED = 0.7  # s of a slow speed without an effect, after which the least speed is raised
+EFFECT = 0.2  # of the way that was asked for; less is no effect
+RAISE = 1.6  # times the least speed, when it had no effect
+MOST_CREEP = 0.4  # m/s or rad/s, the most that it is raised to
+LONGEST_LAG = 2.5  # s; 1.7 was measured
+MOST_COAST = 0.12  # m or rad before the end at which zero is asked for at the most
+GAIN_BY_LAG = 0.7  # the approach is slower for a rover that rolls on for longer
+
+
+class Creeping:
+    """What was learnt of one rover's slowest motion, along or around: kept for all its tasks."""
+
+    def __init__(self, *, least: float, lag: float) -> None:
+        self._least_known = least
+        self.least = least  # m/s or rad/s that moves it
+        self.lag = lag  # s times the speed: how far it rolls on after zero
+
+    def __repr__(self) -> str:
+        return f"Creeping(least {self.least:.3f}, rolls on {self.lag:.2f} s)"
+
+    def coast(self, speed: float) -> float:
+        """Return how far before the end zero is to be asked for, m or rad."""
+        return min(abs(speed) * self.lag, MOST_COAST)
+
+    def gain(self, usual: float) -> float:
+        """Return the speed per distance left, 1/s, that does not overshoot."""
+        return min(usual, GAIN_BY_LAG / self.lag) if self.lag > 0 else usual
+
+    def rolled_on(self, way: float, speed: float) -> None:
+        """Take in how far it rolled on after zero was asked for at a speed."""
+        if speed > 0:
+            seen = max(0.0, min(LONGEST_LAG, way / speed))
+            self.lag = 0.5 * (self.lag + seen)
+
+    def had_no_effect(self, speed: float) -> None:
+        """Ask for more than this speed from now on: at this speed it stands."""
+        self.least = max(self.least, min(MOST_CREEP, speed * RAISE))
+
+    def overshot(self) -> None:
+        """Ask for less from now on: it went past the end."""
+        self.least = max(self._least_known, self.least / RAISE)
+
+    def begins_again(self) -> None:
+        """Another leg begins: it may have been the ground, so a little less is tried."""
+        self.least = max(self._least_known, 0.8 * self.least)
+
+
+class Arrival:
+    """The memory of one rover's arrivals; ``begin_leg`` for each leg."""
+
+    def __init__(self) -> None:
+        self.along = Creeping(least=CREEP_SPEED, lag=0.1)
+        self.around = Creeping(least=CREEP_RATE, lag=0.05)
+        self._is_settling = False  # zero is asked for until it stands
+        self._gives_up = False  # what it reached is good enough, if it is near
+        self._corrections = 0
+        self._left_at_zero: tuple[float, float] | None = None  # what was left, at which speed
+        self._best = 0.0  # the least that was left
+        self._best_at: float | None = None
+        #: since when it is asked for a slow speed, what was left then, and the least speed since
+        self._crept: tuple[float, float, float] | None = None
+
+    def __repr__(self) -> str:
+        return f"Arrival({self.along}, {self.around}, corrected {self._corrections} times)"
+
+    @property
+    def slowest(self) -> Slowest:
+        """How the last of a leg is to be driven."""
+        along, around = self.along, self.around
+        return Slowest(along.least, around.least, along.gain(APPROACH_GAIN), around.gain(TURN_GAIN))
+
+    def begin_leg(self) -> None:
+        """Begin anew with another leg."""
+        self._is_settling = self._gives_up = False
+        self._corrections = 0
+        self._left_at_zero = self._best_at = self._crept = None
+        self.along.begins_again()
+        self.around.begins_again()
+
+    def stands_here(
+        self, course: Course, last: Velocity, *, stands: bool, driving: Driving, now: float
+    ) -> bool:
+        """Return whether zero is to be asked for: the end is here, or as near as it gets.
+
+        ``last`` is the velocity that was asked for last. If the rover also ``stands``, it arrived.
+        """
+        if not isinstance(course.leg, Move | Rotate | Follow):
+            return course.has_arrived(stands=stands, driving=driving)
+        if stands:
+            return self._judge(course, driving=driving)
+        self._watch(course, last, driving=driving, now=now)
+        asked = self._asked(course, last)
+        coast = self._creeping(course).coast(asked)
+        if self._is_settling or self._gives_up:
+            return True
+        if course.has_arrived(stands=False, driving=driving, coast=coast):
+            self._is_settling = True
+            self._left_at_zero = (course.remaining, asked) if asked else None
+            return True
+        return False
+
+    def _judge(self, course: Course, *, driving: Driving) -> bool:
+        """It stands: whether that is the end."""
+        if self._is_settling and self._left_at_zero is not None:
+            left, speed = self._left_at_zero
+            self._creeping(course).rolled_on(left - course.remaining, speed)
+        was_settling, self._is_settling, self._left_at_zero = self._is_settling, False, None
+        if course.has_arrived(stands=True, driving=driving):
+            return True
+        if was_settling:
+            self._corrections += 1
+            if course.remaining < 0.0:
+                self._creeping(course).overshot()
+        tried = self._gives_up or self._corrections > CORRECTIONS
+        return tried and course.is_settled(driving=driving)
+
+    def _watch(self, course: Course, last: Velocity, *, driving: Driving, now: float) -> None:
+        """Look whether it still gets nearer, and whether creeping has an effect."""
+        left, asked = abs(course.remaining), self._asked(course, last)
+        if self._best_at is None or left < self._best - NEARER:
+            self._best, self._best_at = left, now
+        is_near = course.is_settled(driving=driving)
+        self._gives_up = is_near and (self._gives_up or now - self._best_at > STALLED)
+        creeping = self._creeping(course)
+        if not 0.0 < asked <= MOST_CREEP:
+            self._crept = None
+            return
+        since, before, slowest = self._crept or (now, course.remaining, asked)
+        slowest = min(slowest, asked)
+        self._crept = since, before, slowest
+        if now - since >= ASKED:
+            if abs(before - course.remaining) < EFFECT * slowest * (now - since):
+                creeping.had_no_effect(slowest)
+            self._crept = None
+
+    def _creeping(self, course: Course) -> Creeping:
+        return self.around if isinstance(course.leg, Rotate) else self.along
+
+    def _asked(self, course: Course, last: Velocity) -> float:
+        return abs(last.yaw_rate if isinstance(course.leg, Rotate) else last.forward)

@@ -1,0 +1,29 @@
+"""The end of a move on rovers that do not move slowly, and roll on."""
+
+from functools import partial
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskState
+from tests.kit.bodies import Sticky
+from tests.scenarios.conftest import MakeWorld
+
+S = TaskState
+
+
+@pytest.mark.parametrize("least", [0.02, 0.1])
+@pytest.mark.parametrize("rolling", [0.9, 0.3, 0.2])
+def test_moves_end_as_near_as_the_rover_can_and_none_is_stuck(
+    make_world: MakeWorld, least: float, rolling: float
+) -> None:
+    world = make_world(body=partial(Sticky, least=least, rolling=rolling))
+    wanted, errors = 0.0, []
+    for number, metres in enumerate((2.0, 0.3, -1.0, 3.0, 0.5, -0.4), start=1):
+        world.client.move(metres)
+        world.until_state(number, S.COMPLETED, within=60)
+        wanted += metres
+        world.until(world.stands, within=5)
+        errors.append(abs(world.truth.north - wanted))
+        wanted = world.truth.north  # the next one begins where this one ended
+    assert max(errors) <= 0.1, errors
+    assert sorted(errors)[2] <= 0.05, errors
