@@ -9,6 +9,8 @@ not for ever: within the settling distance what it cannot do better is good enou
 that remains is in the task's status.
 """
 
+from math import radians
+
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Move, Rotate
@@ -17,6 +19,7 @@ from mav_tasks.tasks.guidance import (
     CREEP_RATE,
     CREEP_SPEED,
     TURN_GAIN,
+    Motion,
     Slowest,
     Velocity,
 )
@@ -25,6 +28,8 @@ CORRECTIONS = 2  # times that the end is corrected from a standstill
 STALLED = 4.0  # s without getting nearer, within the settling distance, after which it stands
 NEARER = 0.005  # m or rad, less than this is not getting nearer
 ASKED = 0.7  # s of a slow speed without an effect, after which the least speed is raised
+NEAR = 0.5  # m or rad from the end; farther off, slowness has other reasons
+TURNS = radians(5)  # rad/s, faster than this it turns to where it is to go
 EFFECT = 0.2  # of the way that was asked for; less is no effect
 RAISE = 1.6  # times the least speed, when it had no effect
 MOST_CREEP = 0.4  # m/s or rad/s, the most that it is raised to
@@ -104,7 +109,14 @@ class Arrival:
         self.around.begins_again()
 
     def stands_here(
-        self, course: Course, last: Velocity, *, stands: bool, driving: Driving, now: float
+        self,
+        course: Course,
+        motion: Motion,
+        last: Velocity,
+        *,
+        stands: bool,
+        driving: Driving,
+        now: float,
     ) -> bool:
         """Return whether zero is to be asked for: the end is here, or as near as it gets.
 
@@ -114,7 +126,8 @@ class Arrival:
             return course.has_arrived(stands=stands, driving=driving)
         if stands:
             return self._judge(course, driving=driving)
-        self._watch(course, last, driving=driving, now=now)
+        self._watch(course, driving=driving, now=now)
+        self._look_for_effect(course, motion, last, now=now)
         asked = self._asked(course, last)
         coast = self._creeping(course).coast(asked)
         if self._is_settling or self._gives_up:
@@ -140,15 +153,21 @@ class Arrival:
         tried = self._gives_up or self._corrections > CORRECTIONS
         return tried and course.is_settled(driving=driving)
 
-    def _watch(self, course: Course, last: Velocity, *, driving: Driving, now: float) -> None:
-        """Look whether it still gets nearer, and whether creeping has an effect."""
-        left, asked = abs(course.remaining), self._asked(course, last)
+    def _watch(self, course: Course, *, driving: Driving, now: float) -> None:
+        """Look whether it still gets nearer."""
+        left = abs(course.remaining)
         if self._best_at is None or left < self._best - NEARER:
             self._best, self._best_at = left, now
         is_near = course.is_settled(driving=driving)
         self._gives_up = is_near and (self._gives_up or now - self._best_at > STALLED)
-        creeping = self._creeping(course)
-        if not 0.0 < asked <= MOST_CREEP:
+
+    def _look_for_effect(
+        self, course: Course, motion: Motion, last: Velocity, *, now: float
+    ) -> None:
+        """Look whether a slow speed near the end has an effect, unless it still turns."""
+        asked = self._asked(course, last)
+        is_turning = isinstance(course.leg, Move) and abs(motion.yaw_rate) > TURNS
+        if not 0.0 < asked <= MOST_CREEP or is_turning or abs(course.remaining) > NEAR:
             self._crept = None
             return
         since, before, slowest = self._crept or (now, course.remaining, asked)
@@ -156,7 +175,7 @@ class Arrival:
         self._crept = since, before, slowest
         if now - since >= ASKED:
             if abs(before - course.remaining) < EFFECT * slowest * (now - since):
-                creeping.had_no_effect(slowest)
+                self._creeping(course).had_no_effect(slowest)
             self._crept = None
 
     def _creeping(self, course: Course) -> Creeping:

@@ -347,7 +347,12 @@ class Executor:
         self._note_progress(task, now)
         stands = seen.still and self._has_asked_to_stand(now)
         if self._arrival.stands_here(
-            course, self._last_velocity, stands=stands, driving=self._settings.driving, now=now
+            course,
+            motion,
+            self._last_velocity,
+            stands=stands,
+            driving=self._settings.driving,
+            now=now,
         ):
             if stands or isinstance(course.leg, Wait):
                 self._arrive(task, course, seen, motion, now)
