@@ -67,6 +67,8 @@ class Watch:
     commit: float = 0.4  # a submission not durable by then is withdrawn
     forward_answer: float = 0.4  # a forwarded command not answered by then is refused
     shutdown: float = 0.8  # to stop the vehicles in an orderly end
+    #: disarm a vehicle that was told to stand, shows HOLD, and still moves after this; 0: never
+    disarm_moving: float = 2.0
     stop_unconfirmed: float = 5.0  # cancelled, but not seen to stand by then: held
     still_speed: float = 0.03  # m/s, measured, below which a vehicle stands
     still_turn_rate: float = radians(2)  # rad/s, the same

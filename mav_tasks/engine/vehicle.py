@@ -16,9 +16,11 @@ from mav_tasks.engine.hold_before import HoldBefore
 from mav_tasks.engine.known_profile import KnownProfile
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.overspeed import Overspeed
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.start_mark import StartMark
+from mav_tasks.engine.stop_ladder import Step, StopLadder
 from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.engine.whereabouts import Whereabouts
 from mav_tasks.errors import Rejection
@@ -34,6 +36,7 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
+from mav_tasks.tasks.guidance import ZERO, Velocity
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -48,6 +51,7 @@ REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restar
 UNSEEN_STOP = 3.0
 #: a station's buttons for a held task
 BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
+SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -106,6 +110,9 @@ class Vehicle:
         #: whether its mission begins when it is armed
         self.start_mark = StartMark()
         self._own_items = 0  # of a mission on board
+        #: how it is made to stand, while it is not known that it does
+        self.ladder = StopLadder()
+        self._overspeed = Overspeed()
         #: what was measured of it beforehand
         self.known = KnownProfile(persona)
         self.known.apply(settings.profiles, system_id)
@@ -582,7 +589,9 @@ class Vehicle:
         return killed
 
     def _begin_stop(self, *, now: float) -> None:
-        self.control.begin_stop(now=now)
+        brakes = self.persona.brakes_by_setpoints and self._is_motion_fresh(now=now)
+        self.control.begin_stop(now=now, brake_first=brakes)
+        self.ladder.begin(now=now)
         self.requests.end_performing()
         self._clock.restart(now=now)
         self.requests.flush(now=now)
@@ -760,9 +769,83 @@ class Vehicle:
                 self.where.motion.doubt(until=now + UNSEEN_STOP)
                 seen = replace(seen, still=False)
         self._follow(demand, seen, now=now)
+        self._watch_motion(demand, seen, now=now)
         if self.requests.flush(now=now):
             self.tasks.setpoint_left(now=now)
         self._plan_tick(now=now)
+
+    def _watch_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
+        """See that it stands when it is told to, and drives no faster than it is told to."""
+        wanted = demand.velocity if demand.kind is DemandKind.DRIVE else ZERO
+        if self.control.in_control and not self.tasks.is_stopped:
+            self._check_overspeed(wanted, now=now)
+        if not wanted.is_zero and self.control.in_control:
+            self.ladder.end()
+        elif self._is_told_to_stand(seen):
+            self.ladder.begin(now=now)
+        if self.ladder.is_on:
+            self._climb(demand, seen, now=now)
+
+    def _is_told_to_stand(self, seen: VehicleView) -> bool:
+        """Whether it is ours, may move, and was told to stand by us."""
+        is_ours = self.control.in_control or self.control.phase in (Phase.RELEASING, Phase.STOPPING)
+        return is_ours and self.armed and not seen.still
+
+    def _climb(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
+        ladder, control = self.ladder, self.control
+        mode = self._monitor.custom_mode
+        is_elses = not control.is_engaged and mode != self.persona.hold_mode
+        if seen.still or is_elses or not seen.heard:
+            ladder.end()
+            return
+        speed = self._speed(now=now)
+        if speed is None and control.phase is not Phase.STOPPING:
+            return  # zeros go on, and HOLD follows them: of a car that HOLD lets roll nobody knows
+        due = ladder.climb(
+            speed=speed,
+            is_held=mode == self.persona.hold_mode,
+            disarm_after=self._settings.watch.disarm_moving or inf,
+            now=now,
+        )
+        if due is Step.HOLD:
+            self._ask_for_hold(demand, now=now)
+        elif due is Step.DISARM and self.armed:
+            self._note(f"moves in HOLD, {speed or 0.0:.1f} m/s: disarmed", now=now)
+            control.disarm_now(now=now)
+
+    def _ask_for_hold(self, demand: Demand, *, now: float) -> None:
+        """Set-points do not stop it."""
+        if demand.kind in (DemandKind.TAKE, DemandKind.DRIVE):
+            self._note("moves though it is told to stand: HOLD", now=now)
+            self.tasks.hold(TaskReason.STOP_UNCONFIRMED, now=now)
+            self._begin_stop(now=now)
+        elif self.control.phase is Phase.STOPPING:
+            self.control.hold_now(now=now)
+        elif self.control.in_control:
+            self.control.begin_release(now=now)
+
+    def _check_overspeed(self, wanted: Velocity, *, now: float) -> None:
+        """Somebody else adds to its speed, or it runs away: it is stopped, and waits for help."""
+        speed, motion = self._speed(now=now), self.where.motion.latest()
+        reported = 0.0 if motion is None else motion.speed
+        fast = self._overspeed.look(wanted.forward, min(speed or 0.0, reported), now=now)
+        begun = self.tasks.begun
+        if not fast or begun is None or begun.state is not TaskState.EXECUTING:
+            return
+        words = f"drives {speed:.1f} m/s, asked for {fast:.1f}: stopped. Is a stick off its centre?"
+        self._note(words, now=now)
+        self.tasks.hold(TaskReason.OVERSPEED, now=now)
+        self._begin_stop(now=now)
+
+    def _speed(self, *, now: float) -> float | None:
+        """Return m/s by displacement, None while nothing fresh is known."""
+        if not self._is_motion_fresh(now=now):
+            return None
+        return self.where.motion.standstill.speed(SPEED_WINDOW, now=now)
+
+    def _is_motion_fresh(self, *, now: float) -> bool:
+        motion = self.where.motion.latest()
+        return motion is not None and now - motion.at <= self._settings.watch.motion_fresh
 
     def check_late(self, *, now: float) -> None:
         """What drove on without us for too long stops, and somebody looks at it first.
@@ -781,7 +864,7 @@ class Vehicle:
             self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
-        if self.control.is_engaged or self.tasks.begun is not None:
+        if self.control.is_engaged or self.tasks.begun is not None or self.ladder.is_on:
             self._clock.plan(now=now)
         else:
             self._clock.stop()
@@ -831,9 +914,11 @@ class Vehicle:
                 self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 still = seen.still and not self.hold_before.is_open(now=now)
-                self.control.release(still=still, disarm=False, now=now)
+                slows = self.ladder.is_slowing(now=now)
+                self.control.release(still=still, disarm=False, now=now, is_slowing=slows)
             case DemandKind.HAND_BACK:
-                self.control.release(still=seen.still, disarm=True, now=now)
+                slows = self.ladder.is_slowing(now=now)
+                self.control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)
             case DemandKind.HALT if self.control.phase is not Phase.STOPPING:
                 self._begin_stop(now=now)
             case DemandKind.STOP | DemandKind.HALT:

@@ -29,6 +29,7 @@ STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirme
 RELEASE_REPEAT = 1.0  # s, the same of a hand-back
 ASK_REPEAT = 0.25  # s, between requests that the vehicle refuses
 STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
+ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 3.7 s
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
 #: s after a request was last sent in which what it asks for may still come true: a copy of it may
 #: be late on the net. Longer, and a person who does the same would be taken for it.
@@ -104,6 +105,7 @@ class OffboardControl:
         self._lead_until = 0.0  # zeros only, before our mode is asked for
         self._led_at = 0.0  # the last of them
         self._was_heard_leading_in = False
+        self._is_braking = False  # while STOPPING: zeros alone, as long as they slow it down
         self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
         self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
         self.phase = Phase.IDLE
@@ -334,11 +336,11 @@ class OffboardControl:
             self._release_until = None
             self._send_setpoint(wanted if self.in_control and wanted.is_finite else STANDING)
 
-    def release(self, *, still: bool, disarm: bool, now: float) -> None:
+    def release(self, *, still: bool, disarm: bool, now: float, is_slowing: bool = False) -> None:
         """Zeros until the vehicle stands, then HOLD until seen, then nothing more.
 
-        A vehicle that cannot be seen to stand gets HOLD after a while all the same. With
-        ``disarm`` a vehicle that we armed is disarmed in the end.
+        A vehicle that cannot be seen to stand gets HOLD after a while all the same, later while it
+        ``is_slowing``. With ``disarm`` a vehicle that we armed is disarmed in the end.
         """
         self._note_requests(now)
         self.refused = None
@@ -350,7 +352,8 @@ class OffboardControl:
                 self._withdraw(MavCmd.COMPONENT_ARM_DISARM)
                 if self._release_until is None:
                     self._release_until = now + STAND_UNSEEN
-                if still or now >= self._release_until:
+                limit = self._release_until + (ROLLS_OUT if is_slowing else 0.0)
+                if still or now >= limit:
                     self.begin_release(now=now)
             case Phase.STOPPING:  # continued before it was confirmed
                 self.begin_release(now=now)
@@ -383,16 +386,38 @@ class OffboardControl:
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
-    def begin_stop(self, *, now: float) -> None:
-        """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them."""
+    def begin_stop(self, *, now: float, brake_first: bool = False) -> None:
+        """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
+
+        With ``brake_first`` zeros alone, until the vehicle stands or ``hold_now`` is called: for
+        one that HOLD lets roll, and that is in our mode.
+        """
+        brakes = brake_first and self.in_control
         for command in (MavCmd.DO_SET_MODE, MavCmd.COMPONENT_ARM_DISARM):
             self._sender.cancel(self._target.component_id, command, now=now)
         self.phase = Phase.STOPPING
         self.refused = None
         self._disarm_by = now + UNSTOPPED if self._persona.stop_disarms else inf
+        self._is_braking = brakes
+        if brakes:
+            self._send_setpoint(STANDING)
+            self._next_hold_at = now + STAND_UNSEEN + ROLLS_OUT
+            return
         self._unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=STOP_REPEAT)
+
+    def hold_now(self, *, now: float) -> None:
+        """While STOPPING: ask for HOLD, braking has no effect or was enough."""
+        if self.phase is Phase.STOPPING and self._is_braking:
+            self._is_braking = False
+            self._unsettle(now, awaits_hold=True)
+            self._send_setpoint(STANDING)
+            self._request_hold(now=now, again_after=STOP_REPEAT)
+
+    def disarm_now(self, *, now: float) -> None:
+        """It moves in spite of all: ask for disarming, whoever armed it, in whatever phase."""
+        self._request_disarming(now=now)
 
     def stop(self, *, still: bool, heard: bool, now: float) -> None:
         """Repeat zero and HOLD until HOLD is seen and the vehicle measured to stand.
@@ -406,6 +431,9 @@ class OffboardControl:
         if heard and still and (self._in_hold or self._is_disarmed_by_stop):
             self._withdraw_requests()
             self.phase = Phase.IDLE
+            return
+        if self._is_braking and (still or not heard or now >= self._next_hold_at):
+            self.hold_now(now=now)
             return
         if now >= self._next_hold_at:
             self._request_hold(now=now, again_after=STOP_REPEAT)

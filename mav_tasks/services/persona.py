@@ -57,6 +57,15 @@ class Persona:
     def __repr__(self) -> str:
         return f"Persona({self.name})"
 
+    @property
+    def brakes_by_setpoints(self) -> bool:
+        """Whether it stands sooner by set-points than by its HOLD.
+
+        One that steers as a car rolls on in HOLD (ArduPilot), or drives a loop back to where it
+        began (PX4): STOP asks for HOLD when it stands, or when set-points have no effect.
+        """
+        return self.turning is Turning.STEERED
+
     def mode_name(self, mode: int) -> str:
         """Give a custom_mode in words, as ground stations show it."""
         return self.mode_names.get(mode, f"mode {mode}")

@@ -374,6 +374,11 @@ _WATCH = (
     ),
     _key("watch.shutdown", _seconds(0.1, 30), "to stop the rovers in an orderly end"),
     _key(
+        "watch.disarm_moving",
+        Number(0, 60, "s"),
+        "disarm a rover that still moves so long after HOLD was seen; 0: never",
+    ),
+    _key(
         "watch.stop_unconfirmed",
         _seconds(1, 60),
         "a cancelled task whose rover is not seen to stand by then is held",

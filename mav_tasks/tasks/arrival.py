@@ -23,6 +23,7 @@ from mav_tasks.tasks.guidance import (
     Slowest,
     Velocity,
 )
+from mav_tasks.tasks.path import Follow
 
 CORRECTIONS = 2  # times that the end is corrected from a standstill
 STALLED = 4.0  # s without getting nearer, within the settling distance, after which it stands

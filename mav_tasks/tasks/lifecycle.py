@@ -72,6 +72,7 @@ class TaskReason(IntEnum):
     OFF_LINE = 53
     FRAME_RESET = 54
     STOP_UNCONFIRMED = 55
+    OVERSPEED = 56
     # ended
     STUCK = 70
     ARM_REFUSED = 71

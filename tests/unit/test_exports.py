@@ -151,6 +151,7 @@ def test_every_setting_is_known_by_name() -> None:
             "commit",
             "forward_answer",
             "shutdown",
+            "disarm_moving",
             "stop_unconfirmed",
             "still_speed",
             "still_turn_rate",

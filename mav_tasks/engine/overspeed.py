@@ -1,0 +1,40 @@
+"""Whether a vehicle drives faster than it was told to: somebody adds to it, or it runs away.
+
+An ArduPilot in GUIDED adds the throttle stick to the speed that it is asked for: 6 m/s were
+measured where 1 was asked for. What is compared is the least of two speeds, by displacement and as
+reported: a position that is corrected, or a velocity that is off, is no motion.
+"""
+
+from collections import deque
+
+LATELY = 1.0  # s, in which the fastest speed asked for counts: a rover slows down later than asked
+OVERSHOOT = 1.5  # times what was asked for; 1.37 was measured on a healthy rover
+NOISE = 0.3  # m/s more, for what an estimator may be off
+LASTS = 0.2  # s that it must last; with the window of the speed it is seen within 0.5 s
+
+
+class Overspeed:
+    """The speeds that one vehicle was asked for lately."""
+
+    def __init__(self) -> None:
+        self._asked: deque[tuple[float, float]] = deque()
+        self._since: float | None = None
+
+    def __repr__(self) -> str:
+        return f"Overspeed(since={self._since})"
+
+    def look(self, asked: float, speed: float, *, now: float) -> float | None:
+        """Return the m/s that were asked for, if it has been driving too fast for that.
+
+        ``asked`` is what is asked for now and ``speed`` what was measured, m/s.
+        """
+        self._asked.append((now, abs(asked)))
+        while self._asked[0][0] < now - LATELY:
+            self._asked.popleft()
+        most = max(each for _, each in self._asked)
+        if speed <= OVERSHOOT * most + NOISE:
+            self._since = None
+            return None
+        if self._since is None:
+            self._since = now
+        return most if now - self._since >= LASTS else None
