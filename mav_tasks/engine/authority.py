@@ -33,7 +33,8 @@ class Authority:
         self._asked_at = -inf
         self._mode_is_ours = False
         self._granted: set[Hashable] = set()
-        self._other_at = -inf
+        self._other_at = -inf  # sticks, or a second controller
+        self._by_client: tuple[Hashable, float] = (None, -inf)  # the last that drove through us
         self._client_armed_at = -inf
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
         #: until somebody disarms or changes the mode
@@ -133,8 +134,12 @@ class Authority:
         return who == client and now - at <= STREAM_GAP
 
     def revoke(self) -> None:
-        """A task has ended, or STOP: who wants to drive must ask again."""
+        """A task has ended, or a halt: a client that wants to drive must ask again.
+
+        Nothing of any client passes from here on, so that no client drives any more.
+        """
         self._granted.clear()
+        self._by_client = (None, -inf)
 
     def forget(self, client: Hashable) -> bool:
         """A client is gone; gives whether it had control. Who comes to its place must ask."""
@@ -142,10 +147,19 @@ class Authority:
         self._granted.discard(client)
         return had_control
 
+    def note_client(self, client: Hashable, *, now: float) -> None:
+        """A client's motion message goes to the vehicle: the client is driving just now."""
+        self._by_client = client, now
+
+    def driver(self, *, within: float, now: float) -> Hashable:
+        """Return the client that was driving in the last so many seconds, None if none was."""
+        client, at = self._by_client
+        return client if now - at < within else None
+
     def note_other(self, *, now: float) -> None:
-        """Somebody else is driving just now."""
+        """Somebody who is no client of ours is driving just now."""
         self._other_at = now
 
     def since_other(self, *, now: float) -> float:
-        """Give the seconds since somebody else was driving."""
-        return now - self._other_at
+        """Return the seconds since somebody else was driving, clients included."""
+        return now - max(self._other_at, self._by_client[1])

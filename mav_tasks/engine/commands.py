@@ -366,7 +366,7 @@ def _check_relay(asked: Asked, *, now: float) -> None:
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
     if number in MOVING:
-        vehicle.is_moved_by_client(now=now)
+        vehicle.is_moved_by(asked.client.key, now=now)
 
 
 def _relay(asked: Asked, *, now: float) -> None:

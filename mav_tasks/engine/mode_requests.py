@@ -126,6 +126,8 @@ class ModeRequests:
             self._mark(vehicle, client, submitter, now=now)
         else:
             self._plans.check_start(client.rights, vehicle, submitter)
+            self._submissions.check_new(vehicle)
+            vehicle.end_driving_of(client.key, now=now)
             self._start_unasked(vehicle, submitter, client.rights, now=now)
 
     # missions
@@ -135,6 +137,7 @@ class ModeRequests:
         vehicle, submitter = asked.vehicle, asked.submitter
         self._plans.check_start(asked.rights, vehicle, submitter)
         self._submissions.check_new(vehicle)
+        vehicle.end_driving_of(asked.client.key, now=now)
         started = self._plans.start(vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
             task = self._submissions.submit_draft(asked, started, now=now)

@@ -82,10 +82,12 @@ def withheld(
         vehicle.is_not_moved_by(client, now=now)
 
 
-def passed(vehicle: Vehicle, packet: Packet, message: m.Message | None, *, now: float) -> None:
+def passed(
+    vehicle: Vehicle, client: Hashable, packet: Packet, message: m.Message | None, *, now: float
+) -> None:
     """Note what a packet that goes to the vehicle means for its tasks."""
     if _moves(packet, message):
-        vehicle.is_moved_by_client(now=now)
+        vehicle.is_moved_by(client, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
         vehicle.sticks_moved(now=now)
 

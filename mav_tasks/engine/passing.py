@@ -67,7 +67,7 @@ class Passing:
             is_old = self._vehicles.is_old_news(now=now)
             if all(may_pass(v, client.key, packet, message, is_old=is_old) for v in vehicles):
                 for vehicle in vehicles:
-                    passed(vehicle, packet, message, now=now)
+                    passed(vehicle, client.key, packet, message, now=now)
                 vehicles[0].requests.forward(packet)
             else:
                 for vehicle in vehicles:

@@ -93,6 +93,8 @@ class Submissions:
             return
         self.check_new(vehicle)
         draft = _allowed(asked.client, vehicle, draft)
+        if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven
+            vehicle.end_driving_of(asked.client.key, now=now)
         if self._settings.guided == "now" and asked.is_go_to:
             asked.rights.require(OPERATOR, "interrupt what a rover does")
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
@@ -105,6 +107,7 @@ class Submissions:
 
     def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
         """Take in a task that runs at once; Rejection says why not."""
+        asked.vehicle.end_driving_of(asked.client.key, now=now)
         known = self._recollection.known(
             draft, confirmation=0, origin=asked.vehicle.where.origin, now=now
         )
@@ -121,6 +124,7 @@ class Submissions:
         self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, actor: str, now: float
     ) -> None:
         """The same for what no acknowledgement is expected of."""
+        vehicle.end_driving_of(client.key, now=now)
         known = self._recollection.known(
             draft, confirmation=0, origin=vehicle.where.origin, now=now
         )

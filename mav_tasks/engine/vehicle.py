@@ -443,8 +443,8 @@ class Vehicle:
             self._zero_what_is_kept()
             self._take_over("disarmed by a client", now=now)
         elif disarms:
-            self._authority.revoke()  # a client's stream would leave a velocity behind
             is_driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
+            self._authority.revoke()  # a client's stream would leave a velocity behind
             if is_driven and not self.persona.has_loss_failsafe:
                 self.requests.send_zero()
         self.requests.relay(
@@ -542,9 +542,32 @@ class Vehicle:
         if had_control and is_driven and is_free:
             self.requests.send_zero()
 
-    def is_moved_by_client(self, *, now: float) -> None:
+    def is_moved_by(self, client: Hashable, *, now: float) -> None:
         """A client's motion message goes to it: tasks wait."""
-        self._authority.note_other(now=now)
+        self._authority.note_client(client, now=now)
+
+    def end_driving_of(self, client: Hashable, *, now: float) -> None:
+        """A client asks for a return, a place or a mission: its own setpoints end with that.
+
+        What it drove stands, so that neither its last velocity nor a failsafe for lost setpoints
+        comes before what it asks for now.
+        """
+        if client is None or self._driver(now=now) != client:
+            return
+        self._authority.revoke()
+        if self.control.is_engaged:
+            return
+        if self.persona.has_loss_failsafe:
+            self.control.begin_release(now=now)
+            self.requests.flush(now=now)
+            self._clock.restart(now=now)
+        else:
+            self.requests.send_zero()
+            self.requests.send_zero()  # one may be lost
+
+    def _driver(self, *, now: float) -> Hashable:
+        """The client whose setpoints the vehicle may still follow, or None."""
+        return self._authority.driver(within=self._settings.watch.other_controller, now=now)
 
     def sticks_moved(self, *, now: float) -> None:
         """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""
@@ -636,6 +659,7 @@ class Vehicle:
         self.forget_start()
         self.tasks.clear(begun_too=begun_too, actor=actor, now=now)
         if begun_too:
+            self.end_driving_of(self._driver(now=now), now=now)
             self._authority.revoke()
         if begun_too and self.control.is_engaged:
             self.step(now=now)
