@@ -8,6 +8,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from mav_tasks.engine.asked import Asked
+from mav_tasks.engine.broadcasts import EVERYBODY
 from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
@@ -136,9 +137,10 @@ class Commands:
         if command.command == MavCmd.TASK_STOP:
             self._stop(client, packet, command, now=now)
             return
-        vehicle = self._vehicles.get(command.target.system_id)
-        if vehicle is None:
+        addressed = self._vehicles.addressed_by(command.target.system_id)
+        if not addressed:
             return  # clients send everything to everyone: it is for somebody else
+        vehicle = addressed[0]
         receiver = client.receiver(packet.source)
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None:
@@ -156,6 +158,9 @@ class Commands:
                 asked.answer(result_of(refusal.reason), refusal.reason)
 
     def _dispatch(self, asked: Asked, *, now: float) -> None:
+        if asked.command.target.system_id == EVERYBODY:  # what is not ours came once for each rover
+            number = asked.command.command
+            raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
         component = asked.command.target.component_id
         at_server = component == asked.vehicle.server_component
         # an autopilot answers for components that are not there: also about what it sends

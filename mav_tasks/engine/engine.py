@@ -8,6 +8,7 @@ monotonic seconds, never going back.
 from math import inf
 from typing import assert_never
 
+from mav_tasks.engine.broadcasts import Broadcasts
 from mav_tasks.engine.commands import Commands
 from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.flood_gate import FloodGates
@@ -133,6 +134,7 @@ class Engine:
         )
         self._passing = Passing(self._vehicles, self._vehicles.our_address)
         self._requests = RequestLimit(self._vehicles)
+        self._broadcasts = Broadcasts(self._vehicles, packer)
         self._operator = OperatorWatch()
         self._setup = SetupSigning(self.signatures, self._vehicles, settings)
         self._stop_by: float | None = None
@@ -284,6 +286,11 @@ class Engine:
         if not self._requests.may_pass(client, packet, message, now=now):
             return
         self._publisher.welcome(client, now=now)
+        for each in self._broadcasts.addressed(received):
+            self._see_to(each, now=now)
+
+    def _see_to(self, received: Received, *, now: float) -> None:
+        client, packet, message = received.client, received.packet, received.message
         if isinstance(message, m.CommandLong | m.CommandInt):
             self._commands.receive(client, packet, command_of(message), now=now)
         elif isinstance(message, m.CommandCancel):

@@ -356,7 +356,6 @@ def test_commands_for_systems_that_are_not_here_are_nobodys(world: World) -> Non
     world.client.move(1, target=(9, 191))
     world.client.stop(target=(9, 1))
     world.client.arm(target=(9, 1))
-    world.client.arm(target=(0, 0))
     world.run(1)
     assert (world.client.acks, world.tasks()) == ([], ())
     assert not world.rover.autopilot.armed

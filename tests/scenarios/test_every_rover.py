@@ -1,0 +1,146 @@
+"""target_system 0 is every rover, for whatever a stock autopilot answers: DroneKit sends it."""
+
+from collections.abc import Iterator
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.client import (
+    ACCEPTED,
+    ARM,
+    DENIED,
+    HOLD,
+    MOVE,
+    PAUSE_CONTINUE,
+    REPEATS,
+    REQUEST,
+    SET_MODE,
+    FakeClient,
+    Received,
+    command_long,
+)
+from tests.kit.fleet import Fleet
+from tests.kit.mission import COUNT, Count, Download, Item, Upload
+from tests.kit.px4 import HOLD as PX4_HOLD
+from tests.kit.px4 import ask_mode
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
+
+ALL = (0, 0)
+AUTOPILOT_VERSION, WAYPOINT, DELAY = 148, 16, 93
+
+
+@pytest.fixture
+def fleet() -> Iterator[Fleet]:
+    """Two rovers on links of their own."""
+    fleet = Fleet({"one": {"a": (1,)}, "two": {"b": (2,)}})
+    fleet.ready()
+    yield fleet
+    fleet.check()
+
+
+def answers(client: FakeClient, command: int) -> list[tuple[tuple[int, int], int]]:
+    """Give (source, result) of every ack of a command."""
+    acks = [(p.source, client.decoded(p)) for p in client.of_id(77)]
+    return [(source, ack.result) for source, ack in acks if ack.command == command]
+
+
+def test_a_disarming_reaches_every_rover_and_each_autopilot_answers(fleet: Fleet) -> None:
+    for number in (1, 2):
+        fleet.client.arm(target=(number, 1))
+    fleet.run(1.5)
+    assert all(rover.autopilot.armed for rover in fleet.rovers)
+    fleet.other.arm(False, target=ALL)
+    fleet.run(0.3)
+    assert not any(rover.autopilot.armed for rover in fleet.rovers)
+    assert sorted(answers(fleet.other, ARM)) == [((1, 1), ACCEPTED), ((2, 1), ACCEPTED)]
+
+
+@pytest.mark.parametrize("component", [0, 1])
+def test_hold_and_a_pause_reach_every_rover(fleet: Fleet, component: int) -> None:
+    for number in (1, 2):
+        fleet.client.move(20, speed=1.0, target=(number, 191))
+    fleet.run(3)
+    fleet.other.mode(HOLD, target=(0, component))
+    fleet.run(0.3)
+    assert {fleet.queue_paused(n) for n in (1, 2)} == {R.OPERATOR}
+    fleet.run(3.5)
+    assert {rover.autopilot.mode for rover in fleet.rovers} == {Mode.HOLD}
+    assert sorted(answers(fleet.other, SET_MODE)) == [((1, 1), ACCEPTED), ((2, 1), ACCEPTED)]
+    fleet.other.proceed(target=(0, component))
+    fleet.run(3)
+    fleet.other.pause(target=(0, component))
+    fleet.run(0.3)
+    assert {fleet.queue_paused(n) for n in (1, 2)} == {R.OPERATOR}
+    assert len(answers(fleet.other, PAUSE_CONTINUE)) == 4
+
+
+def test_a_command_sent_again_is_still_one_for_each_rover(fleet: Fleet) -> None:
+    raw = fleet.other.send(command_long(DELAY, 1.0, target=ALL))
+    fleet.run(0.2)
+    fleet.other.send_raw(raw)
+    fleet.run(0.3)
+    assert len(fleet.tasks()) == 2
+    assert {task.vehicle for task in fleet.tasks()} == {1, 2}
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)
+def test_modes_and_capabilities_are_answered(make_world: MakeWorld, persona: Persona) -> None:
+    world = make_world(persona=persona)
+    if persona is PX4:
+        hold = ask_mode(world.client, PX4_HOLD, target=ALL)
+    else:
+        hold = world.client.mode(HOLD, target=ALL)
+    asked = world.client.command(REQUEST, AUTOPILOT_VERSION, target=ALL)
+    world.run(0.5)
+    assert (hold.result, asked.result) == (ACCEPTED, ACCEPTED)
+    assert world.client.heard("AUTOPILOT_VERSION")
+    assert {ack for ack, _ in answers(world.client, REQUEST)} == {(1, 1)}
+
+
+def test_the_message_set_mode_reaches_the_rover(world: World) -> None:
+    world.client.move(5)
+    world.until_state(1, S.EXECUTING)
+    world.client.send(common.MAVLink_set_mode_message(0, 1, HOLD))
+    world.run(0.3)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+
+
+def test_a_plan_is_taken_in_given_back_and_cleared(world: World) -> None:
+    plan = [Item(WAYPOINT, **at(north, 0.0)) for north in (0.0, 1.0, 2.0)]
+    upload = ToAll(world.client, plan)
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0
+    world.client.send(common.MAVLink_mission_request_list_message(*ALL, 0))
+    world.run(0.2)
+    assert Count.of(list(world.client.of_id(COUNT))[-1].payload).items == 3
+    world.client.send(common.MAVLink_mission_clear_all_message(*ALL, 0))
+    world.run(0.2)
+    download = Download(world.client)
+    world.until(lambda: download.is_done, within=3)
+    assert download.items == []
+
+
+class ToAll(Upload):
+    """An upload to system 0, which the rover answers as itself."""
+
+    def turn(self, *, now: float) -> None:
+        self.target = ALL
+        super().turn(now=now)
+
+    def take(self, packet: Received, *, now: float) -> None:
+        self.target = packet.source
+        super().take(packet, now=now)
+        self.target = ALL
+
+
+def test_a_task_command_must_name_its_rover_and_is_told_so_once(fleet: Fleet) -> None:
+    sent = fleet.client.move(1, target=ALL, repeats=REPEATS)
+    fleet.run(1)
+    assert sent.answer == (DENIED, R.BAD_PARAMETER)
+    assert [source for source, _ in answers(fleet.client, MOVE)] == [(1, 191)]
+    assert fleet.tasks() == ()
+    assert any("name its rover" in text for text in fleet.client.texts())
