@@ -438,6 +438,7 @@ class Vehicle:
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
         if command == MavCmd.COMPONENT_ARM_DISARM and not disarms:
             self._authority.client_arms(now=now)
+            self.control.keep_armed()
         if disarms and self.control.is_engaged and self.control.phase is not Phase.STOPPING:
             self._authority.withdraw_arming()
             self._zero_what_is_kept()

@@ -245,6 +245,17 @@ class OffboardControl:
         until = now + self._watch.ask_vehicle
         self._request(self._orders.hold(), until=until, now=now, urgent=True)
 
+    def keep_armed(self) -> None:
+        """A client arms the vehicle, too: handed back, it stays armed as that client asked."""
+        self.we_armed = False
+        if self.phase is Phase.DISARMING:
+            self._withdraw(MavCmd.COMPONENT_ARM_DISARM)
+            self.phase = Phase.IDLE
+
+    def disarm_at_end(self) -> None:
+        """Whoever armed the vehicle has done with it: it is disarmed when we hand it back."""
+        self.we_armed = self._armed
+
     def hand_over(self) -> None:
         """Somebody else goes on from the hand-back, and HOLD asked for again would undo it.
 
