@@ -37,6 +37,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.guidance import ZERO, Velocity
+from mav_tasks.tasks.goal import ends_at_home
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -104,6 +105,7 @@ class Vehicle:
         self._restarted_at = -inf
         self._arming_texts = ArmingTexts()
         self._is_closing = False
+        self._is_back_home = False  # by its last task; it is disarmed also where others wait
         self.stopped_at = -inf  # the last STOP
         #: a HOLD that a "go to" may undo
         self.hold_before = HoldBefore()
@@ -788,8 +790,10 @@ class Vehicle:
         seen = self.view(now=now)
         begun_before = self.tasks.begun
         demand = STOP if self._is_closing else self.tasks.step(seen, now=now)
+        self._is_back_home = self._is_back_home and self.tasks.begun is None
         if begun_before is not None and self.tasks.begun is None:
             self._authority.revoke()
+            self._note_end(self._book[begun_before.id])
             if self._book[begun_before.id].reason is TaskReason.STUCK:
                 self.where.motion.doubt(until=now + UNSEEN_STOP)
                 seen = replace(seen, still=False)
@@ -872,6 +876,12 @@ class Vehicle:
         motion = self.where.motion.latest()
         return motion is not None and now - motion.at <= self._settings.watch.motion_fresh
 
+    def _note_end(self, ended: Task) -> None:
+        """A return has ended: as on an autopilot that has landed, whoever armed it is done."""
+        self._is_back_home = ended.state is TaskState.COMPLETED and ends_at_home(ended.goal)
+        if self._is_back_home:
+            self.control.disarm_at_end()
+
     def check_late(self, *, now: float) -> None:
         """What drove on without us for too long stops, and somebody looks at it first.
 
@@ -939,8 +949,8 @@ class Vehicle:
                 self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 still = seen.still and not self.hold_before.is_open(now=now)
-                slows = self.ladder.is_slowing(now=now)
-                self.control.release(still=still, disarm=False, now=now, is_slowing=slows)
+                slows, disarm = self.ladder.is_slowing(now=now), self._is_back_home
+                self.control.release(still=still, disarm=disarm, now=now, is_slowing=slows)
             case DemandKind.HAND_BACK:
                 slows = self.ladder.is_slowing(now=now)
                 self.control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)

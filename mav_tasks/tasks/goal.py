@@ -204,6 +204,13 @@ def describe(goal: Goal) -> str:
             return f"wait {duration:g} s"
 
 
+def ends_at_home(goal: Goal) -> bool:
+    """Return whether the last place that a goal drives to is the vehicle's home."""
+    steps = goal.steps if isinstance(goal, Plan) else (goal,)
+    driven = [step for step in steps if isinstance(step, SingleGoal)]
+    return isinstance(driven[-1], GoTo) and driven[-1].place is None if driven else False
+
+
 def _describe_plan(plan: Plan) -> str:
     has_home = plan.steps[:1] == (Nothing(),)  # somebody's mission, however short
     if len(plan.steps) <= FEW_STEPS and not has_home:

@@ -2,13 +2,17 @@
 
 import pytest
 
+from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Persona
-from tests.kit.client import ACCEPTED
-from tests.kit.px4 import PROMPT_PX4
+from tests.kit.client import ACCEPTED, HOLD, RTL
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import PROMPT_PX4, RETURN, ask_mode
+from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 BOTH = pytest.mark.parametrize("persona", [ARDUPILOT, PROMPT_PX4], ids=lambda each: each.name)
+START, WAYPOINT, RETURN_ITEM = 300, 16, 20
 HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
@@ -47,5 +51,71 @@ def test_a_rover_that_nobody_else_armed_is_disarmed_when_its_queue_is_empty(
     world = make_world(persona=persona)
     world.client.move(0.5)
     world.until_state(1, S.COMPLETED, within=20)
+    world.run(HANDED_BACK)
+    assert not world.rover.autopilot.armed
+
+
+def armed_by_client(make_world: MakeWorld, persona: Persona) -> World:
+    world = make_world(persona=persona)
+    if persona is ARDUPILOT:
+        world.client.mode(HOLD)  # armed in MANUAL it would be a person's
+    world.client.arm(True)
+    world.run(1.2)
+    assert world.rover.autopilot.armed
+    return world
+
+
+def returns(world: World, persona: Persona) -> None:
+    """Ask for the mode RTL, and wait until the rover is at home."""
+    count = len(world.tasks())
+    sent = world.client.mode(RTL) if persona is ARDUPILOT else ask_mode(world.client, RETURN)
+    world.run(0.3)
+    assert sent.task_id == count + 1
+    world.until_state(sent.task_id, S.COMPLETED, within=30)
+
+
+@BOTH
+def test_a_return_ends_disarmed_whoever_armed_the_rover(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """MAVSDK's fly_mission waits for that after return_to_launch."""
+    world = armed_by_client(make_world, persona)
+    world.client.move(1.0)
+    world.until_state(1, S.COMPLETED, within=20)
+    world.run(HANDED_BACK)
+    assert world.rover.autopilot.armed
+    returns(world, persona)
+    world.run(HANDED_BACK)
+    assert not world.rover.autopilot.armed
+
+
+@BOTH
+def test_a_return_from_a_task_that_waits_to_go_on_ends_disarmed_too(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = armed_by_client(make_world, persona)
+    world.client.move(3.0)
+    world.until_state(1, S.EXECUTING, within=10)
+    world.run(2)
+    returns(world, persona)
+    world.run(HANDED_BACK)
+    assert not world.rover.autopilot.armed
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED, within=30)
+    world.run(HANDED_BACK)
+    assert not world.rover.autopilot.armed, "the server armed it for the rest"
+
+
+@BOTH
+def test_a_mission_whose_last_item_is_the_return_ends_disarmed(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = armed_by_client(make_world, persona)
+    plan = [Item(WAYPOINT, **at(0.0, 0.0)), Item(WAYPOINT, **at(1.0, 0.0)), Item(RETURN_ITEM)]
+    upload = Upload(world.client, plan)
+    world.until(lambda: upload.result is not None, within=5)
+    world.client.command(START, target=(1, 1))
+    world.until_state(1, S.COMPLETED, within=40)
     world.run(HANDED_BACK)
     assert not world.rover.autopilot.armed
