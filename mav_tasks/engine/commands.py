@@ -182,6 +182,10 @@ class Commands:
                 ):  # in examples for every kind of vehicle: nothing to do
                     asked.answer(MavResult.ACCEPTED)
                     return
+                case MavCmd.NAV_LAND as number if at_server or self._claims(number):
+                    asked.vehicle.stand_down(asked.client.key, now=now)
+                    asked.answer(MavResult.ACCEPTED)
+                    return
                 case MavCmd.MISSION_START as number if at_server or self._claims(number):
                     first = whole(asked.command, 1, "first item", high=0xFFFF)
                     _check_last_item(asked)

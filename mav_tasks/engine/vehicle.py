@@ -568,6 +568,21 @@ class Vehicle:
             self.requests.send_zero()
             self.requests.send_zero()  # one may be lost
 
+    def stand_down(self, client: Hashable, *, now: float) -> None:
+        """A client has done with it ("land"): it is disarmed as soon as nothing is left to drive.
+
+        Raise Rejection under STOP, and while a person drives.
+        """
+        if self.tasks.is_stopped:
+            raise Rejection(TaskReason.STOPPED, "STOP is latched: continue first")
+        self.check_not_by_hand(now=now)
+        self.end_driving_of(client, now=now)
+        self.control.disarm_at_end()
+        if self.armed and self.tasks.is_idle and not self.control.is_engaged:
+            self.control.begin_release(now=now)
+            self.requests.flush(now=now)
+            self._clock.restart(now=now)
+
     def _driver(self, *, now: float) -> Hashable:
         """The client whose setpoints the vehicle may still follow, or None."""
         return self._authority.driver(within=self._settings.watch.other_controller, now=now)

@@ -4,15 +4,24 @@ import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, Persona
-from tests.kit.client import ACCEPTED, HOLD, RTL
+from rover_sim.personas import ARDUPILOT, Mode, Persona
+from tests.kit.client import (
+    ACCEPTED,
+    GUIDED,
+    HOLD,
+    RTL,
+    TEMPORARILY_REJECTED,
+    Sent,
+    setpoint,
+    sticks,
+)
 from tests.kit.mission import Item, Upload
-from tests.kit.px4 import PROMPT_PX4, RETURN, ask_mode
+from tests.kit.px4 import OFFBOARD, PROMPT_PX4, RETURN, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 BOTH = pytest.mark.parametrize("persona", [ARDUPILOT, PROMPT_PX4], ids=lambda each: each.name)
-START, WAYPOINT, RETURN_ITEM = 300, 16, 20
+START, WAYPOINT, RETURN_ITEM, LAND, TAKEOFF = 300, 16, 20, 21, 22
 HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
@@ -119,3 +128,60 @@ def test_a_mission_whose_last_item_is_the_return_ends_disarmed(
     world.until_state(1, S.COMPLETED, within=40)
     world.run(HANDED_BACK)
     assert not world.rover.autopilot.armed
+
+
+def land(world: World) -> Sent:
+    sent = world.client.command(LAND, target=(1, 1))
+    world.run(0.2)
+    return sent
+
+
+@BOTH
+def test_takeoff_and_land_are_both_accepted_and_land_disarms(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """The first and the last line of many a script."""
+    world = armed_by_client(make_world, persona)
+    takeoff = world.client.command(TAKEOFF, target=(1, 1))
+    world.run(0.2)
+    assert (takeoff.result, land(world).result) == (ACCEPTED, ACCEPTED)
+    world.run(HANDED_BACK)
+    assert not world.rover.autopilot.armed
+    assert world.tasks() == ()
+
+
+@BOTH
+def test_land_waits_for_what_is_being_driven(make_world: MakeWorld, persona: Persona) -> None:
+    world = armed_by_client(make_world, persona)
+    world.client.move(2.0)
+    world.until_state(1, S.EXECUTING, within=10)
+    assert land(world).result == ACCEPTED
+    world.until_state(1, S.COMPLETED, within=20)
+    assert world.rover.autopilot.armed
+    world.run(HANDED_BACK)
+    assert not world.rover.autopilot.armed
+
+
+@BOTH
+def test_land_ends_what_its_client_drives_by_setpoints(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = armed_by_client(make_world, persona)
+    world.client.stream(setpoint(0.6), rate=20)
+    world.run(0.3)
+    _ = world.client.mode(GUIDED) if persona is ARDUPILOT else ask_mode(world.client, OFFBOARD)
+    world.run(2)
+    assert world.truth.forward_speed > 0.4
+    land(world)
+    world.run(HANDED_BACK)
+    assert (world.stands(), world.rover.autopilot.armed) == (True, False)
+
+
+def test_land_takes_the_rover_out_of_nobodys_hands(world: World) -> None:
+    world.operator_mode(Mode.MANUAL)
+    world.operator_arm(True)
+    world.client.stream(sticks(z=600), rate=10)
+    world.run(1.5)
+    assert land(world).result == TEMPORARILY_REJECTED
+    world.run(1)
+    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.MANUAL, True)
