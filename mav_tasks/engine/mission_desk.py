@@ -23,7 +23,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.mission_item import unpacked
-from mav_tasks.services.mission_receiver import Sender
+from mav_tasks.services.mission_receiver import RequestForm, Sender
 from mav_tasks.services.mission_sender import MissionSender
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -70,8 +70,8 @@ MissionMessage = (
 class _Desk:
     """Uploads to, and downloads from, one address."""
 
-    def __init__(self, check: ItemCheck) -> None:
-        self.uploads = UploadDesk(check)
+    def __init__(self, check: ItemCheck, form: RequestForm) -> None:
+        self.uploads = UploadDesk(check, form)
         self.sender = MissionSender()
 
 
@@ -209,7 +209,10 @@ class MissionDesks:
         key = vehicle.system_id, component
         desk = self._desks.get(key)
         if desk is None:
-            desk = self._desks[key] = _Desk(ItemCheck(vehicle, component, self._settings))
+            is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
+            form = m.MissionRequest if is_plain else m.MissionRequestInt
+            check = ItemCheck(vehicle, component, self._settings)
+            desk = self._desks[key] = _Desk(check, form)
         return desk
 
     def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:

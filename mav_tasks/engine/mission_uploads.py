@@ -30,6 +30,7 @@ from mav_tasks.services.mission_receiver import (
     CAPACITY,
     GIVE_UP,
     MissionReceiver,
+    RequestForm,
     Sender,
     Upload,
 )
@@ -60,9 +61,9 @@ def refusal_of(result: int) -> Rejection:
 class UploadDesk:
     """Where uploads to one address are taken in."""
 
-    def __init__(self, check: ItemCheck) -> None:
+    def __init__(self, check: ItemCheck, form: RequestForm) -> None:
         self.check = check
-        self.receiver = MissionReceiver(check=check)
+        self.receiver = MissionReceiver(check=check, form=form)
 
 
 class MissionUploads:

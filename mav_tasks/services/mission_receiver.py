@@ -16,6 +16,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.services.mission_item import Item, item_of
 
+RequestForm = type[m.MissionRequest] | type[m.MissionRequestInt]
 ASK_AGAIN = 0.2  # s, between requests for one item; MAVSDK loses least between 0.1 and 0.2
 GIVE_UP = 2.3  # s without an item; MAVSDK gives up after 2.5
 STEP_BACK = 3  # from so many requests for an item on each second one is for an earlier one
@@ -25,6 +26,13 @@ REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
 ANOTHER_TRY = (
     10.0  # s after an upload that came to nothing, in which the next one is meant the same
 )
+#: requests for one item in the form that is known to be understood, or expected to be, before each
+#: second one is in the other form
+PATIENCE_PLAIN = 1
+#: the same of MISSION_REQUEST_INT first: MAVSDK breaks off when a PX4 asks with MISSION_REQUEST, so
+#: that this must not come of a packet or two that were lost
+PATIENCE_INT = 4
+INT_SENDERS = 64  # clients remembered that know MISSION_ITEM_INT
 CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
 
 #: mission type, number, item, count -> why not, or None
@@ -64,7 +72,9 @@ class _Session:
     ask_at: float
     give_up_at: float
     quiet_until: float  # until then come items of the upload before
+    form: RequestForm  # that its client is known, or expected, to understand
     items: list[Item] = field(default_factory=list)
+    last_form: RequestForm = m.MissionRequestInt  # of the last request
     asked: int = 0  # times, for the next item
     is_whole: bool = False
 
@@ -79,10 +89,16 @@ class _Answered(NamedTuple):
 
 
 class MissionReceiver:
-    """Takes in one upload; other clients are refused meanwhile."""
+    """Takes in one upload; other clients are refused meanwhile.
 
-    def __init__(self, *, check: Check) -> None:
+    ``form``: how the autopilot at this address asks for items. Clients that wait for the other form
+    only, as DroneKit for MISSION_REQUEST, are served by the repeats.
+    """
+
+    def __init__(self, *, check: Check, form: RequestForm) -> None:
         self._check = check
+        self._form = form
+        self._sends_int: dict[Sender, None] = {}
         self._session: _Session | None = None
         self._answered: _Answered | None = None
         self._ended: dict[tuple[Sender, int], float] = {}  # by mission type: when the last one did
@@ -128,7 +144,7 @@ class MissionReceiver:
         quiet_until = self._quiet_until(sender, kind, now=now)
         give_up_at = now + GIVE_UP
         self._session = _Session(
-            sender, kind, message.count, begun_at, quiet_until, give_up_at, quiet_until
+            sender, kind, message.count, begun_at, quiet_until, give_up_at, quiet_until, self._form
         )
         self._answered = None
         self._advance(now=now)
@@ -157,6 +173,9 @@ class MissionReceiver:
             self._end(refusal or MavMissionResult.ERROR, item, now=now)
             return
         session.items.append(item)
+        session.form = session.last_form
+        if isinstance(message, m.MissionItemInt):
+            self._note_int(sender)
         session.asked, session.ask_at, session.give_up_at = 0, now, now + GIVE_UP
         self._advance(now=now)
 
@@ -213,8 +232,28 @@ class MissionReceiver:
 
     def _request(self, session: _Session, seq: int) -> None:
         sender = session.sender
-        request = m.MissionRequestInt(*sender.address, seq, session.mission_type)
+        session.last_form = form = self._next_form(session)
+        request = form(*sender.address, seq, session.mission_type)
         self._outgoing.append(ToClient(sender, request))
+
+    def _next_form(self, session: _Session) -> RequestForm:
+        """Return the form for the next request: that of the autopilot; unanswered, also the other.
+
+        DEVIATION: MISSION_REQUEST is deprecated in the guide, and ArduPilot sends nothing else.
+        """
+        is_int_first = self._form is m.MissionRequestInt
+        if is_int_first and session.sender in self._sends_int:
+            return m.MissionRequestInt
+        beyond = session.asked - (PATIENCE_INT if is_int_first else PATIENCE_PLAIN)
+        if beyond <= 0 or beyond % 2 == 0:
+            return session.form
+        return m.MissionRequest if session.form is m.MissionRequestInt else m.MissionRequestInt
+
+    def _note_int(self, sender: Sender) -> None:
+        self._sends_int.pop(sender, None)
+        self._sends_int[sender] = None
+        if len(self._sends_int) > INT_SENDERS:
+            del self._sends_int[next(iter(self._sends_int))]
 
     def _note_end(self, session: _Session, *, now: float) -> None:
         self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}

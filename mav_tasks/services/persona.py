@@ -32,6 +32,7 @@ class Persona:
     mode_names: Mapping[int, str]
     has_main_modes: bool  # a mode has two parts, which a command names apart
     has_home_item: bool  # the first item of a mission is home
+    has_int_requests: bool  # it asks for the items of a plan with MISSION_REQUEST_INT
     #: it is armed in HOLD and enters our mode only while setpoints stream; else it is armed in our
     #: mode
     arms_in_hold: bool
@@ -117,6 +118,7 @@ ARDUPILOT = Persona(
     },
     has_main_modes=False,
     has_home_item=True,
+    has_int_requests=False,  # MISSION_REQUEST always (4.6.3)
     arms_in_hold=False,
     drives_in_hold=False,
     stop_disarms=False,
@@ -160,6 +162,7 @@ PX4 = Persona(
     },
     has_main_modes=True,
     has_home_item=False,
+    has_int_requests=True,
     arms_in_hold=True,
     drives_in_hold=True,
     stop_disarms=False,

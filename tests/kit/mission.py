@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tests.kit.client import FakeClient
 
 COUNT, ITEM_INT, REQUEST, REQUEST_INT, MISSION_ACK, CURRENT, REACHED = 44, 73, 40, 51, 47, 42, 46
+ARDUPILOTMEGA = 3  # MAV_AUTOPILOT
 RETRY = 0.5  # s
 TRIES = 5  # of an upload: sends of one message, and waits for the next request, together
 TIMEOUT = -1  # instead of a MAV_MISSION_RESULT
@@ -141,7 +142,10 @@ class Upload:
     def take(self, packet: Received, *, now: float) -> None:
         if self.result is not None or packet.source != self.target:
             return
-        if packet.message_id == REQUEST_INT:
+        if packet.message_id == REQUEST and not self._is_ardupilot:
+            self.client.send(common.MAVLink_mission_ack_message(*self.target, 3, self.kind))
+            self._end(3)  # as MAVSDK, which knows it of ArduPilot only
+        elif packet.message_id in (REQUEST, REQUEST_INT):
             seq, _, _, kind = struct.unpack("<HBBB", packet.payload.ljust(5, b"\0")[:5])
             if kind == self.kind:
                 self._take_request(seq, now=now)
@@ -153,6 +157,12 @@ class Upload:
             is_early = ack.result == 0 and self._next != len(self.items)
             self.opaque_id = ack.opaque_id
             self._end(1 if is_early else ack.result)
+
+    @property
+    def _is_ardupilot(self) -> bool:
+        """Whether the last heartbeat of the autopilot says so."""
+        beats = [p for p in self.client.of_id(0) if p.source == (self.target[0], 1)]
+        return bool(beats) and self.client.decoded(beats[-1]).autopilot == ARDUPILOTMEGA
 
     def cancel(self) -> None:
         """Give up, and say so."""

@@ -12,7 +12,7 @@ from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.task import Task
 from rover_sim.virtual import VirtualWorld
 from tests.kit.client import FakeClient
-from tests.kit.mission import COUNT, MISSION_ACK, REQUEST_INT, Ack
+from tests.kit.mission import COUNT, MISSION_ACK, REQUEST, REQUEST_INT, Ack
 
 ROVER = "rover1"
 
@@ -60,7 +60,7 @@ class Wire(MemoryNet):
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Note what the server says."""
-        if source == CLIENT_LINK and _is(data, REQUEST_INT):
+        if source == CLIENT_LINK and (_is(data, REQUEST) or _is(data, REQUEST_INT)):
             self.asked.append((target, int.from_bytes(_payload(data)[:2], "little")))
         elif source == CLIENT_LINK and _is(data, MISSION_ACK):
             self.acks.append((target, Ack.of(_payload(data))))

@@ -113,4 +113,4 @@ def test_while_its_client_uploads_it_is_no_item_of_the_plan(world: World) -> Non
     world.client.send(go_there(1.5, -1.0))
     world.run(0.1)
     assert acks(world) == [(OK, 0, 1)]
-    assert {each.seq for each in world.client.of_type("MISSION_REQUEST_INT")} == {0}
+    assert {each.seq for each in world.client.of_type("MISSION_REQUEST")} == {0}

@@ -81,7 +81,7 @@ def decoder(data: bytes) -> None:
 
 def mission_receiver(data: bytes) -> None:
     """Uploads come only whole, of one sender each; whatever is said in whatever order."""
-    receiver = MissionReceiver(check=_check)
+    receiver = MissionReceiver(check=_check, form=m.MissionRequest)
     now = 0.0
     for step, what in zip(data[::2], data[1::2], strict=False):
         now += step / 100

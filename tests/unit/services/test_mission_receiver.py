@@ -13,6 +13,7 @@ from mav_tasks.services.mission_receiver import (
     GIVE_UP,
     QUIET,
     MissionReceiver,
+    RequestForm,
     Sender,
     Upload,
 )
@@ -32,11 +33,14 @@ def item(seq: int, *, north: int = 0, kind: int = MISSION) -> m.MissionItemInt:
 class Rig:
     """A receiver in virtual time."""
 
-    def __init__(self, *, refused: int | None = None) -> None:
+    def __init__(
+        self, *, refused: int | None = None, form: RequestForm = m.MissionRequestInt
+    ) -> None:
         self.now = 0.0
         self.refused = refused  # the command that is
-        self.receiver = MissionReceiver(check=self.check)
+        self.receiver = MissionReceiver(check=self.check, form=form)
         self.uploads: list[Upload] = []
+        self.forms: list[type[m.Message]] = []  # of the requests
 
     def check(self, kind: int, seq: int, item: Item, count: int) -> Result | None:
         assert (kind in (MISSION, FENCE), seq < count) == (True, True)
@@ -50,7 +54,8 @@ class Rig:
         for sender, message in outgoing:
             assert target_of(message) == sender.address
             match message:
-                case m.MissionRequestInt():
+                case m.MissionRequest() | m.MissionRequestInt():
+                    self.forms.append(type(message))
                     words.append((str(sender.key), "request", message.seq))
                 case m.MissionAck():
                     words.append((str(sender.key), "ack", message.type))
@@ -331,3 +336,45 @@ def test_the_float_form_means_the_same_place() -> None:
         rig.receiver.item(message, ALICE, now=0.0)
     rig.said()
     assert [(i.x, i.y) for i in rig.uploads[0].items] == [(470000000, 80000000), (-25000, 80000)]
+
+
+class TestForms:
+    """How items are asked for: as the autopilot does, and on repeats the other way as well."""
+
+    @staticmethod
+    def plain(seq: int) -> m.MissionItem:
+        return m.MissionItem(1, 1, seq, 3, 16, 0, 1, 0, 0, 0, 0, 47.0, 8.0, 0, MISSION)
+
+    def test_an_ardupilot_asks_plainly_and_each_second_time_for_an_int_item(self) -> None:
+        rig = Rig(form=m.MissionRequest)
+        rig.count(2).said()
+        rig.run(4.5 * ASK_AGAIN)
+        assert rig.forms == [m.MissionRequest, m.MissionRequestInt] * 2 + [m.MissionRequest]
+
+    def test_a_px4_asks_four_times_for_an_int_item_before_it_asks_plainly(self) -> None:
+        rig = Rig()
+        rig.count(2).said()
+        rig.run(6.5 * ASK_AGAIN)
+        assert rig.forms[:4] == [m.MissionRequestInt] * 4
+        assert rig.forms[4:] == [m.MissionRequest, m.MissionRequestInt, m.MissionRequest]
+
+    def test_a_client_that_has_sent_int_items_to_a_px4_is_never_asked_plainly(self) -> None:
+        rig = Rig()
+        rig.count(2).said()
+        rig.item(0)
+        rig.run(GIVE_UP - 0.1)
+        rig.count(2).said()
+        rig.run(2 * GIVE_UP)
+        assert set(rig.forms) == {m.MissionRequestInt}
+        assert len(rig.forms) > 10
+
+    def test_a_client_that_answers_one_form_only_is_asked_for_the_next_in_it_at_once(self) -> None:
+        rig = Rig()
+        rig.count(3).said()
+        rig.run(4 * ASK_AGAIN)
+        assert rig.forms[-1] is m.MissionRequest
+        for seq in range(3):
+            rig.receiver.item(self.plain(seq), ALICE, now=rig.now)
+            rig.said()
+        assert rig.forms[4:] == [m.MissionRequest] * 3
+        assert len(rig.uploads[0].items) == 3
