@@ -212,18 +212,22 @@ class Commands:
                     asked.answer(MavResult.ACCEPTED)
                     return
                 case number if number in OUR_COMMANDS:
-                    words = f"command {number}: not supported in this version"
-                    unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
-                    refused = asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now)
-                    self._book.record(refused)
+                    self._refuse_unknown(asked, now=now)
                     return
-        if at_server:
+        if at_server and asked.command.command in ASKING:  # ground stations ask everybody
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
+        elif at_server:
+            self._refuse_unknown(asked, now=now)
         elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
             return
         else:  # also to a component never heard of: an autopilot does what that is told
             _check_relay(asked, now=now)
             _relay(asked, now=now)
+
+    def _refuse_unknown(self, asked: Asked, *, now: float) -> None:
+        words = f"command {asked.command.command}: not supported in this version"
+        unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+        self._book.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
 
     def _claims(self, command: int) -> bool:
         """Whether a command to the autopilot itself is ours to see to."""

@@ -38,6 +38,7 @@ from mav_tasks.engine.parameters import ParameterDesk
 from mav_tasks.engine.passing import Passing
 from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
+from mav_tasks.engine.refusals import Refusals
 from mav_tasks.engine.request_limit import RequestLimit
 from mav_tasks.engine.rights import OPERATOR
 from mav_tasks.engine.setup_signing import SetupSigning
@@ -117,7 +118,10 @@ class Engine:
         )
         self._reports = MissionReports(self._gcs, self._vehicles, self._book, self._plans, settings)
         self._displays = Displays(self._gcs, self._vehicles, self._book)
-        self._modes = ModeRequests(self._gcs, self._book, self._submissions, self._plans, settings)
+        refusals = Refusals(self._book)
+        self._modes = ModeRequests(
+            self._gcs, self._book, self._submissions, self._plans, refusals, settings
+        )
         self._commands = Commands(
             self._gcs,
             self._vehicles,
@@ -132,8 +136,8 @@ class Engine:
         self._publisher = Publisher(
             self._gcs, self._vehicles, self._book, self._displays, self._submissions
         )
-        self._passing = Passing(self._vehicles, self._vehicles.our_address)
-        self._requests = RequestLimit(self._vehicles)
+        self._passing = Passing(self._vehicles, self._vehicles.our_address, refusals)
+        self._requests = RequestLimit(self._vehicles, refusals)
         self._broadcasts = Broadcasts(self._vehicles, packer)
         self._operator = OperatorWatch()
         self._setup = SetupSigning(self.signatures, self._vehicles, settings)

@@ -3,16 +3,21 @@
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.vehicle import Vehicle
+from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
 from mav_tasks.services.mission_receiver import Sender, ToClient
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason
 
 
 class MissionAnswers:
     """Answers to whoever asked, while that client is still there."""
 
-    def __init__(self, gcs: GcsSide) -> None:
+    def __init__(self, gcs: GcsSide, book: TaskBook) -> None:
         self._gcs = gcs
+        self._book = book
 
     def client(self, sender: Sender) -> GcsClient | None:
         """Give the client that a sender is at, if it is still there."""
@@ -35,3 +40,16 @@ class MissionAnswers:
         client = self.client(sender)
         if client is not None:
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+
+    def refused(
+        self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, message_id: int, now: float
+    ) -> None:
+        """Say why a request was refused: to its client, and in the log; 0: it is an upload."""
+        client = self.client(sender)
+        if client is not None and not client.may_be_refused(now=now):
+            return  # a flood of them fills neither disk nor net
+        self.tell(sender, vehicle, refusal.text, now=now)
+        reason, actor = TaskReason(refusal.reason), str(sender.address)
+        self._book.record(
+            SubmissionRefused(vehicle.system_id, -message_id, reason, refusal.text, actor, now)
+        )

@@ -10,13 +10,17 @@ from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
 from mav_tasks.engine.write_through import WriteThrough
 from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.services.mission_receiver import Sender
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason
-from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason, TaskState
+from mav_tasks.tasks.task import Task, TaskId
 
 R = TaskReason
+
+#: has begun, and is not being driven: a stock autopilot, too, clears a mission in HOLD
+AT_REST = frozenset({TaskState.PAUSED, TaskState.HELD})
 
 
 class MissionClearing:
@@ -45,10 +49,10 @@ class MissionClearing:
             self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
             return
         task = self._plans.task(vehicle)
-        if MISSION in kinds and task is not None and task.state in ACTIVE:
+        if MISSION in kinds and task is not None and task.state in ACTIVE - AT_REST:
             self._answers.ack(sender, kind, MavMissionResult.DENIED)
-            words = f"task {task.id} has begun: cancel it first"
-            self._answers.tell(sender, vehicle, words, now=now)
+            words = f"clear: task {task.id} is being driven: pause or cancel it first"
+            self._refused(sender, vehicle, Rejection(R.WRONG_STATE, words), now=now)
             return
         stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
         self._forget(vehicle, sender, kind, stored, {}, now=now)
@@ -70,6 +74,7 @@ class MissionClearing:
 
             def accept(*, now: float) -> None:
                 self._vehicles.get(vehicle.system_id)
+                self._call_off(vehicle, task, actor=actor, now=now)
                 self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
                 self._answers.ack(sender, asked, MavMissionResult.ACCEPTED)
 
@@ -89,9 +94,19 @@ class MissionClearing:
 
         def refuse(refusal: Rejection, *, now: float) -> None:
             self._answers.ack(sender, asked, result_of(refusal))
-            self._answers.tell(sender, vehicle, refusal.text, now=now)
+            self._refused(sender, vehicle, refusal, now=now)
 
         if first == MISSION:
             go_on(now=now)
         else:
             self._write_through.write(vehicle, first, (), go_on, refuse, now=now)
+
+    def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
+        """End a mission that was interrupted: without its plan nobody could have it go on."""
+        current = None if task is None else self._book.get(task.id)
+        if current is not None and current.state in AT_REST:
+            vehicle.cancel(current, kill=False, actor=actor, now=now)
+
+    def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
+        message_id = m.MissionClearAll.id
+        self._answers.refused(sender, vehicle, why, message_id=message_id, now=now)

@@ -90,7 +90,7 @@ class MissionDesks:
         self._vehicles = vehicles
         self._plans = plans
         self._settings = settings
-        self._answers = MissionAnswers(gcs)
+        self._answers = MissionAnswers(gcs, book)
         write_through = WriteThrough(vehicles)
         self._uploads = MissionUploads(
             gcs, vehicles, book, submissions, plans, self._answers, write_through
@@ -187,7 +187,9 @@ class MissionDesks:
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
                 self._answers.ack(sender, kind, MavMissionResult.DENIED)
-                self._uploads.refused(sender, vehicle, refusal, now=now)
+                is_upload = isinstance(message, m.MissionCount)
+                message_id = 0 if is_upload else type(message).id
+                self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
             return True
         return False
 
@@ -240,7 +242,8 @@ class MissionDesks:
             self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
             self._plans.go_on_with(vehicle, seq, now=now)
         except Rejection as refusal:
-            self._answers.tell(sender, vehicle, refusal.text, now=now)
+            message_id = m.MissionSetCurrent.id
+            self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
         client.outlet.send(
             self._plans.current(vehicle, seq=seq), Address(vehicle.system_id, AUTOPILOT)
         )

@@ -35,7 +35,6 @@ from mav_tasks.services.mission_receiver import (
     Upload,
 )
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
@@ -248,20 +247,7 @@ class MissionUploads:
 
     def refused(self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, now: float) -> None:
         """Say why an upload was refused: to its client, and in the log."""
-        client = self._answers.client(sender)
-        if client is not None and not client.may_be_refused(now=now):
-            return  # a flood of them fills neither disk nor net
-        self._answers.tell(sender, vehicle, refusal.text, now=now)
-        self._book.record(
-            SubmissionRefused(
-                vehicle.system_id,
-                0,
-                TaskReason(refusal.reason),
-                refusal.text,
-                str(sender.address),
-                now,
-            )
-        )
+        self._answers.refused(sender, vehicle, refusal, message_id=0, now=now)
 
     def _check_replaced(self, client: GcsClient, vehicle: Vehicle, submitter: Submitter) -> None:
         task = self._plans.task(vehicle)

@@ -9,6 +9,7 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.goals import marks_of
 from mav_tasks.engine.plans import MISSION, Plans
+from mav_tasks.engine.refusals import Refusals
 from mav_tasks.engine.rights import OPERATOR, Rights
 from mav_tasks.engine.start_mark import WAITS as START_WAITS
 from mav_tasks.engine.submissions import Submissions
@@ -38,8 +39,10 @@ class ModeRequests:
         book: TaskBook,
         submissions: Submissions,
         plans: Plans,
+        refusals: Refusals,
         settings: Settings,
     ) -> None:
+        self._refusals = refusals
         self._gcs = gcs
         self._book = book
         self._submissions = submissions
@@ -94,7 +97,8 @@ class ModeRequests:
         try:
             self._heard(client, vehicle, submitter, packet, mode, now=now)
         except Rejection as refusal:
-            client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
+            if self._refusals.message(client, vehicle, packet, refusal, now=now):
+                client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
 
     def _heard(
         self,

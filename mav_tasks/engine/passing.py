@@ -7,14 +7,19 @@ from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.motion_gate import may_pass, passed, withheld
 from mav_tasks.engine.plans import MISSION
-from mav_tasks.engine.rights import OPERATOR, SAFETY, Rights
+from mav_tasks.engine.refusals import Refusals
+from mav_tasks.engine.rights import OBSERVER, OPERATOR, SAFETY
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
+from mav_tasks.tasks.lifecycle import TaskReason
+
+R = TaskReason
 
 EVERYBODY = Address(0, 0)
 #: what everybody may send to a vehicle: it asks. SYSTEM_TIME sets the clock of some
@@ -24,6 +29,8 @@ ASKING = frozenset(
         *(m.MissionRequestList.id, m.MissionRequest.id, m.MissionRequestInt.id, m.MissionAck.id),
     }
 )
+#: what everybody sends all the time, and only operators have passed on: nothing was refused there
+TELLING = frozenset({m.Heartbeat.id, m.SystemTime.id, m.Statustext.id})
 #: what changes the bounds in which a vehicle drives, or anything in it; files are read and written
 #: by one message
 BOUNDING = frozenset(
@@ -43,8 +50,9 @@ BOUNDING = frozenset(
 class Passing:
     """Passes clients' packets on."""
 
-    def __init__(self, vehicles: VehicleSide, identity: Address) -> None:
+    def __init__(self, vehicles: VehicleSide, identity: Address, refusals: Refusals) -> None:
         """``identity``: as whom the server speaks to vehicles."""
+        self._refusals = refusals
         self._vehicles = vehicles
         self._identity = identity
 
@@ -52,9 +60,12 @@ class Passing:
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
         """Pass a packet to the vehicles that it is for; what is for us ends here."""
-        if not _may_send(client.rights, packet, message) or self._is_ours(packet.source):
-            return
         target = EVERYBODY if message is None else _target(message)
+        why_not = self._why_not(client, packet, message)
+        if why_not is not None:
+            if packet.message_id not in TELLING:
+                self._refusals.stream(client, target.system_id, packet, why_not, now=now)
+            return
         behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
         for vehicle in self._vehicles.addressed_by(target.system_id):
             if target != vehicle.server_address:
@@ -65,13 +76,31 @@ class Passing:
                     client.outlet.send(refusal, vehicle.server_address)
         for vehicles in behind.values():
             is_old = self._vehicles.is_old_news(now=now)
-            if all(may_pass(v, client.key, packet, message, is_old=is_old) for v in vehicles):
+            refusing = [
+                v for v in vehicles if not may_pass(v, client.key, packet, message, is_old=is_old)
+            ]
+            if not refusing:
                 for vehicle in vehicles:
                     passed(vehicle, client.key, packet, message, now=now)
                 vehicles[0].requests.forward(packet)
-            else:
-                for vehicle in vehicles:
-                    withheld(vehicle, client.key, packet, message, now=now)
+                continue
+            for vehicle in vehicles:
+                withheld(vehicle, client.key, packet, message, now=now)
+            for vehicle in refusing:
+                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client))
+                self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
+
+    def _why_not(
+        self, client: GcsClient, packet: Packet, message: m.Message | None
+    ) -> Rejection | None:
+        """Return why a packet may go to no rover at all, None if it may."""
+        if self._is_ours(packet.source):
+            words = f"{packet.source} is an address of the server or of a rover"
+            return Rejection(R.NOT_ALLOWED, words)
+        least = _least_role(packet, message)
+        if client.rights.reach(least):
+            return None
+        return client.rights.refusal(f"may not send that to a rover, {least} may")
 
     def _is_ours(self, source: Address) -> bool:
         """Whether a packet says that it is of the server or of a rover, and is of neither."""
@@ -88,15 +117,20 @@ class Passing:
                 vehicle.client_is_gone((link, peer), now=now)
 
 
-def _may_send(rights: Rights, packet: Packet, message: m.Message | None) -> bool:
-    """Whether a client may have a packet passed on; what has no answer is refused without one."""
+def _least_role(packet: Packet, message: m.Message | None) -> str:
+    """Return the role from which on a client may have a packet passed on."""
     if packet.message_id in ASKING:
-        return True
+        return OBSERVER
     if isinstance(message, m.FileTransferProtocol) and file_transfer.reads(message):
-        return True
+        return OBSERVER
     is_of_plan = getattr(message, "mission_type", MISSION) == MISSION  # or else of a fence
     is_bounding = packet.message_id in BOUNDING or not is_of_plan
-    return rights.reach(SAFETY if is_bounding else OPERATOR)
+    return SAFETY if is_bounding else OPERATOR
+
+
+def _why_withheld(vehicle: Vehicle, client: GcsClient) -> str:
+    """Return in words why a packet that a client may send does not go to a rover now."""
+    return vehicle.why_not_moved(client.key) or "not finite, or older than the server's pause"
 
 
 def _target(message: m.Message) -> Address:

@@ -8,8 +8,10 @@ But all that goes on to a rover is counted of who may only look: its way there m
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.motion_gate import GO_TO
 from mav_tasks.engine.passing import ASKING
+from mav_tasks.engine.refusals import Refusals
 from mav_tasks.engine.rights import OPERATOR
 from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
@@ -32,7 +34,8 @@ UNCOUNTED = frozenset(
 class RequestLimit:
     """Counts requests, and answers what is one too many."""
 
-    def __init__(self, vehicles: VehicleSide) -> None:
+    def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
+        self._refusals = refusals
         self._vehicles = vehicles
         #: requests that were too many
         self.left_out = 0
@@ -68,6 +71,8 @@ class RequestLimit:
         rights = client.rights
         words = f"role {rights.role} may send {rights.limits.rate:g} requests a second"
         client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+        refusal = Rejection(TaskReason.RATE_LIMITED, words)
+        self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
 
 
 def _is_uncounted(client: GcsClient, packet: Packet, message: m.Message | None) -> bool:

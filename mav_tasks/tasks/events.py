@@ -150,7 +150,10 @@ class TaskWithdrawn:
 
 @dataclass(frozen=True, slots=True)
 class SubmissionRefused:
-    """A submission refused, for the audit log; ``command`` is 0 of an upload of a plan."""
+    """A submission or request refused, for the audit log.
+
+    ``command`` is 0 of an upload of a plan, and of another message minus its id.
+    """
 
     vehicle: int
     command: int
@@ -160,7 +163,8 @@ class SubmissionRefused:
     at: float
 
     def __str__(self) -> str:
-        what = f"command {self.command}" if self.command else "upload"
+        what = f"command {self.command}" if self.command > 0 else f"message {-self.command}"
+        what = what if self.command else "upload"
         return f"{what} of {self.actor} refused: {self.text}"
 
 
