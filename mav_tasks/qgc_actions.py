@@ -38,14 +38,16 @@ def _task(
     return Action(label, description, command, (*first, 0.0, 0.0, 0.0, priority))
 
 
+#: QGroundControl shows three of a row, and inserts one of its own in front while a rover is armed:
+#: what stops a rover comes first, and the order stays as it is
 ACTIONS = (
+    Action("STOP", "Stop at once, until continued", MavCmd.TASK_STOP, (0.0,)),
+    Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
+    Action("Continue", "Continue; ends a STOP", MavCmd.DO_PAUSE_CONTINUE, (1.0,)),
     _task("Forward 1 m", "Queue: drive 1 m ahead", MavCmd.TASK_MOVE, 1.0),
     _task("Back 1 m", "Queue: drive 1 m backwards", MavCmd.TASK_MOVE, -1.0),
     _task("Right 90", "Queue: turn 90 degrees clockwise on the spot", MavCmd.TASK_ROTATE, 90.0),
     _task("Left 90", "Queue: turn 90 degrees anticlockwise", MavCmd.TASK_ROTATE, -90.0),
-    Action("STOP", "Stop at once, until continued", MavCmd.TASK_STOP, (0.0,)),
-    Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
-    Action("Continue", "Continue; ends a STOP", MavCmd.DO_PAUSE_CONTINUE, (1.0,)),
     Action("Cancel task", "Call off the running task", MavCmd.TASK_CANCEL, (0.0,)),
     Action("Clear queue", "Call off all that wait", MavCmd.TASK_CLEAR, (0.0,)),
     Action("Held: again", "Do the held task again from here", MavCmd.TASK_RELEASE, (0.0, 0.0)),

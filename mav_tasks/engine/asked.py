@@ -85,7 +85,7 @@ class Asked:
         if result is None:
             result = translate.result_of(refusal.reason)
         self.answer(result, refusal.reason)
-        self.tell(refusal.text, MavSeverity.WARNING, now=now)
+        self.client.tell_refusal(refusal.text, self.vehicle.server_address, now=now)
         reason = TaskReason(refusal.reason)
         return SubmissionRefused(
             self.vehicle.system_id, self.command.command, reason, refusal.text, self.actor, now

@@ -92,6 +92,9 @@ BOUNDING = frozenset(
 )
 
 
+MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
+
+
 class _Asker(NamedTuple):
     """Whose command was forwarded: the endpoint, the address there, and whom it addressed."""
 
@@ -152,10 +155,22 @@ class Commands:
         try:
             self._dispatch(asked, now=now)
         except Rejection as refusal:
-            if client.may_be_refused(now=now):
+            if self._is_tried_again(asked, now=now):
+                asked.answer(MavResult.CANCELLED, refusal.reason)
+            elif client.may_be_refused(now=now):
                 self._book.record(asked.refuse(refusal, now=now))
             else:  # a flood of them fills neither disk nor net
                 asked.answer(result_of(refusal.reason), refusal.reason)
+
+    def _is_tried_again(self, asked: Asked, *, now: float) -> bool:
+        """Whether a mode that has just been refused is asked for, and refused, once more.
+
+        QGroundControl asks three times, and shows a box for each refusal that is called so.
+        """
+        is_mode = asked.command.command == MavCmd.DO_SET_MODE
+        return is_mode and asked.receiver.is_refused_again(
+            asked.command, within=MODE_TRIED_AGAIN, now=now
+        )
 
     def _dispatch(self, asked: Asked, *, now: float) -> None:
         if asked.command.target.system_id == EVERYBODY:  # what is not ours came once for each rover

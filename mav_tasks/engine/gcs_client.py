@@ -1,6 +1,7 @@
 """One client: an endpoint on a client link. What it has been shown, and what it asked for."""
 
 from collections import OrderedDict
+from math import inf
 
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.outlet import Outlet
@@ -20,6 +21,10 @@ from mav_tasks.tasks.task import Submitter, Task
 
 AT_ONCE = 5.0  # s, of which the requests may come in a moment: a script queues a day's work
 REFUSALS = 20.0  # a second
+#: s in which one refusal is said once: QGroundControl asks three times for a mode, 1.3 s apart, and
+#: sends one "go to" in two messages
+REFUSAL_EACH = 5.0
+MAX_REFUSALS_TOLD = 64
 MAX_FOLLOWED = 1000  # tasks of others that one client is told about
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 
@@ -62,6 +67,7 @@ class GcsClient:
         self.statuses = TaskStatusSender(rate=settings.status_rate, now=now)
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
+        self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it
         self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
         self._introduced: set[int] = set()
         self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
@@ -206,6 +212,19 @@ class GcsClient:
             self._left_out[source] = self._left_out.get(source, 0) + 1
             return
         self._say(text, severity, source)
+
+    def tell_refusal(self, text: str, source: Address, *, now: float) -> None:
+        """Say why something was refused; to a ground station that tries again and again, once."""
+        if self.uses_dialect:  # a script has its words with each refusal
+            self.tell(text, MavSeverity.WARNING, source, now=now)
+            return
+        said_at = self._refusals_told.get((source, text), -inf)
+        if now - said_at < REFUSAL_EACH:
+            return
+        if len(self._refusals_told) >= MAX_REFUSALS_TOLD:
+            self._refusals_told.clear()
+        self._refusals_told[source, text] = now
+        self.tell(text, MavSeverity.WARNING, source, now=now)
 
     def tell_what_was_left_out(self, *, now: float) -> None:
         """Say how many texts were too many, in one for each who said them."""

@@ -48,7 +48,8 @@ class MissionAnswers:
         client = self.client(sender)
         if client is not None and not client.may_be_refused(now=now):
             return  # a flood of them fills neither disk nor net
-        self.tell(sender, vehicle, refusal.text, now=now)
+        if client is not None:
+            client.tell_refusal(refusal.text, vehicle.server_address, now=now)
         reason, actor = TaskReason(refusal.reason), str(sender.address)
         self._book.record(
             SubmissionRefused(vehicle.system_id, -message_id, reason, refusal.text, actor, now)

@@ -98,7 +98,7 @@ class ModeRequests:
             self._heard(client, vehicle, submitter, packet, mode, now=now)
         except Rejection as refusal:
             if self._refusals.message(client, vehicle, packet, refusal, now=now):
-                client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
+                client.tell_refusal(refusal.text, vehicle.server_address, now=now)
 
     def _heard(
         self,

@@ -21,6 +21,13 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskI
 
 R = TaskReason
 
+#: why a queue stands, in the first words that a station shows
+PAUSED = {
+    R.OPERATOR: "queue paused",
+    R.STOPPED: "STOP in force",
+    R.TAKEOVER: "taken over",
+    R.RESTARTED: "server restarted",
+}
 NONCE = 3  # where it is among the parameters
 
 
@@ -230,10 +237,28 @@ class Submissions:
         for each in self._undecided.pop(task.id):
             each.answer(MavResult.ACCEPTED, task.id)
             _note(each, task.id)
-        words = f"Task {task.id} queued: {describe(task.goal)}"
-        if asked.vehicle.tasks.paused:  # who queued it may not be who paused
-            words += f"; the queue is paused: {words_of(asked.vehicle.tasks.paused)}"
-        self._gcs.tell(words, MavSeverity.INFO, asked.vehicle.server_address, now=now)
+        self._tell_queued(asked, task, now=now)
+
+    def _tell_queued(self, asked: Asked, task: Task, *, now: float) -> None:
+        """Tell everybody of a task; a station that has it wait for a button, as a warning."""
+        tasks, source = asked.vehicle.tasks, asked.vehicle.server_address
+        paused = tasks.paused
+        if tasks.urgent == task.id:
+            words = f"Task {task.id} begins now: {describe(task.goal)}"
+        elif paused:  # who queued it may not be who paused
+            words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
+            words += f". {describe(task.goal)}"
+        elif tasks.is_held_ahead:
+            words = f"Task {task.id} waits, press a Held button: a task is held. "
+            words += describe(task.goal)
+        else:
+            words = f"Task {task.id} queued: {describe(task.goal)}"
+        for client in self._gcs:
+            is_blocked = tasks.urgent != task.id and (paused or tasks.is_held_ahead)
+            is_told_otherwise = client is not asked.client or client.uses_dialect
+            is_calm = is_told_otherwise or not is_blocked
+            severity = MavSeverity.INFO if is_calm else MavSeverity.WARNING
+            client.tell(words, severity, source, now=now)
 
     def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:
         askers = self._undecided.pop(task.id)
@@ -255,9 +280,11 @@ class Submissions:
             return
         asked.answer(MavResult.ACCEPTED, known.task_id)
         _note(asked, known.task_id)  # it names the nonce; an ack does not
-        if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL):
+        task = self._book.get(known.task_id)
+        # one click of QGroundControl's is a command and an item: two messages, and nothing twice
+        is_other_message = task is not None and task.command != asked.command.command
+        if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
-            task = self._book.get(known.task_id)
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"same {what} again: still task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)

@@ -11,6 +11,7 @@ from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
+    SERVER,
     Event,
     QueueContinued,
     QueuePaused,
@@ -186,6 +187,13 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         ):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(reason)}"
             return event.vehicle, MavSeverity.ERROR, text
+        case TaskChanged(
+            new=TaskState.KILLED | TaskState.CANCELLED as new, reason=TaskReason.CANCELLED
+        ):
+            who = event.actor.partition("@")[0]  # the endpoint says nothing to people
+            text = f"Task {event.task_id} {new.name.lower()}"
+            text += "" if event.actor == SERVER else f" by {who}"
+            return event.vehicle, _severity(event.reason), text
         case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
             return event.vehicle, _severity(event.reason), text

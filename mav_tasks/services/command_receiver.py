@@ -126,6 +126,16 @@ class CommandReceiver:
                 return pending.answer
         return None
 
+    def is_refused_again(self, command: Command, *, within: float, now: float) -> bool:
+        """Whether an equal command was refused in the last so many seconds."""
+        return any(
+            now - pending.at <= within
+            and pending.answer is not None
+            and pending.answer.result != MavResult.ACCEPTED
+            and _equal(pending.command, command)
+            for pending in self._packets.values()
+        )
+
     def older_copy(self, command: Command, *, before: float, now: float) -> bool:
         """Whether an equal command was carried out before ``before``, so lately that this may be
         a repeat of it whose ack was lost."""

@@ -103,9 +103,16 @@ class TaskReason(IntEnum):
     RATE_LIMITED = 113
 
 
+#: where the name of a reason is not what people say
+_WORDS = {
+    TaskReason.FRAME_RESET: "position reference changed",
+    TaskReason.OFF_LINE: "off track",
+}
+
+
 def words_of(reason: TaskReason) -> str:
-    """Give a reason as people read it."""
-    return reason.name.lower().replace("_", " ")
+    """Return a reason as people read it."""
+    return _WORDS.get(reason) or reason.name.lower().replace("_", " ")
 
 
 _S = TaskState

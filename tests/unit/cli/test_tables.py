@@ -125,7 +125,7 @@ def test_what_has_no_room_is_counted() -> None:
         (
             replace(QUEUE, current=HELD),
             (
-                "rover 1: task 12 held (off line); "
+                "rover 1: task 12 held (off track); "
                 "decide: mav-tasks release 12 again|remainder|skip; 1 waiting"
             ),
         ),
@@ -181,7 +181,7 @@ def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
         (
             HELD,
             (
-                "task 12: rotate 90 deg: held (off line); "
+                "task 12: rotate 90 deg: held (off track); "
                 "decide: mav-tasks release 12 again|remainder|skip"
             ),
         ),
