@@ -25,6 +25,7 @@ REFUSALS = 20.0  # a second
 #: sends one "go to" in two messages
 REFUSAL_EACH = 5.0
 MAX_REFUSALS_TOLD = 64
+BACK_AFTER = 3.5  # s of silence, after which a ground station may be another run of it
 MAX_FOLLOWED = 1000  # tasks of others that one client is told about
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 
@@ -70,6 +71,7 @@ class GcsClient:
         self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it
         self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
         self._introduced: set[int] = set()
+        self._informed: set[int] = set()  # of which vehicles' tasks it was told since it came
         self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
         self._submitters: dict[
             tuple[Address, str], Submitter
@@ -156,6 +158,8 @@ class GcsClient:
     def heard(self, source: Address, *, now: float) -> None:
         """Note that a packet of this address came from here."""
         self.is_passing = not self.is_heard
+        if now - self.heard_at > BACK_AFTER:
+            self._informed.clear()
         self.is_one_of_many = self.is_one_of_many and self.is_passing
         self.heard_at = now
         self.last_source = source
@@ -176,6 +180,13 @@ class GcsClient:
     def knows(self, system_id: int) -> bool:
         """Whether the client has seen a heartbeat of this vehicle's autopilot."""
         return system_id in self._introduced
+
+    def is_to_be_informed(self, system_id: int) -> bool:
+        """Whether it is new, or back, and knows a vehicle; asked once, it is informed."""
+        if not self.is_heard or not self.knows(system_id) or system_id in self._informed:
+            return False
+        self._informed.add(system_id)
+        return True
 
     def knows_all(self, count: int) -> bool:
         """Whether the client has seen as many vehicles as there are."""

@@ -11,8 +11,10 @@ from mav_tasks.engine.displays import Displays
 from mav_tasks.engine.gcs_client import GcsClient
 from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.submissions import Submissions
+from mav_tasks.engine.summary import summary_of
+from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
-from mav_tasks.mavlink.enums import MavState
+from mav_tasks.mavlink.enums import MavSeverity, MavState
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import component_heartbeat
 from mav_tasks.tasks.book import TaskBook
@@ -146,3 +148,14 @@ class Publisher:
             for client in self._gcs:
                 if client.is_heard and client.knows(vehicle.system_id):
                     client.outlet.send(heartbeat, vehicle.server_address)
+            self._inform(vehicle, now=now)
+
+    def _inform(self, vehicle: Vehicle, *, now: float) -> None:
+        """Tell clients that are new, or back, what is held or paused, up to a second later.
+
+        A ground station takes no text of a vehicle that it has only just heard of.
+        """
+        new = [client for client in self._gcs if client.is_to_be_informed(vehicle.system_id)]
+        words = summary_of(vehicle.tasks) if new else ""
+        for client in new if words else ():
+            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
