@@ -23,7 +23,7 @@ from mav_tasks.engine.goals import (
 )
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.mode_requests import ModeRequests
-from mav_tasks.engine.plans import Plans
+from mav_tasks.engine.plans import Plans, begins_with
 from mav_tasks.engine.rights import OPERATOR, SAFETY
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.task_control import TaskControl
@@ -211,6 +211,8 @@ class Commands:
                     seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
                     task = self._plans.go_on_with(asked.vehicle, seq, now=now)
                     asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
+                    if task is None and seq is not None:
+                        asked.tell(begins_with(seq), MavSeverity.INFO, now=now)
                     return
                 case MavCmd.DO_PAUSE_CONTINUE:
                     asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)

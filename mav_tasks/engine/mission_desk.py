@@ -11,7 +11,7 @@ from mav_tasks.engine.mission_answers import MissionAnswers
 from mav_tasks.engine.mission_clearing import MissionClearing
 from mav_tasks.engine.mission_uploads import MissionUploads, UploadDesk
 from mav_tasks.engine.motion_gate import GO_TO
-from mav_tasks.engine.plans import MISSION, STORED, Plans, Stored
+from mav_tasks.engine.plans import MISSION, STORED, Plans, Stored, begins_with
 from mav_tasks.engine.rights import OPERATOR, SAFETY, SUBMITTER
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
@@ -20,7 +20,7 @@ from mav_tasks.engine.write_through import WriteThrough
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavMissionResult
+from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.mission_item import unpacked
 from mav_tasks.services.mission_receiver import RequestForm, Sender
@@ -240,7 +240,9 @@ class MissionDesks:
         """The message MISSION_SET_CURRENT; MAVSDK waits for this very number, for ever."""
         try:
             self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
-            self._plans.go_on_with(vehicle, seq, now=now)
+            if self._plans.go_on_with(vehicle, seq, now=now) is None:
+                words = begins_with(seq)
+                client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         except Rejection as refusal:
             message_id = m.MissionSetCurrent.id
             self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)

@@ -28,6 +28,7 @@ R, S = TaskReason, TaskState
 
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
+NOT_STARTED = 2  # MISSION_STATE
 STARTED_TWICE = 2.5  # s in which a second wish to start means the first: MAVSDK sends two
 
 
@@ -121,7 +122,7 @@ class Plans:
         current = None if task is None else self._book.get(task.id)
         if current is not None:
             self.end(vehicle, current, reason, actor=actor, now=now)
-        self.begin_at(vehicle, 0)
+        self._first.pop(vehicle.system_id, None)
 
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
         """Let the next start begin with this item; 0: with the first."""
@@ -241,7 +242,10 @@ class Plans:
         return Draft(vehicle.system_id, command, plan, submitter, terms=wanted.terms)
 
     def go_on_with(self, vehicle: Vehicle, seq: int, *, now: float) -> Task | None:
-        """Let the mission go on, or begin, with another item; Rejection: it cannot."""
+        """Let the mission go on with another item; None: it will begin with that when started.
+
+        Raise Rejection if there is no such item.
+        """
         task = self.shown(vehicle)
         count = len(self.stored(vehicle.system_id, MISSION).items)
         if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
@@ -263,13 +267,16 @@ class Plans:
         count = len(stored.items)
         if task is not None and isinstance(task.goal, Plan):
             count = len(task.goal.steps)
-        at = self._first.get(system_id, 0)
-        if task is not None and task.progress.step >= 0:
+        chosen, state = self._first.get(system_id), _mission_state(task, has_plan=bool(count))
+        at = chosen or 0
+        if chosen is not None and task is not None and task.state in TERMINAL:
+            state = NOT_STARTED  # over, and to begin again with another item
+        elif task is not None and task.progress.step >= 0:
             at = min(task.progress.step, max(count - 1, 0))
         return m.MissionCurrent(
             at if seq is None else seq,
             count,
-            _mission_state(task, has_plan=bool(count)),
+            state,
             0,
             stored.plan_id if task is None else task.id,
             self.stored(system_id, MavMissionType.FENCE).plan_id,
@@ -292,6 +299,11 @@ def waits_for_start(task: Task) -> bool:
     return task.state in WAITING and task.terms.is_staged
 
 
+def begins_with(seq: int) -> str:
+    """Return what a client is told that has chosen an item of a mission that does not run."""
+    return f"Mission begins with item {seq} when started"
+
+
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:
     """Give the MISSION_STATE."""
     if not has_plan:
@@ -304,4 +316,4 @@ def _mission_state(task: Task | None, *, has_plan: bool) -> int:
         case S.COMPLETED:
             return 5  # COMPLETE
         case _:
-            return 2  # NOT_STARTED
+            return NOT_STARTED

@@ -599,3 +599,25 @@ def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
     world.run(5)
     words = "Rover 1 carries 2 mission items of its own: see its mission mode"
     assert world.client.texts().count(words) == 1
+
+
+@pytest.mark.parametrize("by_command", [True, False])
+def test_an_item_chosen_of_a_finished_plan_stays_shown_and_begins_the_next_start(
+    world: World, by_command: bool
+) -> None:
+    uploaded(world)
+    start(world)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(3)
+    world.client.received.clear()
+    if by_command:
+        world.client.command(SET_CURRENT, 2, target=(1, 1))
+    else:
+        world.client.send(set_current(2))
+    world.run(3)
+    shown = {(each.seq, each.state) for each in currents(world.client)}
+    assert shown == {(2, NOT_STARTED)}
+    assert world.client.texts() == ["Mission begins with item 2 when started"]
+    assert start(world) == (ACCEPTED, 2)
+    world.until_state(2, S.COMPLETED, within=60)
+    assert set(reached(world.client)) == {2, 3}, "item 1 is left out"
