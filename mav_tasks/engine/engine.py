@@ -40,6 +40,7 @@ from mav_tasks.engine.plans import Plans
 from mav_tasks.engine.publisher import Publisher
 from mav_tasks.engine.refusals import Refusals
 from mav_tasks.engine.request_limit import RequestLimit
+from mav_tasks.engine.restart_watch import RestartWatch
 from mav_tasks.engine.rights import OPERATOR
 from mav_tasks.engine.setup_signing import SetupSigning
 from mav_tasks.engine.signatures import Signatures
@@ -140,6 +141,7 @@ class Engine:
         self._requests = RequestLimit(self._vehicles, refusals)
         self._broadcasts = Broadcasts(self._vehicles, packer)
         self._operator = OperatorWatch()
+        self._restarts = RestartWatch()
         self._setup = SetupSigning(self.signatures, self._vehicles, settings)
         self._stop_by: float | None = None
         self._stopped = False
@@ -280,6 +282,8 @@ class Engine:
                 continue
             vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
             if vehicle is not None:
+                if self._restarts.begins_anew(packet, now=now):
+                    self._gcs.continue_numbers(packet)
                 if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
                     self._publisher.withhold(packet)
                 else:

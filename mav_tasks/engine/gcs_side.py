@@ -181,6 +181,11 @@ class GcsSide:
             else:
                 client.outlet.withhold(packet.source)
 
+    def continue_numbers(self, packet: Packet) -> None:
+        """Let this packet follow on the last one of its source towards every client."""
+        for client in self._clients.values():
+            client.outlet.continue_numbers(packet)
+
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT to every client."""
         for client in self._clients.values():

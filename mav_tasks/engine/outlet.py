@@ -57,6 +57,10 @@ class Outlet:
         """Note that a packet of the source is not passed on, so that no gap shows."""
         self._sequence.withheld(source)
 
+    def continue_numbers(self, packet: Packet) -> None:
+        """Note that a packet's source counts from 0 again: what was sent goes on with it."""
+        self._sequence.continued(packet.source, packet.seq)
+
     def _put(self, raw: bytes, *, first: bool = False, until: float = inf) -> None:
         if self._signatures is not None:
             raw = self._signatures.sealed(self.link, self.peer, raw)

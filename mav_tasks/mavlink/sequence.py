@@ -24,6 +24,11 @@ class SequenceKeeper:
             self._next[source] = (number + 1) & 0xFF
         return number
 
+    def continued(self, source: Address, seq: int) -> None:
+        """Note that a source begins anew with ``seq``: that packet follows on the last one."""
+        if source in self._next:
+            self._offset[source] = (self._next[source] - seq) & 0xFF
+
     def withheld(self, source: Address) -> None:
         """Note that a packet of the source is not passed on."""
         if source in self._offset or len(self._offset) < MOST:
