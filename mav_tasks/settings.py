@@ -21,6 +21,8 @@ DEFAULT_TURNING_RADIUS = 1.5
 
 #: who may arm a vehicle
 ARMING = ("auto", "server", "operator")
+#: the command that makes a rover stand when its setpoints stop, as refusals name it
+SET_FAILSAFE = "mav-tasks probe --set-failsafe"
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +202,9 @@ class Settings:
     #: whether PX4 and generic rovers turn at a yaw rate: "honoured", or "ignored"; then they are
     #: steered by course, and neither turn on the spot nor reverse
     yaw_rate: str = "ignored"
+    #: a rover that is known not to stand when setpoints stop: it "must_stand" first, and its tasks
+    #: wait, or they are driven all the same, "accept"
+    loss_failsafe: str = "must_stand"
     #: whether standard commands and modes addressed to the autopilot become tasks, too
     claim: bool = True
     #: what a "go to" that changes the mode does: "queue", or run at once, "now"

@@ -78,7 +78,8 @@ class KnownProfile:
 
     def _words(self) -> str:
         if self.chosen is not None:
-            return f"profile of {self.chosen.probed[:10]} is used"
+            words = f"profile of {self.chosen.probed[:10]} is used"
+            return f"{words}: it does not stop by itself" if self.why_drives_on else words
         if self._identity is None or not self._profiles:
             return ""
         latest = max(self._profiles, key=lambda each: each.probed)

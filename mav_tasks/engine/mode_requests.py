@@ -130,7 +130,7 @@ class ModeRequests:
             self._mark(vehicle, client, submitter, now=now)
         else:
             self._plans.check_start(client.rights, vehicle, submitter)
-            self._submissions.check_new(vehicle)
+            self._submissions.check_open()
             vehicle.end_driving_of(client.key, now=now)
             self._start_unasked(vehicle, submitter, client.rights, now=now)
 
@@ -140,7 +140,7 @@ class ModeRequests:
         """Start or continue the uploaded mission; one that is over is another task."""
         vehicle, submitter = asked.vehicle, asked.submitter
         self._plans.check_start(asked.rights, vehicle, submitter)
-        self._submissions.check_new(vehicle)
+        self._submissions.check_open()
         vehicle.end_driving_of(asked.client.key, now=now)
         started = self._plans.start(vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
@@ -180,7 +180,7 @@ class ModeRequests:
     def _start_unasked(
         self, vehicle: Vehicle, submitter: Submitter, rights: Rights, *, now: float
     ) -> None:
-        self._submissions.check_new(vehicle)
+        self._submissions.check_open()
         started = self._plans.start(vehicle, submitter, first=0, now=now)
         if isinstance(started, Draft):
             allowed = rights.checked(started, waiting=vehicle.tasks.count_of(submitter))

@@ -98,7 +98,7 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
-        self.check_new(vehicle)
+        self.check_open()
         draft = _allowed(asked.client, vehicle, draft)
         if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven
             vehicle.end_driving_of(asked.client.key, now=now)
@@ -121,7 +121,7 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
-        self.check_new(asked.vehicle)
+        self.check_open()
         asked.rights.require(OPERATOR, "interrupt what a rover does")
         draft = _allowed(asked.client, asked.vehicle, draft)
         task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
@@ -136,7 +136,7 @@ class Submissions:
             draft, confirmation=0, origin=vehicle.where.origin, now=now
         )
         if known is None:
-            self.check_new(vehicle)
+            self.check_open()
             client.rights.require(OPERATOR, "interrupt what a rover does")
             draft = _allowed(client, vehicle, draft)
             task = vehicle.run_now(draft, actor=actor, now=now)
@@ -144,7 +144,7 @@ class Submissions:
 
     def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
         """Take in a task that a command means without naming it; Rejection says why not."""
-        self.check_new(asked.vehicle)
+        self.check_open()
         draft = _allowed(asked.client, asked.vehicle, draft)
         task = asked.vehicle.tasks.submit(draft, now=now)
         self._await_commit(asked, task, now=now)
@@ -164,7 +164,7 @@ class Submissions:
 
     def submit_plan(self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
         """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
-        self.check_new(vehicle)
+        self.check_open()
         draft = _allowed(client, vehicle, draft)
         task = vehicle.tasks.submit(draft, now=now)
         self._recollection.remember(task, at=now, now=now)
@@ -210,13 +210,6 @@ class Submissions:
             raise Rejection(R.BAD_PARAMETER, words)
         if not vehicle.where.is_within_fence(goal):
             raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
-
-    def check_new(self, vehicle: Vehicle) -> None:
-        """Raise Rejection while no new task is taken in for a vehicle."""
-        self.check_open()
-        why = vehicle.why_drives_on
-        if why:
-            raise Rejection(R.NOT_ALLOWED, f"the rover would drive on without setpoints: {why}")
 
     def check_open(self) -> None:
         """Raise Rejection while nothing new is taken in."""

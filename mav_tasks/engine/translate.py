@@ -9,6 +9,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.services.command_receiver import Command
+from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     SERVER,
@@ -46,6 +47,7 @@ RESULT_OF: dict[int, MavResult] = {
     R.WRONG_MODE: MavResult.TEMPORARILY_REJECTED,
     R.NO_POSITION: MavResult.TEMPORARILY_REJECTED,
     R.DISARMED: MavResult.TEMPORARILY_REJECTED,
+    R.LOSS_FAILSAFE: MavResult.TEMPORARILY_REJECTED,
     R.VEHICLE_SILENT: MavResult.FAILED,
 }
 
@@ -57,6 +59,7 @@ WAITS_FOR = {
     R.NO_POSITION: "no position",
     R.DISARMED: "disarmed; arm, or continue",
     R.NOT_READY: "the rover is not ready to arm",
+    R.LOSS_FAILSAFE: f"it would not stand without us; {SET_FAILSAFE}",
 }
 
 #: why a task or a queue does not go on: as somebody has asked, or nothing that needs a hand

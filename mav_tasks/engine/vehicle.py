@@ -33,7 +33,7 @@ from mav_tasks.services.identity import identity_of
 from mav_tasks.services.offboard import Phase, Refused
 from mav_tasks.services.orders import Speeds
 from mav_tasks.services.persona import Persona
-from mav_tasks.settings import Settings
+from mav_tasks.settings import SET_FAILSAFE, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.guidance import ZERO, Velocity
@@ -156,9 +156,12 @@ class Vehicle:
         return self._monitor.custom_mode in self.persona.manual_modes
 
     @property
-    def why_drives_on(self) -> str:
-        """Why it would go on without setpoints, in words; "": it stops, or that is not known."""
-        return self.requests.loss_failsafe.why_off or self.known.why_drives_on
+    def may_drive_on(self) -> bool:
+        """Whether it might not stand without setpoints, though it must; unsaid, it is believed."""
+        if self._settings.loss_failsafe != "must_stand":
+            return False
+        failsafe = self.requests.loss_failsafe
+        return bool(failsafe.awaits_answer or failsafe.why_off or self.known.why_drives_on)
 
     @property
     def heard_at(self) -> float:
@@ -266,10 +269,13 @@ class Vehicle:
     def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
         self.requests.loss_failsafe.receive(message)
         self._note_failsafe(now=now)
+        self.wake(now=now)
 
     def _note_failsafe(self, *, now: float) -> None:
         failsafe = self.requests.loss_failsafe
         news = failsafe.take_news()
+        if news and failsafe.why_off:
+            news = f"{news}. To make it stand: {SET_FAILSAFE}"
         if news and (failsafe.is_unknown or failsafe.why_off):
             self._note(news, now=now)
         elif news:
@@ -942,7 +948,7 @@ class Vehicle:
             turning=self.persona.turning,
             turning_radius=self.persona.turning_radius or self._settings.driving.turning_radius,
             is_unknown=self.tasks.has_uid and not self.requests.is_identified,
-            drives_on=bool(self.why_drives_on),
+            drives_on=self.may_drive_on,
         )
 
     def apply(self, settings: Settings) -> None:

@@ -248,6 +248,11 @@ _RULES = (
         live=False,
     ),
     _key(
+        "rules.loss_failsafe",
+        Choice(("must_stand", "accept")),
+        "whether a rover is driven that would move by itself when setpoints stop",
+    ),
+    _key(
         "rules.claim",
         Flag(),
         "whether standard commands and modes to the autopilot become tasks, too",

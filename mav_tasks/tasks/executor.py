@@ -236,7 +236,7 @@ class Executor:
             self._finish(S.FAILED, seen.refusal, actor=SERVER, now=now)
             return view.HOLD
         if seen.drives_on:
-            self._finish(S.FAILED, R.NOT_ALLOWED, actor=SERVER, now=now)
+            self._finish(S.FAILED, R.LOSS_FAILSAFE, actor=SERVER, now=now)
             return view.HOLD
         if not seen.in_control:
             if now - self._taking_since > self._settings.watch.start_timeout:

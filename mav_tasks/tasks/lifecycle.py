@@ -58,6 +58,7 @@ class TaskReason(IntEnum):
     HELD_AHEAD = 11
     RESTARTED = 12
     NOT_READY = 13
+    LOSS_FAILSAFE = 14
     # paused
     OPERATOR = 30
     PREEMPTED = 31

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from mav_tasks.errors import Rejection
-from mav_tasks.settings import Driving, Settings
+from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
@@ -534,12 +534,12 @@ class VehicleTasks:
 
     def _check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
+        if blocker is R.LOSS_FAILSAFE:
+            words = f"cannot go on: it would not stand without us, {SET_FAILSAFE}"
+            raise Rejection(blocker, words)
         if blocker:
             way_on = "; continue, or arm it" if blocker is R.DISARMED else ""
             raise Rejection(blocker, f"cannot go on: {words_of(blocker)}{way_on}")
-        if seen.drives_on:
-            words = "cannot go on: the rover would drive on without setpoints"
-            raise Rejection(R.NOT_ALLOWED, words)
 
     def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
         if self._is_of_another_frame(task, seen):

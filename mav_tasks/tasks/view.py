@@ -46,7 +46,7 @@ class VehicleView:
     is_not_ready: bool = False  # the refusal is of arming, and may be another one later
     why_not_ready: str = ""  # in the vehicle's own words, as far as it has said lately
     is_booting: bool = False  # it shows that it is, and takes no mode yet
-    drives_on: bool = False  # it is known not to stop by itself when nothing is asked of it
+    drives_on: bool = False  # it is not known to stand when nothing is asked of it, and must
 
     @property
     def origin(self) -> GlobalPlace | None:

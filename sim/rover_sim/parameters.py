@@ -71,6 +71,9 @@ class Parameters:
     def __repr__(self) -> str:
         return f"Parameters({len(self._listed)})"
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._values
+
     def __getitem__(self, name: str) -> float:
         return self._values[name]
 

@@ -196,6 +196,9 @@ def stand(
     serve = ["-m", *module, "serve"]
     serve += ["--client", f"udpin:127.0.0.1:{client_port}{client_options}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]
+    # a PX4 rover drives home by itself when setpoints stop: tests that are about that say so
+    if not any("loss_failsafe" in option for option in serve_options):
+        serve += ["--set", "rules.loss_failsafe=accept"]
     serve += ["--store", serve_store, *serve_options]
     with (
         process(*rover, folder=folder, name="rover") as rover_process,

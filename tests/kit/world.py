@@ -34,6 +34,7 @@ from tests.kit.store import LateStore
 E = TypeVar("E")
 
 LOOK = 0.02  # s of virtual time between two looks at what a test waits for
+PX4_HOLD = 5  # of COM_OBL_RC_ACT
 STANDS = 0.01  # m/s and rad/s
 COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
 
@@ -117,6 +118,10 @@ class World(VirtualWorld):
                 unix_offset=wall_offset or 0.0,
                 key=rover_key,
             )
+            if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
+                # by default a PX4 rover drives home when setpoints stop, and is not driven at all;
+                # tests that are about that set it back
+                vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
             link = self.net.link(f"rover{number}")
             ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
             observer = self.watched.observers[link.name] = Observer(

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import nan, remainder, tau
+from struct import pack, unpack
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -13,7 +14,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim import offboard, steering
 from rover_sim.estimate import Estimate
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
-from tests.kit.client import ACCEPTED, DENIED
+from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
 from tests.kit.world import MODE_COMMAND, World, at, is_at, near_pose
@@ -22,6 +23,7 @@ from tests.scenarios.conftest import MakeWorld
 MOVE, ROTATE, DRIVE = 54000, 54001, 54002
 WAYPOINT, YAW, YAW_SPEED, START = 16, 115, 213, 300
 NO_PLACE = 0x7FFFFFFF
+PARAM_VALUE = 22
 
 ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
 
@@ -251,42 +253,78 @@ class TestPausing:
         assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
-class TestOneThatWouldDriveOnWithoutUs:
-    """Its offboard-loss failsafe is off: nobody could stop it if the server went away."""
+class TestOneThatWouldDriveByItselfWithoutUs:
+    """By its offboard-loss failsafe: nobody could stop it if the server went away."""
 
-    def make(self, make_world: MakeWorld) -> World:
-        world = make_world(persona=PROMPT_PX4)
-        world.client.send(
-            common.MAVLink_param_set_message(1, 1, b"COM_OF_LOSS_T", 60.0, 9)  # REAL32
-        )
+    def make(self, make_world: MakeWorld, settings: Settings | None = None) -> World:
+        world = make_world(persona=PROMPT_PX4, settings=settings)
+        world.client.send(set_action(3))
         world.run(0.2)
-        assert any("would drive on without setpoints" in t for t in world.client.texts())
         return world
 
-    def test_is_given_no_task(self, make_world: MakeWorld) -> None:
+    def test_it_is_told_with_the_command_that_cures_it(self, make_world: MakeWorld) -> None:
+        world = self.make(make_world)
+        said = " ".join(world.client.texts())
+        assert "COM_OBL_RC_ACT is 3: Return, it drives home by itself" in said
+        assert "To make it stand: mav-tasks probe --set-failsafe" in said
+
+    def test_its_tasks_wait_and_say_why(self, make_world: MakeWorld) -> None:
         world = self.make(make_world)
         sent = world.client.move(1)
-        world.run(0.1)
-        assert sent.answer == (DENIED, R.NOT_ALLOWED)
-        assert any("COM_OF_LOSS_T is 60 s" in text for text in world.client.texts())
-        upload = Upload(world.client, [Item(WAYPOINT, **at(1, 0))])
-        world.until(lambda: upload.result is not None, within=5)
-        assert upload.result == 14  # DENIED
-
-    def test_begins_none_that_waits(self, make_world: MakeWorld) -> None:
-        world = make_world(persona=PROMPT_PX4)
-        world.client.command(MOVE, 1.0, 0, 0, 0, 0, 2.0, 5)  # in two seconds
-        world.run(0.5)
-        world.rover.autopilot.parameters["COM_OF_LOSS_T"] = 60.0
-        world.client.send(common.MAVLink_param_request_read_message(1, 1, b"COM_OF_LOSS_T", -1))
-        world.until(lambda: world.state(1)[0] is S.FAILED, within=5)
-        assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
+        world.run(5)
+        assert sent.answer == (ACCEPTED, 1)
+        assert world.state(1) == (S.QUEUED, R.NONE)
+        assert why(world) == R.LOSS_FAILSAFE
+        assert any("waits: it would not stand without us" in t for t in world.client.texts())
         assert not world.rover.autopilot.armed
 
-    def test_is_driven_again_when_it_is_mended(self, make_world: MakeWorld) -> None:
+    def test_what_is_to_run_at_once_is_refused(self, make_world: MakeWorld) -> None:
+        world = self.make(make_world, Settings(guided="now"))
+        sent = world.client.command_int(
+            REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=6, target=(1, 1)
+        )
+        world.run(0.5)
+        assert sent.answer == (TEMPORARILY_REJECTED, R.LOSS_FAILSAFE)
+        assert any("mav-tasks probe --set-failsafe" in text for text in world.client.texts())
+
+    def test_is_driven_when_it_is_mended(self, make_world: MakeWorld) -> None:
         world = self.make(make_world)
-        world.client.send(common.MAVLink_param_set_message(1, 1, b"COM_OF_LOSS_T", 1.0, 9))
-        world.run(0.2)
+        world.client.move(1)
+        world.run(1)
+        world.client.send(set_action(5))
+        world.until_idle(tasks=1)
+        assert world.state(1)[0] is S.COMPLETED
+
+    def test_is_driven_all_the_same_where_that_is_accepted(self, make_world: MakeWorld) -> None:
+        world = self.make(make_world, Settings(loss_failsafe="accept"))
         world.client.move(1)
         world.until_idle(tasks=1)
         assert world.state(1)[0] is S.COMPLETED
+
+    def test_one_that_never_says_what_it_does_is_driven_after_it_was_asked_for_a_while(
+        self, make_world: MakeWorld
+    ) -> None:
+        world = make_world(persona=PROMPT_PX4)
+        world.rover.autopilot.reboot(now=world.now)
+        world.watched.loses = lambda source, target, data: (
+            source == "rover1" and data[7] == PARAM_VALUE
+        )
+        world.run(5)
+        world.client.move(1)
+        world.run(1)
+        assert why(world) == R.LOSS_FAILSAFE
+        world.until_idle(tasks=1)
+        assert world.state(1)[0] is S.COMPLETED
+
+
+def why(world: World) -> int:
+    """Why the first task waits, as clients are told."""
+    world.client.request_status(1)
+    world.run(0.1)
+    return world.client.statuses(1)[-1].reason
+
+
+def set_action(action: int) -> common.MAVLink_param_set_message:
+    """COM_OBL_RC_ACT as clients of a PX4 set it: an INT32 by its bytes."""
+    (wire,) = unpack("<f", pack("<i", action))
+    return common.MAVLink_param_set_message(1, 1, b"COM_OBL_RC_ACT", wire, 6)

@@ -153,5 +153,5 @@ def test_a_task_is_not_continued_while_the_failsafe_is_off(make_world: MakeWorld
     sent = world.client.proceed()
     world.run(0.5)
     assert sent.answer is not None
-    assert sent.answer[1] == R.NOT_ALLOWED
+    assert sent.answer[1] == R.LOSS_FAILSAFE
     assert world.state(1) == (S.PAUSED, R.OPERATOR)

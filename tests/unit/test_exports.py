@@ -109,6 +109,7 @@ def test_every_setting_is_known_by_name() -> None:
             "retention",
             "arming",
             "yaw_rate",
+            "loss_failsafe",
             "claim",
             "guided",
             "operator_lost",

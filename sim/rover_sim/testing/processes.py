@@ -95,7 +95,16 @@ class RealTime:
         port = _free_udp_port()
         links = ["--client", f"udpin:127.0.0.1:{port}", "--no-push", "--vehicle", rover_url]
         server = self._start(
-            "mav_tasks.cli", "serve", "--config", "", *links, "--store", ":memory:"
+            "mav_tasks.cli",
+            "serve",
+            "--config",
+            "",
+            *links,
+            "--store",
+            ":memory:",
+            # a PX4 rover would have to be told first to stand when setpoints stop
+            "--set",
+            "rules.loss_failsafe=accept",
         )
         for number in range(1, self._options.count + 1):
             server.wait_for(rf"vehicle {number}: found")

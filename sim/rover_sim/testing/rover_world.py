@@ -159,6 +159,9 @@ class RoverWorld:
         self._bodies.append(body)
         persona = PERSONAS[self.options.persona]
         vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona)
+        if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
+            # Hold: by default a PX4 rover drives home when setpoints stop, and no task is driven
+            vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
         self._world.join(RoverParty(vehicle, self._net.link(_name_of(number))))
         return SimulatedRover(vehicle, body, persona=persona, clock=lambda: self.now)
 
