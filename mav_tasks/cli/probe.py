@@ -11,10 +11,18 @@ if TYPE_CHECKING:
     from mav_tasks.probe.probe import Probe
 
 Url = Annotated[
-    str,
+    str | None,
     typer.Argument(
         metavar="URL",
         help="Of the rover itself: udpout:host:port, udpin:…, tcp:…, serial:/dev/ttyUSB0:57600.",
+    ),
+]
+SetFailsafe = Annotated[
+    bool,
+    typer.Option(
+        "--set-failsafe",
+        help="Set its parameters so that it stands when setpoints stop, and do nothing else. "
+        "URL may be that of a task server; default: the one on this machine.",
     ),
 ]
 DriveFlag = Annotated[
@@ -66,7 +74,8 @@ SIGNALLED = 128  # as a shell reports a signal
 
 @command
 async def probe(
-    url: Url,
+    url: Url = None,
+    set_failsafe: SetFailsafe = False,
     drive: DriveFlag = False,
     yes: Yes = False,
     speed: Speed = 0.3,
@@ -80,23 +89,41 @@ async def probe(
 ) -> None:
     """Find out what a rover can do, directly, with no server between.
 
-    It changes nothing for good and moves nothing, unless --drive is said.
+    It changes nothing for good and moves nothing, unless --set-failsafe or --drive is said.
     """
+    from mav_tasks.cli.options import DEFAULT_SERVER  # noqa: PLC0415
     from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415
     from mav_tasks.errors import NoAnswer, UsageError  # noqa: PLC0415
+    from mav_tasks.probe.failsafe import NotSet  # noqa: PLC0415
     from mav_tasks.probe.probe import NothingHeard, Occupied, Options  # noqa: PLC0415
     from mav_tasks.probing import run_probe  # noqa: PLC0415
 
+    if set_failsafe and drive:
+        raise UsageError("--set-failsafe and --drive: one after the other")
+    if url is None and not set_failsafe:
+        raise UsageError("say where the rover is: mav-tasks probe URL")
     if drive and not yes:
         _confirm(speed)
     key = key_to_sign_with(sign, keys) if sign else None
-    options = Options(drive=drive, speed=speed, system_id=vehicle, find_within=find_within)
-    done, signal = await run_probe(url, options, insecure=insecure, key=key, on_stage=_say)
+    options = Options(
+        drive=drive,
+        set_failsafe=set_failsafe,
+        speed=speed,
+        system_id=vehicle,
+        find_within=find_within,
+    )
+    where = url or DEFAULT_SERVER
+    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=_say)
     if isinstance(done.error, NothingHeard):
         raise NoAnswer(str(done.error))
     if isinstance(done.error, Occupied):
         raise UsageError(str(done.error))
-    _show(done, output, as_json=as_json)
+    if isinstance(done.error, NotSet):
+        raise UsageError(str(done.error))
+    if set_failsafe:
+        _show_failsafe(done, as_json=as_json)
+    else:
+        _show(done, output, as_json=as_json)
     if signal:
         raise typer.Exit(SIGNALLED + signal)
     if done.findings.drive is not None and done.findings.drive.ended:
@@ -112,6 +139,18 @@ def _confirm(speed: float) -> None:
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() != "yes":
         raise UsageError("not driven: the answer was not yes")
+
+
+def _show_failsafe(done: "Probe", *, as_json: bool) -> None:
+    """Print what was set, and what the rover does now."""
+    from mav_tasks.cli import output as out  # noqa: PLC0415
+    from mav_tasks.probe.report import as_json as values_of  # noqa: PLC0415
+
+    found = done.findings
+    if as_json:
+        out.say_json(values_of(found))
+    else:
+        out.say(f"rover {found.system_id}: {found.failsafe_set}; {found.loss_by_parameters}")
 
 
 def _show(done: "Probe", output: str | None, *, as_json: bool) -> None:

@@ -214,7 +214,7 @@ class Conversation:
             case m.Attitude() | m.LocalPositionNed():
                 self.motion.receive(message, now=self.now)
             case m.ParamValue():
-                self.parameters.setdefault(name_of(message), message)
+                self.parameters[name_of(message)] = message
             case m.MessageInterval():
                 self.intervals[message.message_id] = message.interval_us
             case m.Statustext():

@@ -58,6 +58,7 @@ class Findings:
     missing_parameters: list[str] = field(default_factory=list)
     #: what it does by its parameters, or by its make, when setpoints stop
     loss_by_parameters: str = ""
+    failsafe_set: str = ""  # what was set for good so that it stands; "": nobody asked for that
     mission_items: int | None = None  # on board, home not counted
     prearm: str = ""  # "ok", "not ok", or "" where it does not say
     prearm_texts: list[str] = field(default_factory=list)

@@ -25,7 +25,8 @@ ARDUPILOT = (
 )
 PX4 = (
     *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_IN_MODE", "COM_RC_LOSS_T", "COM_DL_LOSS_T"),
-    *("NAV_RCL_ACT", "NAV_DLL_ACT", "COM_FAIL_ACT_T", "COM_DISARM_PRFLT", "RD_MAX_SPEED"),
+    *("NAV_RCL_ACT", "COM_RCL_EXCEPT", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
+    *("COM_DISARM_PRFLT", "RO_SPEED_LIM"),
 )
 BY_PERSONA: Mapping[str, tuple[str, ...]] = {"ardupilot": ARDUPILOT, "px4": PX4, "generic": PX4}
 #: what an ArduPilot Rover does, whatever its parameters say
@@ -78,9 +79,7 @@ def _loss_of(talk: Conversation) -> str:
     if not persona.has_loss_failsafe:
         return FIXED
     failsafe = loss_failsafe_of(talk)
-    if AFTER not in talk.parameters:
-        return "does not say whether it stops when setpoints stop"
-    return failsafe.take_news() or "stops when setpoints stop"
+    return failsafe.what_it_does or "does not say whether it stops when setpoints stop"
 
 
 def loss_time_of(findings: Findings) -> float:

@@ -6,20 +6,27 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.box import Box
 from mav_tasks.probe.conversation import Conversation
+from mav_tasks.probe.failsafe import NotSet, set_failsafe
 from mav_tasks.probe.findings import Drive, Findings
 from mav_tasks.probe.parameters import loss_failsafe_of, loss_time_of
-from mav_tasks.probe.questions import ask_everything, ask_rates, give_rates_back, listen
+from mav_tasks.probe.questions import (
+    ask_everything,
+    ask_rates,
+    give_rates_back,
+    identify,
+    listen,
+    meet,
+)
 from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
 from mav_tasks.probe.wheel import DriveEnded, Wheel, is_fresh
-from mav_tasks.services.loss_failsafe import ACTION
 from mav_tasks.services.offboard import Phase
 from mav_tasks.settings import Identity, Watch
 from mav_tasks.tasks.guidance import Motion
 
 FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven
 DRIVEN_TYPES = frozenset({10, 11})  # MAV_TYPE: ground rover, surface boat
-RETURNS = 3  # COM_OBL_RC_ACT: the return mode
+SETTER = Address(244, 191)  # beside the address of scripts
 NEEDED = ("LOCAL_POSITION_NED", "ATTITUDE")
 
 
@@ -40,6 +47,7 @@ class Options:
     """What a probe may do."""
 
     drive: bool = False
+    set_failsafe: bool = False  # and nothing else
     speed: float = 0.3  # m/s
     system_id: int | None = None  # None: the first rover that is heard
     find_within: float = 10.0  # s
@@ -51,6 +59,8 @@ class Probe:
     def __init__(self, options: Options, *, now: float, watch: Watch | None = None) -> None:
         identity = Identity()
         source = Address(identity.system_id, identity.component_id)
+        if options.set_failsafe:  # also through a server, which has that address itself
+            source = SETTER
         self.findings = Findings()
         self.talk = Conversation(
             source, system_id=options.system_id, watch=watch or Watch(), now=now
@@ -108,23 +118,38 @@ class Probe:
 
     def _run(self) -> Steps[None]:
         try:
+            yield from self._find()
+            if self._options.set_failsafe:
+                yield from self._set_failsafe()
+                return
             yield from self._look()
             if self._options.drive:
                 yield from self._drive()
-        except (NothingHeard, Occupied, Interrupted) as error:
+        except (NothingHeard, Occupied, Interrupted, NotSet) as error:
             self.error = error
         self._is_clearing_up = True
         if self._has_rates:
             yield from give_rates_back(self.talk, self.findings)
 
-    def _look(self) -> Steps[None]:
-        talk, findings = self.talk, self.findings
-        within = self._options.find_within
+    def _find(self) -> Steps[None]:
+        talk, within = self.talk, self._options.find_within
         yield Wait(lambda: talk.rover is not None, within)
         if talk.rover is None:
             which = self._options.system_id
             who = "a rover" if which is None else f"rover {which}"
             raise NothingHeard(f"no heartbeat of {who} within {within:g} s")
+
+    def _set_failsafe(self) -> Steps[None]:
+        """It may be asked through a task server, and while somebody drives: nothing moves by it."""
+        talk, findings = self.talk, self.findings
+        self.stage = f"looking at the loss failsafe of rover {talk.target.system_id}"
+        meet(talk, findings)
+        findings.is_rover = findings.vehicle_type in DRIVEN_TYPES
+        yield from identify(talk, findings)
+        yield from set_failsafe(talk, findings)
+
+    def _look(self) -> Steps[None]:
+        talk, findings = self.talk, self.findings
         self.stage = f"listening to rover {talk.target.system_id}, and asking it"
         yield from listen(talk, findings)
         findings.is_rover = findings.vehicle_type in DRIVEN_TYPES
@@ -170,12 +195,8 @@ class Probe:
     def _may_try_loss(self, drive: Drive) -> bool:
         """Whether it is seen what it does without setpoints; not if it would drive far for it."""
         failsafe = loss_failsafe_of(self.talk)
-        action = self.findings.parameters.get(ACTION)
-        if failsafe.why_off:
-            drive.loss_stop = "no"
+        if failsafe.why_off:  # the server reads that itself: no profile is to outlive its cure
             drive.loss_note = f"not tried: {failsafe.why_off}"
-        elif action == RETURNS:
-            drive.loss_note = f"not tried: {ACTION} is {action:g}, it would drive home"
         return not drive.loss_note
 
     def _why_not_drive(self) -> str:

@@ -26,14 +26,20 @@ RATES: Mapping[str, int] = {
 }
 
 
-def listen(talk: Conversation, findings: Findings) -> Steps[None]:
-    """Count what comes by itself, and notice who else is there."""
+def meet(talk: Conversation, findings: Findings) -> None:
+    """Note what its heartbeat says of it."""
     findings.system_id = talk.target.system_id
     assert talk.monitor is not None
     heartbeat = talk.monitor.latest
     talk.persona = persona_of(heartbeat)
     findings.autopilot = "" if talk.persona is None else talk.persona.name
     findings.vehicle_type = heartbeat.type
+
+
+def listen(talk: Conversation, findings: Findings) -> Steps[None]:
+    """Count what comes by itself, and notice who else is there."""
+    meet(talk, findings)
+    assert talk.monitor is not None
     talk.counts.clear()
     first_at = talk.monitor.heard_at
     yield pause(LISTEN)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mav_tasks.mavlink.enums import MavResult, MavType
 from mav_tasks.probe.findings import Drive, Findings, Rate
-from mav_tasks.settings import Identity
+from mav_tasks.settings import SET_FAILSAFE, Identity
 
 NOT_TRIED = "not tried: that needs --drive"
 UNKNOWN = "not known"
@@ -79,17 +79,21 @@ def _lines(findings: Findings) -> Iterator[Line]:
         yield Line("rates given back", words, Mark.WARNING if is_bad else Mark.PLAIN)
     yield from _arming(findings)
     yield from _mission(findings)
-    stops = findings.loss_by_parameters.startswith("stops")
-    yield Line(
-        "without setpoints",
-        findings.loss_by_parameters or UNKNOWN,
-        Mark.GOOD if stops else Mark.WARNING,
-    )
+    yield _without_setpoints(findings.loss_by_parameters)
+    if findings.failsafe_set:
+        yield Line("loss failsafe", findings.failsafe_set, Mark.GOOD)
     for name, value in findings.parameters.items():
         yield _parameter(name, value, findings)
     if findings.missing_parameters:
         yield Line("not there", ", ".join(findings.missing_parameters))
     yield from _drive(findings.drive)
+
+
+def _without_setpoints(said: str) -> Line:
+    if said.startswith("would"):
+        return Line("without setpoints", f"{said}. To make it stand: {SET_FAILSAFE} URL", Mark.BAD)
+    mark = Mark.GOOD if said.startswith("stops") else Mark.WARNING
+    return Line("without setpoints", said or UNKNOWN, mark)
 
 
 def _parameter(name: str, value: float, findings: Findings) -> Line:

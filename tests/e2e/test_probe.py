@@ -22,11 +22,12 @@ from tests.kit.processes import (
     environment_with,
     free_udp_ports,
     process,
+    stand,
     submit,
     wait_until,
 )
 
-ROTATE, DENIED = 54001, 2
+MOVE, ROTATE, DENIED = 54000, 54001, 2
 OVER = 60  # s
 
 
@@ -93,6 +94,7 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
         serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{clients}"]
         serve += ["--push", f"127.0.0.1:{push}", "--store", ":memory:"]
         serve += ["--vehicle", f"udpout:127.0.0.1:{port}", "--set", f"vehicles.profiles={known}"]
+        serve += ["--set", "rules.loss_failsafe=accept"]
         with process(*serve, folder=tmp_path, name="server") as server:
             server.wait_for("vehicle 1: found")
             stand = Stand(server, server, clients, port, push, tmp_path / "truth.csv")
@@ -184,3 +186,18 @@ def test_a_rover_that_signs_is_probed_by_who_has_its_key(tmp_path: Path) -> None
     assert signed.returncode == 0, err
     assert json.loads(out)["autopilot"] == "ardupilot"
     assert unsigned.returncode == 3, nothing
+
+
+@pytest.mark.slow
+def test_a_px4_that_would_not_stand_is_driven_after_one_command_through_the_server(
+    tmp_path: Path,
+) -> None:
+    with stand(tmp_path, "--set", "rules.loss_failsafe=must_stand", persona="px4") as running:
+        client = running.connect()
+        submit(client, MOVE, 0.5)
+        running.server.wait_for("task 1 waits: loss failsafe")
+        url = f"udpout:127.0.0.1:{running.client_port}"
+        code, out, error = run("probe", url, "--set-failsafe", "--vehicle", "1")
+        assert code == 0, error
+        assert "COM_OBL_RC_ACT 0, now 5; stops when setpoints stop: Hold" in out
+        running.server.wait_for("task 1 completed")

@@ -15,7 +15,7 @@ from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode, Persona
 from rover_sim.vehicle import make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
-from tests.kit.world import kinematic_body
+from tests.kit.world import PX4_HOLD, kinematic_body
 
 BOOT = 5.0  # s before anybody asks: its estimate has settled
 OVER_WITHIN = 120.0  # s
@@ -63,14 +63,18 @@ class ProbeWorld(VirtualWorld):
         persona: Persona = ARDUPILOT,
         body: Callable[[Pose], Body] = kinematic_body,
         start: Pose = Pose(),  # noqa: B008  # frozen
+        options: Options | None = None,
     ) -> None:
         super().__init__(MemoryNet())
         self.start = start
         self.rover = make_vehicle(body(start), system_id=1, now=0.0, persona=persona)
+        if "COM_OBL_RC_ACT" in self.rover.autopilot.parameters:
+            # by default a PX4 rover drives home when setpoints stop: some tests set that back
+            self.rover.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
         self.join(RoverParty(self.rover, self.net.link("rover1")))
         self.run(BOOT)
         self._stranger = self.net.link("stranger")
-        options = Options(drive=drive, speed=speed)
+        options = options or Options(drive=drive, speed=speed)
         link = self.net.link("probe", peers=("rover1",))
         self.party = ProbeParty(link, options, now=self.now)
         self.farthest = 0.0

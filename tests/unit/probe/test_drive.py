@@ -232,9 +232,10 @@ class TestLoss:
         world = ProbeWorld(drive=True, persona=PX4)
         world.rover.autopilot.parameters["COM_OBL_RC_ACT"] = -1
         found = world.finish().findings
-        assert (world.driven.ended, world.driven.loss_stop) == ("", "no")
-        assert world.driven.loss_note == "not tried: COM_OBL_RC_ACT is -1"
-        line = next(each for each in lines_of(found) if each.topic == "setpoints stop")
+        assert (world.driven.ended, world.driven.loss_stop) == ("", "")
+        why = "COM_OBL_RC_ACT is -1: nothing, it drives on"
+        assert world.driven.loss_note == f"not tried: {why}"
+        line = next(each for each in lines_of(found) if each.topic == "without setpoints")
         assert line.mark is Mark.BAD
         times = [at for at, _ in world.setpoints()]
         assert max(later - earlier for earlier, later in pairwise(times)) < 0.2
@@ -243,7 +244,8 @@ class TestLoss:
         world = ProbeWorld(drive=True, persona=PX4)
         world.rover.autopilot.parameters["COM_OBL_RC_ACT"] = 3
         world.finish()
-        assert world.driven.loss_note == "not tried: COM_OBL_RC_ACT is 3, it would drive home"
+        why = "COM_OBL_RC_ACT is 3: Return, it drives home by itself"
+        assert world.driven.loss_note == f"not tried: {why}"
         assert (world.driven.loss_stop, world.rests()) == ("", True)
 
     def test_one_that_drives_on_in_spite_of_what_it_says_is_stopped_and_found_out(
