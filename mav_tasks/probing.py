@@ -13,6 +13,7 @@ from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.policy import is_nearby, unsigned_beyond
+from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import parse_url
 from mav_tasks.links.way_out import TO_VEHICLES
 from mav_tasks.mavlink.packet import Packet, split_datagram
@@ -41,6 +42,8 @@ async def run_probe(
     if not (insecure or key is not None or is_nearby(parsed)):
         raise unsigned_beyond(f"link {parsed}")
     link = open_link(parsed, way=TO_VEHICLES)
+    if isinstance(link, UdpLink) and link.note:
+        on_stage(link.note)
     face = _Face(link, options, None if key is None else ClientSignatures(key), on_stage)
     try:
         await face.over

@@ -19,6 +19,7 @@ from mav_tasks.link_keys import check_keys, in_words
 from mav_tasks.links.asked import faults_of, links_of, pushing_url
 from mav_tasks.links.base import Link
 from mav_tasks.links.opening import open_link
+from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint
 from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES, WayOut
 from mav_tasks.logs.field_notes import FieldNotes
@@ -72,6 +73,9 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             signatures = in_words(link, has_ring=keys.keys is not None)
             waiting = "" if link.side == "clients" else ", waiting for the first heartbeat"
             _say(f"{link.side} on {link.url}{signatures}{waiting}")
+        for opened_link in vehicle_links:
+            if isinstance(opened_link, UdpLink) and opened_link.note:
+                _say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
             _say("nobody is spoken to unasked: none of the links for clients is UDP")
         _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")

@@ -1,11 +1,12 @@
 """From a link URL to a link."""
 
 from mav_tasks.links.base import Link
+from mav_tasks.links.local_port import port_for
 from mav_tasks.links.tcp_in import TcpInLink
 from mav_tasks.links.tcp_out import TcpOutLink
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, SerialUrl
-from mav_tasks.links.way_out import WayOut
+from mav_tasks.links.way_out import TO_VEHICLES, WayOut
 
 
 def open_link(
@@ -23,4 +24,7 @@ def open_link(
         return TcpInLink(url, way=way)
     if url.kind == "tcp":
         return TcpOutLink(url, way=way)
-    return UdpLink(url, push=push)
+    is_rover_dialled = url.kind == "udpout" and way is TO_VEHICLES
+    return UdpLink(
+        url, push=push, local_port=port_for(url.host, url.port) if is_rover_dialled else 0
+    )

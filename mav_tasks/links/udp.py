@@ -8,6 +8,7 @@ from mav_tasks.links.url import LinkUrl, is_loopback
 
 RECEIVE_BUFFER = 1 << 20  # bytes; a burst of telemetry waits here while the disk is slow
 MAX_DATAGRAM = 65536
+ANY = {socket.AF_INET: "0.0.0.0", socket.AF_INET6: "::"}
 LOOPBACK = {socket.AF_INET: "127.0.0.1", socket.AF_INET6: "::1"}
 
 
@@ -16,19 +17,25 @@ class UdpLink:
 
     is_stream = False
 
-    def __init__(self, url: LinkUrl, *, push: tuple[tuple[str, int], ...] = ()) -> None:
+    def __init__(
+        self, url: LinkUrl, *, push: tuple[tuple[str, int], ...] = (), local_port: int = 0
+    ) -> None:
+        """Open it; a link that dials does so from ``local_port`` if that is free, 0: from any.
+
+        LinkOpenError also where the URL itself names a local port, and that is taken.
+        """
         self.name = str(url)
+        #: what is otherwise than wished, in words for who opened it; "": nothing
+        self.note = ""
         self.lost = 0  # datagrams that the system did not take
         try:
             family, address = _resolve(url.host, url.port)
             pushed = tuple(_resolve(host, port)[1] for host, port in push)
             self.is_local = url.is_loopback and all(is_loopback(host) for host, _ in push)
-            bind_to: tuple[str, int] | None = None
             if url.kind == "udpin":
-                bind_to = address
-            elif self.is_local:  # else the system has it hear other machines, too
-                bind_to = (LOOPBACK[family], 0)
-            self._socket = _open(family, bind_to)
+                self._socket = _open(family, address)
+            else:
+                self._socket = self._dial(family, url, local_port)
         except OSError as error:
             reason = error.strerror or str(error)
             raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
@@ -37,6 +44,20 @@ class UdpLink:
 
     def __repr__(self) -> str:
         return f"UdpLink({self.name})"
+
+    def _dial(self, family: socket.AddressFamily, url: LinkUrl, preferred: int) -> socket.socket:
+        """Open it on this machine only, where that is enough: else it hears other machines, too."""
+        host = LOOPBACK[family] if self.is_local else ANY[family]
+        if url.local is not None:
+            return _open(family, (host, url.local))
+        try:
+            return _open(family, (host, preferred))
+        except OSError:
+            self.note = (
+                f"local port {preferred} is taken, another one is used: "
+                "a rover that answers its first sender only stays silent until it restarts"
+            )
+            return _open(family, (host, 0))
 
     def fileno(self) -> int:
         """Give the socket's descriptor."""
@@ -68,13 +89,12 @@ class UdpLink:
         self._socket.close()
 
 
-def _open(family: socket.AddressFamily, bind_to: tuple[str, int] | None) -> socket.socket:
+def _open(family: socket.AddressFamily, bind_to: tuple[str, int]) -> socket.socket:
     sock = socket.socket(family, socket.SOCK_DGRAM)
     try:
         sock.setblocking(False)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        if bind_to is not None:
-            sock.bind(bind_to)
+        sock.bind(bind_to)
     except OSError:
         sock.close()
         raise

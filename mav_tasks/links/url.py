@@ -1,7 +1,8 @@
 """Link URLs: ``udpin`` and ``tcpin`` listen, ``udpout`` and ``tcp`` dial, ``serial`` is a line.
 
 ``kind:host:port``, and ``serial:/dev/ttyUSB0:57600`` with the baud rate. Behind a question mark
-stands what is asked of signatures there: ``unsigned=allow`` or ``refuse``, and ``key=NAME``.
+stands what is asked of signatures there: ``unsigned=allow`` or ``refuse``, and ``key=NAME``; and
+for ``udpout`` from which local port it is dialled, ``local=PORT``.
 """
 
 import ipaddress
@@ -14,7 +15,7 @@ SERIAL = "serial"
 BAUD_RATES = range(1_200, 12_000_001)
 EXPECTED = "expected " + ", ".join(f"{kind}:host:port" for kind in KINDS)
 EXPECTED += f" or {SERIAL}:device:baud"
-OPTIONS = "unsigned=allow, unsigned=refuse and key=NAME"
+OPTIONS = "unsigned=allow, unsigned=refuse, key=NAME and local=PORT"
 UNSIGNED = {"allow": True, "refuse": False}
 
 
@@ -28,6 +29,8 @@ class LinkUrl:
     #: whether unsigned packets are taken, None: it does not say; it is the same link all the same
     unsigned: bool | None = field(default=None, compare=False)
     key: str = field(default="", compare=False)
+    #: the port from which it dials, None: it does not say
+    local: int | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
         return f"{self.kind}:{self.host}:{self.port}"
@@ -59,15 +62,17 @@ class SerialUrl:
 def parse_url(text: str) -> LinkUrl | SerialUrl:
     """Give the parts of a link URL; LinkUrlError says what is wrong with it."""
     where, _, options = text.partition("?")
-    unsigned, key = _parse_options(options, what=f"link {text!r}")
+    unsigned, key, local = _parse_options(options, what=f"link {text!r}")
     kind, _, rest = where.partition(":")
+    if local is not None and kind != "udpout":
+        raise LinkUrlError(f"link {text!r}: local: only udpout dials from a port of its own")
     if kind == SERIAL:
         device, baud = _parse_serial(rest, what=f"link {text!r}")
         return SerialUrl(device, baud, unsigned, key)
     if kind not in KINDS:
         raise LinkUrlError(f"link {text!r}: {EXPECTED}")
     host, port = parse_endpoint(rest, what=f"link {text!r}")
-    return LinkUrl(kind, host, port, unsigned, key)
+    return LinkUrl(kind, host, port, unsigned, key, local)
 
 
 def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
@@ -79,19 +84,22 @@ def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def _parse_options(text: str, *, what: str) -> tuple[bool | None, str]:
+def _parse_options(text: str, *, what: str) -> tuple[bool | None, str, int | None]:
     options: dict[str, str] = {}
     for each in text.split("&") if text else ():
         name, _, value = each.partition("=")
         if name in options:
             raise LinkUrlError(f"{what}: {name} is said twice")
-        if name not in ("unsigned", "key"):
+        if name not in ("unsigned", "key", "local"):
             raise LinkUrlError(f"{what}: no such option {name!r}: there are {OPTIONS}")
         if not value or (name == "unsigned" and value not in UNSIGNED):
             raise LinkUrlError(f"{what}: {name}: expected one of {OPTIONS}")
         options[name] = value
     unsigned = UNSIGNED[options["unsigned"]] if "unsigned" in options else None
-    return unsigned, options.get("key", "")
+    local = options.get("local")
+    if local is not None and not (_is_number(local) and 0 < int(local) < 65536):
+        raise LinkUrlError(f"{what}: local: expected a port from 1 to 65535")
+    return unsigned, options.get("key", ""), None if local is None else int(local)
 
 
 def _parse_serial(text: str, *, what: str) -> tuple[str, int]:

@@ -9,7 +9,7 @@ what this table says (PX4 1.15 to 1.17: commander's failsafe.cpp, its parameters
    | value | what it does |
    |---|---|
    | -1 | nothing (before 1.14) |
-   | 0 (default), 1, 2, unknown | with sticks: Position, Altitude, Stabilized: the sticks drive it; |
+   | 0 (default), 1, 2, unknown | with sticks: Position, Altitude, Stabilized: sticks drive it; |
    | | without: as NAV_RCL_ACT says |
    | 3 | Return: it drives by itself to where it was armed |
    | 4 | Land: what a rover does then was never seen |

@@ -9,8 +9,11 @@ import pytest
 
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Link, Peer
+from mav_tasks.links.local_port import COUNT, FIRST, port_for
+from mav_tasks.links.opening import open_link
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
 
 HOST = "127.0.0.1"
 
@@ -163,3 +166,60 @@ def test_one_that_speaks_to_others_too_hears_them() -> None:
     link = UdpLink(LinkUrl("udpout", HOST, 9), push=(("192.0.2.1", 9),))
     assert not link.is_local
     link.close()
+
+
+def dialling(port: int, *, local: int | None = None) -> UdpLink:
+    link = open_link(LinkUrl("udpout", HOST, port, local=local), way=TO_VEHICLES)
+    assert isinstance(link, UdpLink)
+    return link
+
+
+def test_a_rover_is_dialled_from_the_same_port_each_time(other: socket.socket) -> None:
+    """It answers its first sender only, as PX4's simulation does."""
+    answered: tuple[str, int] | None = None
+    for _ in range(3):  # a probe, a server, the server again
+        link = dialling(other.getsockname()[1])
+        link.send(link.peers[0], b"hello")
+        data, sender = other.recvfrom(100)
+        answered = answered or sender
+        other.sendto(data, answered)
+        wait_for(link)
+        assert [data for _, data in link.receive(10)] == [b"hello"]
+        assert link.note == ""
+        link.close()
+
+
+def test_rovers_side_by_side_have_ports_of_their_own() -> None:
+    ports = [port_for(HOST, port) for port in range(14580, 14680)]
+    assert len(set(ports)) == 100
+    assert all(FIRST <= port < FIRST + COUNT for port in ports)
+
+
+def test_where_that_port_is_taken_it_is_said_and_another_one_is_used(other: socket.socket) -> None:
+    port = other.getsockname()[1]
+    first, second = dialling(port), dialling(port)
+    assert address_of(second) != address_of(first)
+    assert second.note.startswith(f"local port {address_of(first)[1]} is taken")
+    second.send(second.peers[0], b"hello")
+    assert other.recvfrom(100) == (b"hello", address_of(second))
+    first.close()
+    second.close()
+
+
+def test_a_port_that_the_url_names_is_the_one_or_none(other: socket.socket) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind((HOST, 0))
+        free = sock.getsockname()[1]
+        with pytest.raises(LinkOpenError):
+            dialling(other.getsockname()[1], local=free)
+    link = dialling(other.getsockname()[1], local=free)
+    assert address_of(link) == (HOST, free)
+    link.close()
+
+
+def test_clients_dial_from_any_port(other: socket.socket) -> None:
+    url = LinkUrl("udpout", HOST, other.getsockname()[1])
+    several = [open_link(url, way=TO_CLIENTS) for _ in range(3)]
+    assert len({address_of(cast(UdpLink, link)) for link in several}) == 3
+    for link in several:
+        link.close()

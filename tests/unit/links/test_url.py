@@ -155,15 +155,23 @@ def test_a_url_says_what_is_asked_of_signatures(
     [
         (
             "?keys=a",
-            "no such option 'keys': there are unsigned=allow, unsigned=refuse and key=NAME",
+            "no such option 'keys': there are unsigned=allow, unsigned=refuse, key=NAME and local=PORT",
         ),
         ("?unsigned=yes", "unsigned: expected one of "),
         ("?unsigned", "unsigned: expected one of "),
         ("?key=", "key: expected one of "),
         ("?key=a&key=b", "key is said twice"),
         ("?key=a&", "no such option ''"),
+        ("?local=14590", "local: only udpout dials from a port of its own"),
+        ("?local=0", "local: expected a port from 1 to 65535"),
     ],
 )
 def test_an_unknown_option_is_refused_by_name(options: str, words: str) -> None:
     with pytest.raises(LinkUrlError, match=re.escape(words)):
         parse_url(f"tcp:127.0.0.1:1{options}")
+
+
+def test_a_url_says_from_which_port_it_dials() -> None:
+    url = parse_url("udpout:127.0.0.1:14580?local=14590")
+    assert isinstance(url, LinkUrl)
+    assert (url.local, str(url)) == (14590, "udpout:127.0.0.1:14580")
