@@ -112,9 +112,15 @@ class Authority:
         self._mode_is_ours = by_us or by_client
         return self._mode_is_ours
 
-    def kind_of(self, mode: int) -> ModeKind:
-        """Give what the present mode means for taking control."""
-        if mode == self._persona.hold_mode:
+    def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
+        """Give what the present mode means for taking control.
+
+        A PX4 that has driven home by its failsafe disarms itself and shows our mode, or the return:
+        nothing drives it, and it is put to HOLD before it is armed.
+        """
+        at_rest = (self._persona.control_mode, self._persona.return_mode)
+        is_home = self._persona.arms_in_hold and not armed and mode in at_rest
+        if mode == self._persona.hold_mode or (is_home and not self._mode_is_ours):
             return ModeKind.HOLD
         if mode == self._persona.control_mode and self._mode_is_ours:
             return ModeKind.OURS

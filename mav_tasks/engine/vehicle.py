@@ -211,6 +211,11 @@ class Vehicle:
             self.control.begin_release(now=now)
             self.requests.flush(now=now)
             self._plan_tick(now=now)
+        elif was_driven and self.persona.has_loss_failsafe:
+            # a setpoint would have it enter our mode and lose the next ones again
+            mode = self.persona.mode_name(self._monitor.custom_mode)
+            words = f"is in {mode}, by its failsafe or by somebody, and is left to it"
+            self._note(f"{words}: HOLD stops it, then release its task", now=now)
         elif was_driven:
             self.requests.send_zero()
 
@@ -930,7 +935,7 @@ class Vehicle:
         watch = self._settings.watch
         return VehicleView(
             heard=self.is_heard(now=now),
-            mode=self._authority.kind_of(self._monitor.custom_mode),
+            mode=self._authority.kind_of(self._monitor.custom_mode, armed=self._monitor.armed),
             is_booting=self._monitor.custom_mode == self.persona.booting_mode,
             armed=self._monitor.armed,
             may_arm=self._authority.may_arm,

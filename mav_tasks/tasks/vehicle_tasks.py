@@ -55,6 +55,14 @@ class _Release:
     waits_for: TaskReason
 
 
+#: what the person who reads a refusal may do about it
+WAYS_OUT = {
+    R.WRONG_MODE: "wrong mode, set HOLD first",
+    R.DISARMED: "disarmed; continue, or arm it",
+    R.LOSS_FAILSAFE: f"it would not stand without us, {SET_FAILSAFE}",
+}
+
+
 class VehicleTasks:
     """All tasks of the vehicle with this system id."""
 
@@ -534,12 +542,8 @@ class VehicleTasks:
 
     def _check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
-        if blocker is R.LOSS_FAILSAFE:
-            words = f"cannot go on: it would not stand without us, {SET_FAILSAFE}"
-            raise Rejection(blocker, words)
         if blocker:
-            way_on = "; continue, or arm it" if blocker is R.DISARMED else ""
-            raise Rejection(blocker, f"cannot go on: {words_of(blocker)}{way_on}")
+            raise Rejection(blocker, f"cannot go on: {WAYS_OUT.get(blocker, words_of(blocker))}")
 
     def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
         if self._is_of_another_frame(task, seen):

@@ -10,15 +10,19 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
-from tests.kit.px4 import PROMPT_PX4, SET_MODE
+from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED
+from tests.kit.px4 import HOLD, PROMPT_PX4, SET_MODE, ask_mode
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import COMMAND_ID, MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
 HEARTBEAT = 0
+RELEASE, AGAIN = 54013, 0
 
 
 def driving(make_world: MakeWorld, *, speed: float = 1.5, lost: float = 1.0, **kw: Any) -> World:
@@ -39,13 +43,11 @@ def is_mode_request(data: bytes) -> bool:
 def test_a_server_that_is_started_again_leaves_it_standing(
     make_world: MakeWorld, tmp_path: Path, lost: float
 ) -> None:
-    path, again = tmp_path / "tasks.sqlite3", tmp_path / "again.sqlite3"
+    path = tmp_path / "tasks.sqlite3"
     store = PromptSqliteStore(path, wall_offset=1.8e9)
     world = driving(make_world, store=store, lost=lost)
     world.end_server()
-    for suffix in ("", "-wal"):
-        if Path(f"{path}{suffix}").exists():
-            copy(f"{path}{suffix}", f"{again}{suffix}")
+    again = copied(path)
     store.close()
     world.run(lost + 4)
     assert world.stands()
@@ -155,3 +157,70 @@ def test_a_task_is_not_continued_while_the_failsafe_is_off(make_world: MakeWorld
     assert sent.answer is not None
     assert sent.answer[1] == R.LOSS_FAILSAFE
     assert world.state(1) == (S.PAUSED, R.OPERATOR)
+
+
+class TestOneThatDrivesHomeWithoutUs:
+    """Its failsafe is accepted as it is, and the server is killed while it drives."""
+
+    @pytest.fixture
+    def world(self, make_world: MakeWorld, tmp_path: Path) -> World:
+        self.path = tmp_path / "tasks.sqlite3"
+        store = PromptSqliteStore(self.path, wall_offset=1.8e9)
+        settings = Settings(loss_failsafe="accept")
+        world = make_world(persona=PROMPT_PX4, store=store, settings=settings)
+        world.rover.autopilot.parameters["COM_OBL_RC_ACT"] = 3
+        world.client.move(60, speed=1.5)
+        world.run(14)
+        return world
+
+    def restart(self, world: World, *, away: float) -> None:
+        world.end_server()
+        again = copied(self.path)
+        world.server.store.close()
+        world.run(away)
+        assert world.rover.autopilot.mode is Mode.RTL
+        later = PromptSqliteStore(again, wall_offset=1.8e9)
+        world.start_server(later, later.load())
+
+    def test_a_server_that_is_started_meanwhile_sends_it_no_setpoint(self, world: World) -> None:
+        self.restart(world, away=2.5)
+        began = world.now
+        world.run(5)
+        assert world.rover.autopilot.mode is Mode.RTL
+        assert "zero" not in world.observer.sent_since(began)
+        noted = [event.text for event in world.events(VehicleNoted)]
+        assert noted[0].startswith("is in Return, by its failsafe or by somebody, and is left to")
+
+    def test_what_is_refused_says_the_way_out_and_that_is_one(self, world: World) -> None:
+        self.restart(world, away=2.5)
+        world.run(2.5)
+        refused = world.client.command(RELEASE, 1, AGAIN)
+        world.run(0.2)
+        assert refused.answer == (TEMPORARILY_REJECTED, R.WRONG_MODE)
+        assert any("wrong mode, set HOLD first" in text for text in world.client.texts())
+        ask_mode(world.client, HOLD)
+        world.until(world.stands, within=5)
+        released = world.client.command(RELEASE, 1, AGAIN)
+        world.run(0.2)
+        assert released.answer == (ACCEPTED, 1)
+        world.client.proceed()
+        world.until_state(1, S.EXECUTING)
+
+    def test_one_that_has_disarmed_itself_at_home_is_released_at_once(self, world: World) -> None:
+        self.restart(world, away=25.0)
+        world.operator_arm(False)
+        world.run(1.5)
+        released = world.client.command(RELEASE, 1, AGAIN)
+        world.run(0.2)
+        assert released.answer == (ACCEPTED, 1)
+        world.client.proceed()
+        world.until_state(1, S.EXECUTING)
+
+
+def copied(path: Path) -> Path:
+    """What is on the disk of a server that is gone."""
+    again = path.with_name("again.sqlite3")
+    for suffix in ("", "-wal"):
+        if Path(f"{path}{suffix}").exists():
+            copy(f"{path}{suffix}", f"{again}{suffix}")
+    return again

@@ -155,7 +155,7 @@ def test_a_url_says_what_is_asked_of_signatures(
     [
         (
             "?keys=a",
-            "no such option 'keys': there are unsigned=allow, unsigned=refuse, key=NAME and local=PORT",
+            "no such option 'keys': there are unsigned=allow, unsigned=refuse, key=NAME and local",
         ),
         ("?unsigned=yes", "unsigned: expected one of "),
         ("?unsigned", "unsigned: expected one of "),
