@@ -68,7 +68,7 @@ class Watch:
     other_controller: float = 2.0  # since the last setpoint of somebody else
     commit: float = 0.4  # a submission not durable by then is withdrawn
     forward_answer: float = 0.4  # a forwarded command not answered by then is refused
-    shutdown: float = 0.8  # to stop the vehicles in an orderly end
+    shutdown: float = 3.0  # until the vehicles stand in an orderly end; an ArduPilot rolls in HOLD
     #: disarm a vehicle that was told to stand, shows HOLD, and still moves after this; 0: never
     disarm_moving: float = 2.0
     stop_unconfirmed: float = 5.0  # cancelled, but not seen to stand by then: held

@@ -378,4 +378,6 @@ class Engine:
         rolling = tuple(v.system_id for v in self._vehicles if v.control.is_engaged)
         if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True
+            for vehicle in self._vehicles:
+                vehicle.note_rest(now=now)
             self._book.record(ServerStopped(rolling, now))

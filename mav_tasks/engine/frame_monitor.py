@@ -27,6 +27,7 @@ class FrameMonitor:
         self._origin: GlobalPlace | None = None
         self._is_said = False
         self._booted_at: float | None = None
+        self._heard_at = 0.0  # when that was worked out
         self._global: m.GlobalPositionInt | None = None
         self._local: m.LocalPositionNed | None = None
         self.home: GlobalPlace | None = None
@@ -53,7 +54,7 @@ class FrameMonitor:
                 self._work_out()
             case m.LocalPositionNed():
                 self._local = message
-                self._booted_at = now - message.time_boot_ms / 1000
+                self._booted_at, self._heard_at = now - message.time_boot_ms / 1000, now
                 self._work_out()
 
     def frame(self) -> Frame | None:
@@ -61,8 +62,9 @@ class FrameMonitor:
         if self._booted_at is None:
             return None
         if self._origin is None:
-            return Frame(None, None, self._booted_at)
-        return Frame(self._origin.latitude_degE7, self._origin.longitude_degE7, self._booted_at)
+            return Frame(None, None, self._booted_at, self._heard_at)
+        latitude, longitude = self._origin.latitude_degE7, self._origin.longitude_degE7
+        return Frame(latitude, longitude, self._booted_at, self._heard_at)
 
     def forget(self) -> None:
         """Start afresh, as after a restart of the vehicle."""

@@ -106,6 +106,7 @@ class Vehicle:
         self._arming_texts = ArmingTexts()
         self._is_closing = False
         self._is_back_home = False  # by its last task; it is disarmed also where others wait
+        self._stops_task = False  # which the end of the server has interrupted
         self.stopped_at = -inf  # the last STOP
         #: a HOLD that a "go to" may undo
         self.hold_before = HoldBefore()
@@ -779,10 +780,17 @@ class Vehicle:
     def shut_down(self, *, now: float) -> None:
         """The server ends: pause what is begun and stop what we drive; nothing begins any more."""
         self._is_closing = True
-        if self.tasks.begun is not None:
+        begun = self.tasks.begun
+        self._stops_task = begun is not None and begun.state in RUNNING
+        if begun is not None:
             self.tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
         if self.control.is_engaged:
             self._begin_stop(now=now)
+
+    def note_rest(self, *, now: float) -> None:
+        """The server ends now: keep where what it has stopped has come to."""
+        if self._stops_task:
+            self.tasks.rest(self.view(now=now), now=now)
 
     # time
 

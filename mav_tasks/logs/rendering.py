@@ -20,6 +20,7 @@ from mav_tasks.tasks.events import (
     QueuePaused,
     SignaturesSeen,
     SubmissionRefused,
+    TaskProgressed,
     TaskSubmitted,
     VehicleNoted,
 )
@@ -59,7 +60,7 @@ def event_values(event: Event, *, offset: float) -> dict[str, Any]:
 
 def level_of(event: Event) -> int:
     """Give the log level of an event: what its operator should look at is a warning."""
-    if isinstance(event, SignaturesSeen):
+    if isinstance(event, SignaturesSeen | TaskProgressed):
         return logging.DEBUG  # no part of the journal either
     noteworthy = isinstance(event, SubmissionRefused | VehicleNoted | QueuePaused)
     return logging.WARNING if noteworthy else logging.INFO

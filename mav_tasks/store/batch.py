@@ -14,6 +14,7 @@ from mav_tasks.tasks.events import (
     TaskAdvanced,
     TaskChanged,
     TaskModified,
+    TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
     VehicleIdentified,
@@ -55,6 +56,13 @@ class Batch:
         for number, event in enumerate(events, first):
             if isinstance(event, SignaturesSeen):
                 self._note_signatures(event)
+                continue
+            if isinstance(event, TaskProgressed):  # read back as any other progress
+                kept = TaskAdvanced(
+                    event.task_id, event.vehicle, event.version, event.progress, event.at
+                )
+                row = [format_id, *encoder.row(kept, offset=offset)]
+                self.advanced[event.task_id] = (dumps(row), event.task_id)
                 continue
             row = encoder.row(event, offset=offset)
             row.insert(0, format_id)

@@ -15,6 +15,7 @@ from mav_tasks.tasks.events import (
     TaskAdvanced,
     TaskChanged,
     TaskModified,
+    TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
 )
@@ -171,6 +172,12 @@ class TaskBook:
     def note_progress(self, task_id: TaskId, progress: Progress) -> None:
         """Keep live progress, for status only: no event, no new version."""
         self._tasks[task_id] = replace(self._tasks[task_id], progress=progress)
+
+    def keep_progress(self, task_id: TaskId, *, now: float) -> None:
+        """Have the live progress stored, for whoever starts after a crash. No new version."""
+        task = self._tasks[task_id]
+        event = TaskProgressed(task_id, task.vehicle, task.version, task.progress, now)
+        self.record(event)
 
     def withdraw(self, task_id: TaskId, *, now: float) -> None:
         """Take back a submission that did not become durable in time."""

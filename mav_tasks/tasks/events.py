@@ -70,6 +70,23 @@ class TaskAdvanced:
 
 
 @dataclass(frozen=True, slots=True)
+class TaskProgressed:
+    """How far a task has come that is being driven: kept for a crash, and no part of the journal.
+
+    Only the last one of a task is kept. ``version`` is the task's, which this does not change.
+    """
+
+    task_id: TaskId
+    vehicle: int
+    version: int
+    progress: Progress
+    at: float
+
+    def __str__(self) -> str:
+        return f"task {self.task_id}: {self.progress.execution_time:.0f} s driven"
+
+
+@dataclass(frozen=True, slots=True)
 class StepReached:
     """A step of a plan is done; ``performs``: it is a command that the vehicle gets now."""
 
@@ -311,6 +328,7 @@ Event = (
     TaskSubmitted
     | TaskChanged
     | TaskAdvanced
+    | TaskProgressed
     | StepReached
     | PlanStored
     | TaskModified

@@ -41,6 +41,7 @@ S, R = TaskState, TaskReason
 #: times that a vehicle may drive past a place that its turning circle keeps it from
 MISSES = 3
 ASK_AGAIN = 4.0  # s, from the end of a try to arm to the next one, while a vehicle is not ready
+KEEP_EACH = 1.0  # s between two writes of the progress of a task that is being driven
 #: interruptions that end by themselves when the vehicle is back
 LOSSES = frozenset({R.LINK_LOST, R.POSITION_LOST})
 
@@ -71,6 +72,8 @@ class Executor:
         self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
         #: what a STARTING task waits for, and that in the vehicle's own words
         self.waits_for: tuple[TaskReason, str] = (R.NONE, "")
+        self._kept_at = 0.0  # when progress was last given to the store
+        self._kept_as = 0  # the number of that event
 
     def __repr__(self) -> str:
         return f"Executor({self.task!r})"
@@ -508,6 +511,18 @@ class Executor:
         executed = self._executed_before + now - self._since
         self._course.progress = replace(self._course.progress, execution_time=executed)
         self._book.note_progress(task.id, self._course.progress)
+        is_written = self._book.durable >= self._kept_as  # a store that is away is not piled up on
+        if now - self._kept_at >= KEEP_EACH and is_written:
+            self._book.keep_progress(task.id, now=now)
+            self._kept_at, self._kept_as = now, self._book.recorded
+
+    def rest(self, motion: Motion, *, now: float) -> None:
+        """Count what the vehicle has rolled since the task was paused: it stands here."""
+        task, course = self.task, self._course
+        if task is None or course is None or task.state is not S.PAUSED or self._way_back:
+            return
+        course.look(motion, elapsed=0.0)
+        self._book.advance(task.id, course.progress, now=now)
 
     # states
 
@@ -532,7 +547,7 @@ class Executor:
             self._executed_before += now - self._since
             progress = replace(old.progress, execution_time=self._executed_before)
             timing, self._meter = self.timing, None
-        self._since = self._taking_since = now
+        self._since = self._taking_since = self._kept_at = now
         self._ask_again_at, self.waits_for = None, (R.NONE, "")
         self._book.change(
             self._task_id,

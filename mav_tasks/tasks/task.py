@@ -13,6 +13,9 @@ MAX_TASK_ID = 16_777_215  # 2**24 - 1: exact in a float32 command parameter
 DEFAULT_PRIORITY = 5
 MAX_PRIORITY = 10  # 10 runs first
 
+#: degE7, 0.1 m: one that is worked out from positions differs by 1 each time (ArduPilot 4.6.3)
+SAME_ORIGIN = 10
+CLOCK_ERROR = 0.12  # of the time: simulators run at 0.9 of it and less, a real clock at 0.9999
 SAME_BOOT = 5.0  # s between two estimates of when a vehicle booted, that may be of the same boot
 
 
@@ -40,22 +43,35 @@ class Bend:
 class Frame:
     """Which local frame coordinates are in: its origin, if known, and when the vehicle booted.
 
-    ``booted_at`` in monotonic seconds, good to a second or two. Another boot is another frame.
+    ``booted_at`` in monotonic seconds, as of ``heard_at``, good to a second or two; a vehicle whose
+    clock is slow seems to have booted later and later. Another boot is another frame.
     """
 
     latitude_degE7: int | None
     longitude_degE7: int | None
     booted_at: float
+    heard_at: float | None = None  # monotonic seconds
 
 
 def same_frame(one: Frame | None, other: Frame | None) -> bool:
     """Whether coordinates of one frame mean the same in the other, as far as can be told."""
     if one is None or other is None:
         return False
-    known = (one.latitude_degE7, one.longitude_degE7)
-    others = (other.latitude_degE7, other.longitude_degE7)
-    same_origin = None in (*known, *others) or known == others
-    return same_origin and abs(one.booted_at - other.booted_at) <= SAME_BOOT
+    is_near = _is_near(one.latitude_degE7, other.latitude_degE7) and _is_near(
+        one.longitude_degE7, other.longitude_degE7
+    )
+    return is_near and abs(one.booted_at - other.booted_at) <= SAME_BOOT + _drift(one, other)
+
+
+def _is_near(one_degE7: int | None, other_degE7: int | None) -> bool:
+    return one_degE7 is None or other_degE7 is None or abs(one_degE7 - other_degE7) <= SAME_ORIGIN
+
+
+def _drift(one: Frame, other: Frame) -> float:
+    """Return by how many seconds a vehicle's clock may have gone wrong between the two."""
+    if one.heard_at is None or other.heard_at is None:
+        return 0.0
+    return CLOCK_ERROR * abs(one.heard_at - other.heard_at)
 
 
 @dataclass(frozen=True, slots=True)

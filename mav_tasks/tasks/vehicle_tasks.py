@@ -479,6 +479,11 @@ class VehicleTasks:
             progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
             self._book.advance(task.id, progress, now=now)
 
+    def rest(self, seen: VehicleView, *, now: float) -> None:
+        """The server ends, and the vehicle was stopped for it: what it has rolled counts."""
+        if seen.motion is not None:
+            self._executor.rest(seen.motion, now=now)
+
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
         """Set the speed of the task that runs, and of those to come that name none."""
         self._speed = speed

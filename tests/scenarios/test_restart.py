@@ -1,6 +1,7 @@
 """A server ends, well or not, and another one goes on from what it had stored."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from shutil import copy
 
@@ -8,6 +9,7 @@ import pytest
 
 from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.events import TaskProgressed
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -362,3 +364,46 @@ def test_a_plan_goes_on_with_the_item_that_was_driven(world: World, path: Path) 
     world.until_state(1, S.COMPLETED, within=60)
     assert reached(world.client) == [0, 1, 2]
     assert is_at(world, 3, 2)
+
+
+def test_after_a_kill_the_progress_of_the_last_second_is_known(world: World, path: Path) -> None:
+    world.client.move(8, speed=1.0)
+    world.until(lambda: world.truth.north > 4.0, within=15)
+    restart(world, path)
+    task = world.task(1)
+    assert (task.state, task.reason) == (S.HELD, R.OUTCOME_UNKNOWN)
+    assert 3.0 <= task.progress.done <= 4.0
+    kept = [event.at for event in world.events(TaskProgressed)]
+    assert kept == []  # by this server
+
+
+def test_the_progress_of_what_is_driven_is_stored_once_a_second(world: World) -> None:
+    world.client.move(8, speed=1.0)
+    world.until_idle(tasks=1)
+    at = [event.at for event in world.events(TaskProgressed)]
+    assert 8 <= len(at) <= 12  # of 12 s
+    assert min(later - earlier for earlier, later in pairwise(at)) >= 1.0
+
+
+@pytest.mark.parametrize("is_frame_lost", [False, True])
+def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
+    world: World, path: Path, is_frame_lost: bool
+) -> None:
+    world.client.move(8, speed=1.0)
+    world.until(lambda: world.truth.north > 3.0, within=15)
+    began = world.now
+    world.server.pump.handle(Shutdown(), now=world.now)
+    world.until(lambda: world.server.pump.is_over, within=3.1)
+    assert world.stands()
+    assert world.now - began > 1.0  # from 1 m/s it cannot stand sooner
+    if is_frame_lost:
+        world.rover.autopilot.reboot(now=world.now)
+    restart(world, path, well=True)
+    world.client.proceed()
+    world.run(0.3)
+    if is_frame_lost:
+        assert world.state(1) == (S.HELD, R.FRAME_RESET)
+        assert release(world, 1, REMAINDER) == (ACCEPTED, 1)
+        world.client.proceed()
+    world.until_idle(tasks=1)
+    assert world.truth.north == pytest.approx(8.0, abs=0.05)

@@ -319,3 +319,22 @@ def test_a_migration_that_fails_changes_nothing() -> None:
     assert connection.execute("SELECT name FROM sqlite_master WHERE name = 'x'").fetchone() is None
     assert connection.execute("PRAGMA application_id").fetchone() == (APPLICATION_ID,)
     connection.close()
+
+
+def test_how_far_a_driven_task_has_come_is_kept_and_fills_no_journal(path: Path) -> None:
+    book = TaskBook()
+    task = book.submit(draft(goal=Move(4.0)), now=1.0)
+    for state in (S.STARTING, S.EXECUTING):
+        book.change(task.id, state, reason=R.NONE, actor="server", now=2.0)
+    for second in range(1, 4):
+        book.note_progress(task.id, Progress(Pose(0.0, 0.0, 0.0), done=0.5 * second))
+        book.keep_progress(task.id, now=2.0 + second)
+    with opened(path) as store:
+        store.append(book.take_events())
+        wait_for(store, 6)
+    with opened(path) as store:
+        (kept,) = store.load().tasks
+        assert (kept.state, kept.version, kept.progress.done) == (S.EXECUTING, 3, 1.5)
+    with sqlite3.connect(path) as connection:
+        kinds = [row[0] for row in connection.execute("SELECT kind FROM journal")]
+    assert kinds == ["TaskChanged", "TaskChanged"]

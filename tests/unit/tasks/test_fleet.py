@@ -12,7 +12,7 @@ from mav_tasks.tasks.fleet import LONG_IDLE, Fleet
 from mav_tasks.tasks.goal import Move, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Frame, Pose, Task, TaskId, Terms
+from mav_tasks.tasks.task import Frame, Pose, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import DemandKind
 from tests.unit.tasks.rig import BY, Rig, Rover, idle, in_control, run, run_until
 from tests.unit.tasks.samples import draft
@@ -95,7 +95,7 @@ class TestWhatHadBegun:
 
     @pytest.mark.parametrize(
         "frame",
-        [None, replace(HERE, latitude_degE7=473_977_419), replace(HERE, booted_at=60.0)],
+        [None, replace(HERE, latitude_degE7=473_977_618), replace(HERE, booted_at=60.0)],
     )
     def test_a_line_in_another_frame_is_not_driven_on(self, frame: Frame | None) -> None:
         rig, rover = Rig(), Rover(frame=HERE)
@@ -224,3 +224,24 @@ class TestTheVehicle:
         rig.submit(Move(20.0))
         run(rig, rover, seconds=5.0)
         assert rover.velocity.forward == pytest.approx(1.25)
+
+
+class TestTheFrameOfTheSameVehicle:
+    """``same_frame``: one that comes from another estimate of the origin, or a slow clock."""
+
+    def test_is_the_same_where_its_origin_was_worked_out_anew(self) -> None:
+        again = replace(HERE, latitude_degE7=473_977_419, longitude_degE7=85_455_929)
+        assert same_frame(HERE, again)
+        assert not same_frame(HERE, replace(HERE, latitude_degE7=473_977_418 + 11))
+        assert not same_frame(HERE, replace(HERE, longitude_degE7=85_455_938 - 11))
+
+    @pytest.mark.parametrize("away", [64.0, 600.0, 7200.0])
+    def test_is_the_same_by_a_clock_that_runs_at_nine_tenths(self, away: float) -> None:
+        before = replace(HERE, booted_at=0.0, heard_at=100.0)
+        after = replace(HERE, booted_at=0.1 * away, heard_at=100.0 + away)
+        assert same_frame(before, after)
+
+    def test_is_another_one_after_another_boot(self) -> None:
+        before = replace(HERE, booted_at=0.0, heard_at=100.0)
+        assert not same_frame(before, replace(HERE, booted_at=101.0, heard_at=164.0))
+        assert not same_frame(before, replace(HERE, booted_at=2.0e3, heard_at=2.1e3))
