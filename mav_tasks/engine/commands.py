@@ -293,6 +293,10 @@ class Commands:
         """Bring a vehicle's answer, or its silence, to the client that asked."""
         asker = answered.origin
         assert isinstance(asker, _Asker), "only _relay gives commands an origin"
+        is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
+        if is_accepted and answered.command == MavCmd.DO_SET_HOME:
+            actor = f"{asker.source.system_id}/{asker.source.component_id}"
+            vehicle.home_was_set(answered.request, actor=actor, now=now)
         client = self._gcs.client(asker.client)
         if client is None:
             return

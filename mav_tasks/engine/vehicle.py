@@ -13,6 +13,7 @@ from mav_tasks.engine.authority import Authority, Before
 from mav_tasks.engine.components import Components
 from mav_tasks.engine.frame_monitor import Seen
 from mav_tasks.engine.hold_before import HoldBefore
+from mav_tasks.engine.home_command import home_meant
 from mav_tasks.engine.known_profile import KnownProfile
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
@@ -36,8 +37,8 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.settings import SET_FAILSAFE, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
+from mav_tasks.tasks.goal import GlobalPlace, ends_at_home
 from mav_tasks.tasks.guidance import ZERO, Velocity
-from mav_tasks.tasks.goal import ends_at_home
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -300,6 +301,8 @@ class Vehicle:
         self._monitor.receive(heartbeat, now=now)
         armed, mode = self._monitor.armed, self._monitor.custom_mode
         self.control.heard(armed=armed, mode=mode, now=now)
+        if armed:
+            self._keep_home(self.where.frame.home if was_armed else self.where.here, now=now)
         if not self._was_heard:
             self._heard_again(now=now)
         if mode != was_mode:
@@ -326,6 +329,18 @@ class Vehicle:
             self.where.motion.standstill.may_move()
         else:
             self.where.motion.standstill.told_to_stand(now=now)
+
+    def _keep_home(self, place: GlobalPlace | None, *, now: float) -> None:
+        """Where it is first armed is its home; one met armed has said where that was."""
+        frame = self.where.frame.frame()
+        if place and frame and self.tasks.bounds.home_in(frame) is None:
+            self.tasks.set_home(place, frame, actor=SERVER, now=now)
+
+    def home_was_set(self, command: m.Message, *, actor: str, now: float) -> None:
+        """A client's DO_SET_HOME was accepted: its tasks return there, too."""
+        place, frame = home_meant(command) or self.where.here, self.where.frame.frame()
+        if place and frame:
+            self.tasks.set_home(place, frame, actor=actor, now=now)
 
     def _use_profile(self, *, now: float) -> None:
         """Go by what was measured of it; setpoints do not change their kind while it is driven."""

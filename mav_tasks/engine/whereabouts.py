@@ -6,7 +6,7 @@ from mav_tasks.engine.frame_monitor import FrameMonitor
 from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.bounds import Bounds
-from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.frames import local_place, to_global
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
 from mav_tasks.tasks.legs import distance
 
@@ -34,10 +34,22 @@ class Whereabouts:
 
     @property
     def home(self) -> GlobalPlace | None:
-        """Where the vehicle returns to: the nearest rally point, else the home that it has said."""
+        """Where the vehicle returns to: the nearest rally point, else its home.
+
+        That is where it was first armed, or what somebody set; the home that it says itself moves
+        with it while it is disarmed (ArduPilot), or at each arming (PX4).
+        """
         motion = self.motion.latest() if self._bounds.rally else None
         rally = None if motion is None else self._bounds.refuge(motion.pose, self.frame.origin)
-        return rally or self.frame.home
+        return rally or self._bounds.home_in(self.frame.frame()) or self.frame.home
+
+    @property
+    def here(self) -> GlobalPlace | None:
+        """Where the vehicle is on earth, as far as that is known."""
+        motion, origin = self.motion.latest(), self.frame.origin
+        if motion is None or origin is None:
+            return None
+        return to_global(LocalPlace(motion.pose.north, motion.pose.east), origin)
 
     @property
     def is_fence_unknown(self) -> bool:

@@ -8,10 +8,10 @@ from dataclasses import fields, is_dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import SignatureTime
+from mav_tasks.tasks.events import SignatureTime, VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.task import Frame, Task
 
 
 def settings_to_json(settings: Any) -> Any:
@@ -52,6 +52,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "paused": [[vehicle, int(reason)] for vehicle, reason in restored.paused.items()],
         "uids": list(restored.uids.items()),
         "speeds": list(restored.speeds.items()),
+        "homes": [_home_to_json(home) for home in restored.homes.values()],
         "plans": [[*key, *plan] for key, plan in restored.plans.items()],
         "parameters": list(restored.parameters.items()),
         "signatures": [
@@ -73,6 +74,7 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         paused={vehicle: TaskReason(reason) for vehicle, reason in values["paused"]},
         uids=dict(values["uids"]),
         speeds=dict(values["speeds"]),
+        homes={row[0]: _home_of(row) for row in values.get("homes", ())},
         plans={
             (vehicle, kind): (plan_id, source) for vehicle, kind, plan_id, source in values["plans"]
         },
@@ -83,3 +85,15 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         idle=values["idle"],
         wall_offset=values["wall_offset"],
     )
+
+
+def _home_to_json(home: VehicleHomeSet) -> list[Any]:
+    frame = home.frame
+    place = [home.latitude_degE7, home.longitude_degE7]
+    of_frame = [frame.latitude_degE7, frame.longitude_degE7, frame.booted_at, frame.heard_at]
+    return [home.vehicle, *place, of_frame, home.actor, home.at]
+
+
+def _home_of(row: list[Any]) -> VehicleHomeSet:
+    vehicle, latitude, longitude, of_frame, actor, at = row
+    return VehicleHomeSet(vehicle, latitude, longitude, Frame(*of_frame), actor, at)

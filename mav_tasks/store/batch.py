@@ -17,6 +17,7 @@ from mav_tasks.tasks.events import (
     TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
+    VehicleHomeSet,
     VehicleIdentified,
     VehicleSpeedSet,
 )
@@ -104,6 +105,8 @@ class Batch:
                 self.vehicles["paused", event.vehicle] = None
             case VehicleIdentified():
                 self.vehicles["uid", event.vehicle] = event.uid
+            case VehicleHomeSet():
+                self.vehicles["home", event.vehicle] = body
             case PlanStored():
                 row = (event.vehicle, event.kind, event.plan_id, event.source)
                 self.plans[event.vehicle, event.kind] = row

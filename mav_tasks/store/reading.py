@@ -22,6 +22,7 @@ from mav_tasks.tasks.events import (
     TaskChanged,
     TaskModified,
     TaskSubmitted,
+    VehicleHomeSet,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
@@ -53,6 +54,8 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
                 task = event.task
                 tasks.append(_changed(task, rows, later, offset) if any(later) else task)
         vehicles = connection.execute("SELECT vehicle, paused, uid, speed FROM vehicles").fetchall()
+        found = connection.execute("SELECT home FROM vehicles WHERE home IS NOT NULL")
+        homes = rows.values(VehicleHomeSet, [row[0] for row in found], offset)
         plans = connection.execute("SELECT vehicle, kind, plan_id, source FROM plans").fetchall()
         parameters = connection.execute("SELECT name, value FROM parameters").fetchall()
         signatures = connection.execute(
@@ -64,6 +67,7 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
             paused={row[0]: TaskReason(row[1]) for row in vehicles if row[1] is not None},
             uids={row[0]: row[2] for row in vehicles if row[2] is not None},
             speeds={row[0]: row[3] for row in vehicles if row[3] is not None},
+            homes={home.vehicle: home for home in homes},
             plans={(row[0], row[1]): (row[2], row[3]) for row in plans if row[2]},
             parameters={name: value for name, value in parameters if value is not None},
             signatures=tuple(SignatureTime(*row) for row in signatures),

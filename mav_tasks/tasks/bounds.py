@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import cos, sin
 
+from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.fence import Fence, LocalFence
 from mav_tasks.tasks.frames import local_place, to_local
 from mav_tasks.tasks.goal import (
@@ -19,7 +20,7 @@ from mav_tasks.tasks.goal import (
 from mav_tasks.tasks.legs import distance
 from mav_tasks.tasks.path import pose_on, rest_of
 from mav_tasks.tasks.planner import is_allowed
-from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.task import Frame, Pose, Progress, same_frame
 
 
 class Bounds:
@@ -28,11 +29,20 @@ class Bounds:
     def __init__(self) -> None:
         self.fence = Fence()
         self.rally: tuple[GlobalPlace, ...] = ()
+        #: where it was first armed, or what a client has set; None: neither is known
+        self.home: VehicleHomeSet | None = None
         self._local: LocalFence | None = None
         self._made_of: tuple[Fence, GlobalPlace] | None = None
 
     def __repr__(self) -> str:
         return f"Bounds({len(self.fence.zones)} zones, {len(self.rally)} rally points)"
+
+    def home_in(self, frame: Frame | None) -> GlobalPlace | None:
+        """Return the home of a vehicle in this frame; None: none is known since it booted."""
+        home = self.home
+        if home is None or not same_frame(home.frame, frame):
+            return None
+        return GlobalPlace(home.latitude_degE7, home.longitude_degE7)
 
     def is_unknown(self, origin: GlobalPlace | None) -> bool:
         """Whether there is a fence, and nobody knows where it is in the vehicle's frame."""

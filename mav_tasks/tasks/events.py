@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-from mav_tasks.tasks.task import Progress, Task, TaskId, Terms
+from mav_tasks.tasks.task import Frame, Progress, Task, TaskId, Terms
 from mav_tasks.tasks.timing import Timing
 
 SERVER = "server"
@@ -225,6 +225,26 @@ class VehicleIdentified:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleHomeSet:
+    """Where a vehicle returns to: where it was first armed since it booted, or what a client set.
+
+    ``frame`` is that of the vehicle at that time: after another boot it has another home.
+    """
+
+    vehicle: int
+    latitude_degE7: int
+    longitude_degE7: int
+    frame: Frame
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        place = f"{self.latitude_degE7 / 1e7:.7f}, {self.longitude_degE7 / 1e7:.7f}"
+        who = "first armed there" if self.actor == SERVER else f"by {self.actor}"
+        return f"vehicle {self.vehicle}: its home is {place}, {who}"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleSpeedSet:
     """The speed of tasks that name none was changed; None: as in the settings."""
 
@@ -339,6 +359,7 @@ Event = (
     | QueueContinued
     | VehicleIdentified
     | VehicleSpeedSet
+    | VehicleHomeSet
     | ParameterSet
     | SignaturesSeen
     | VehicleSeen

@@ -77,7 +77,7 @@ class Fleet:
         self.room.restore(restored.tasks, now=now)
         pauses = self._settings.on_restart == "pause"
         self._began_at = now
-        of_note = {*restored.paused, *restored.speeds, *restored.uids}
+        of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
         for vehicle in begun.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
@@ -92,4 +92,5 @@ class Fleet:
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),
             )
+            self.of(vehicle).bounds.home = restored.homes.get(vehicle)
         self._comes_up_paused = pauses and not restored.ended_well  # those that come now

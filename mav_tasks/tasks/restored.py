@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mav_tasks.tasks.events import SignatureTime
+from mav_tasks.tasks.events import SignatureTime, VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Task
 
@@ -13,10 +13,10 @@ class Restored:
     """The state of an earlier run. All times are monotonic seconds of the present one.
 
     ``tasks`` are in the order of their ids, ``next_id`` was never given to any. ``paused`` are the
-    queues that stood, with the reason, ``uids`` the vehicles' unique ids and ``speeds`` their
-    default speeds in m/s, each by system id; ``plans`` by system id and kind are (id, source) as
-    PlanStored has them, ``parameters`` the last value of each by name, ``signatures`` and
-    ``signed_until`` what SignaturesSeen had said. ``ended_well``: the last run
+    queues that stood, with the reason, ``uids`` the vehicles' unique ids, ``speeds`` their default
+    speeds in m/s and ``homes`` where they return to, each by system id; ``plans`` by system id and
+    kind are (id, source) as PlanStored has them, ``parameters`` the last value of each by name,
+    ``signatures`` and ``signed_until`` what SignaturesSeen had said. ``ended_well``: the last run
     closed its store; ``idle`` is the seconds since it last wrote. ``wall_offset`` is UTC less
     monotonic time.
     """
@@ -26,6 +26,7 @@ class Restored:
     paused: Mapping[int, TaskReason] = field(default_factory=dict)
     uids: Mapping[int, str] = field(default_factory=dict)
     speeds: Mapping[int, float] = field(default_factory=dict)
+    homes: Mapping[int, VehicleHomeSet] = field(default_factory=dict)
     plans: Mapping[tuple[int, int], tuple[int, str]] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     signatures: tuple[SignatureTime, ...] = ()

@@ -19,12 +19,13 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     TaskWaits,
+    VehicleHomeSet,
     VehicleIdentified,
     VehicleNoted,
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
-from mav_tasks.tasks.goal import Plan, Rotate, SingleGoal
+from mav_tasks.tasks.goal import GlobalPlace, Plan, Rotate, SingleGoal
 from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, skipped_to
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
@@ -32,7 +33,7 @@ from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.limits import safe_braking
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
-from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, same_frame
+from mav_tasks.tasks.task import Draft, Frame, Progress, Submitter, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
@@ -263,6 +264,13 @@ class VehicleTasks:
         self._book.record(VehicleIdentified(self.vehicle, uid, now))
         if before:
             self._may_be_another(now=now)
+
+    def set_home(self, place: GlobalPlace, frame: Frame, *, actor: str, now: float) -> None:
+        """Keep where the vehicle returns to, as long as it does not boot again."""
+        latitude, longitude = place.latitude_degE7, place.longitude_degE7
+        home = VehicleHomeSet(self.vehicle, latitude, longitude, frame, actor, now)
+        self.bounds.home = home
+        self._book.record(home)
 
     @property
     def has_uid(self) -> bool:

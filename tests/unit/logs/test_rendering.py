@@ -31,6 +31,7 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     TaskWaits,
     TaskWithdrawn,
+    VehicleHomeSet,
     VehicleIdentified,
     VehicleNoted,
     VehicleSeen,
@@ -79,6 +80,10 @@ SAMPLES: list[tuple[Event, dict[str, object]]] = [
     (QueueContinued(1, "a", AT), {"actor": "a"}),
     (VehicleIdentified(1, "uid", AT), {"uid": "uid"}),
     (VehicleSpeedSet(1, 0.5, "a", AT), {"speed": 0.5, "actor": "a"}),
+    (
+        VehicleHomeSet(1, 473_977_418, 85_455_938, Frame(None, None, AT - 50), "a", AT),
+        {"latitude_degE7": 473_977_418, "longitude_degE7": 85_455_938, "actor": "a"},
+    ),
     (ParameterSet("SPEED", nan, "a", AT), {"name": "SPEED", "value": None, "actor": "a"}),
     (SignaturesSeen((), (), 7, AT), {"signed_until": 7}),
     (VehicleSeen(1, "found", AT), {"text": "found"}),
@@ -121,11 +126,12 @@ def test_the_export_and_the_log_have_the_same_fields(
     record.created = UTC
     logged = strictly(json_line(record, str(event), None))
     assert set(logged) == set(exported)
-    assert {**logged, "level": "", "progress": 0, "terms": 0} == {
+    assert {**logged, "level": "", "progress": 0, "terms": 0, "frame": 0} == {
         **exported,
         "level": "",
         "progress": 0,
         "terms": 0,
+        "frame": 0,
     }
 
 

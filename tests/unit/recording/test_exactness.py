@@ -36,10 +36,10 @@ from mav_tasks.recording.surroundings import (
 )
 from mav_tasks.settings import Clients, Retention, Settings
 from mav_tasks.store.codec import Decoder
-from mav_tasks.tasks.events import ParameterSet, ServerStopped, VehicleSeen
+from mav_tasks.tasks.events import ParameterSet, ServerStopped, VehicleHomeSet, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Pose, Progress, Task, TaskId, Terms
+from mav_tasks.tasks.task import Frame, Pose, Progress, Task, TaskId, Terms
 from tests.unit.tasks.samples import draft
 
 PEERS = [("127.0.0.1", 14550), ("::1", 14550, 0, 0), "/dev/ttyUSB0", "rover1", 7]
@@ -134,6 +134,7 @@ def test_what_was_restored_comes_back_as_it_was() -> None:
         paused={2: TaskReason.STOPPED, 1: TaskReason.RESTARTED},
         uids={1: "x"},
         speeds={2: 0.3, 1: 1},
+        homes={2: VehicleHomeSet(2, 5, 6, Frame(None, 1, -0.0, None), "a", 3.0)},
         plans={(2, 0): (7, "[]"), (1, 1): (3, "ä")},
         parameters={"B": -0.0, "A": 1.5},
         ended_well=False,
