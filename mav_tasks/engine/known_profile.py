@@ -18,6 +18,7 @@ class KnownProfile:
         #: what is known of this vehicle; None: nothing
         self.chosen: VehicleProfile | None = None
         self._told = ""
+        self._said: tuple[Turning | None, float | None] = None, None  # by its parameters
 
     def __repr__(self) -> str:
         return f"KnownProfile({self.chosen})"
@@ -66,9 +67,15 @@ class KnownProfile:
             return self._by_default
         return with_yaw_rate(self._by_default, is_honoured=known == "honoured")
 
+    def turns(self, turning: Turning | None, radius: float | None) -> None:
+        """Note how the vehicle's parameters say that it turns; None: they do not say."""
+        self._said = turning, radius
+
     def _turning_as_known(self, persona: Persona) -> Persona:
+        """A profile was measured, and comes before what parameters say."""
         if self.chosen is None or not self.chosen.turning:
-            return persona
+            turning, said = self._said
+            return persona if turning is None else with_turning(persona, turning, radius=said)
         radius = self.chosen.turning_radius
         return with_turning(persona, Turning(self.chosen.turning), radius=radius)
 

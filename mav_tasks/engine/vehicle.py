@@ -34,7 +34,7 @@ from mav_tasks.services.identity import identity_of
 from mav_tasks.services.offboard import Phase, Refused
 from mav_tasks.services.orders import Speeds
 from mav_tasks.services.persona import Persona
-from mav_tasks.settings import SET_FAILSAFE, Settings
+from mav_tasks.settings import SET_FAILSAFE, Settings, Turning
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace, ends_at_home
@@ -276,6 +276,14 @@ class Vehicle:
     def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
         self.requests.loss_failsafe.receive(message)
         self._note_failsafe(now=now)
+        turning = self.requests.turning
+        before = turning.turning
+        turning.receive(message)
+        self.known.turns(turning.turning, turning.radius)
+        if turning.turning is not before:
+            self._use_profile(now=now)
+        if turning.turning is Turning.STEERED is not before:
+            self._book.record(VehicleSeen(self.system_id, "steers as a car", now))
         self.wake(now=now)
 
     def _note_failsafe(self, *, now: float) -> None:
@@ -317,7 +325,7 @@ class Vehicle:
         if not self._clock.is_running:
             self.step(now=now)
         self._ask_for_rates(now=now)
-        self.requests.ask_for_failsafe()
+        self.requests.ask_for_parameters()
         self._note_failsafe(now=now)
         self._use_profile(now=now)
 
@@ -408,6 +416,7 @@ class Vehicle:
         self.requests.ask_which_again()
         self.requests.intervals.ask_all_again()
         self.requests.loss_failsafe.forget()
+        self.requests.turning.forget()
         self.forget_start()
         before = self._authority.take_disarmed(since=booted_at)
         if self.tasks.is_stopped:

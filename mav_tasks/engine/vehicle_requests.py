@@ -21,6 +21,7 @@ from mav_tasks.services.mission_uploader import Done, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
 from mav_tasks.services.orders import moves
 from mav_tasks.services.persona import Persona
+from mav_tasks.services.turning_kind import TurningKind
 from mav_tasks.settings import Watch
 
 ASK_WHICH = 5  # times that a vehicle is asked for its AUTOPILOT_VERSION
@@ -57,6 +58,7 @@ class VehicleRequests:
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
+        self.turning = TurningKind(target, persona)
         self._shows = ASK_TO_SHOW  # times more that it is asked for a heartbeat
         self._versions_asked = 0
         self._ask_version_at = now
@@ -168,9 +170,9 @@ class VehicleRequests:
             self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
             self.flush(now=now)
 
-    def ask_for_failsafe(self) -> None:
-        """Ask whether the vehicle stops by itself, some times, until it has said so."""
-        for request in self.loss_failsafe.requests():
+    def ask_for_parameters(self) -> None:
+        """Ask how the vehicle stops by itself and how it turns, until it has said so."""
+        for request in (*self.loss_failsafe.requests(), *self.turning.requests()):
             self._outlet.send(request, self._source)
 
     def has_not_said_which(self, *, now: float) -> bool:

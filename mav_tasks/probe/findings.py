@@ -59,6 +59,8 @@ class Findings:
     #: what it does by its parameters, or by its make, when setpoints stop
     loss_by_parameters: str = ""
     failsafe_set: str = ""  # what was set for good so that it stands; "": nobody asked for that
+    turning: str = ""  # value of a Turning, by its parameters
+    turning_radius: float | None = None  # m, the same; None: no more than is taken for granted
     mission_items: int | None = None  # on board, home not counted
     prearm: str = ""  # "ok", "not ok", or "" where it does not say
     prearm_texts: list[str] = field(default_factory=list)

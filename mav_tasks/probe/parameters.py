@@ -11,6 +11,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.findings import Findings
 from mav_tasks.probe.steps import Steps, Wait
+from mav_tasks.services import turning_kind
 from mav_tasks.services.loss_failsafe import AFTER, LossFailsafe
 
 BYTEWISE = 16  # MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
@@ -22,11 +23,13 @@ ARDUPILOT = (
     *("FS_ACTION", "FS_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_THR_ENABLE"),
     *("FS_EKF_ACTION", "FS_CRASH_CHECK", "GUID_OPTIONS", "FENCE_ENABLE", "FENCE_ACTION"),
     *("ARMING_CHECK", "ARMING_REQUIRE", "WP_SPEED", "CRUISE_SPEED", "ATC_DECEL_MAX"),
+    *turning_kind.ARDUPILOT,
 )
 PX4 = (
     *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_IN_MODE", "COM_RC_LOSS_T", "COM_DL_LOSS_T"),
     *("NAV_RCL_ACT", "COM_RCL_EXCEPT", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
     *("COM_DISARM_PRFLT", "RO_SPEED_LIM"),
+    *turning_kind.PX4,
 )
 BY_PERSONA: Mapping[str, tuple[str, ...]] = {"ardupilot": ARDUPILOT, "px4": PX4, "generic": PX4}
 #: what an ArduPilot Rover does, whatever its parameters say
@@ -51,6 +54,12 @@ def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
         else:
             findings.parameters[name] = value_of(value, is_bytewise=is_bytewise)
     findings.loss_by_parameters = _loss_of(talk)
+    if talk.persona is not None:
+        kind = turning_kind.TurningKind(talk.target, talk.persona)
+        for message in talk.parameters.values():
+            kind.receive(message)
+        findings.turning = "" if kind.turning is None else kind.turning.value
+        findings.turning_radius = kind.radius
 
 
 def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:

@@ -28,6 +28,8 @@ def profile_of(findings: Findings, *, probed: str) -> VehicleProfile:
         probed=probed,
         yaw_rate=drive.yaw_rate,
         reverse=drive.reverse,
+        turning=findings.turning,
+        turning_radius=findings.turning_radius,
         setpoints=tuple(drive.accepted),
         loss_stop=drive.loss_stop,
         setpoint_timeout=drive.setpoint_timeout,

@@ -94,7 +94,10 @@ def ask_prearm(talk: Conversation, findings: Findings) -> Steps[None]:
         yield pause(PREARM_TIME)
     findings.prearm_texts = list(dict.fromkeys(talk.texts[mark:]))
     status = talk.latest.get(m.SysStatus.id)
-    if isinstance(status, m.SysStatus) and status.onboard_control_sensors_present & PREARM:
+    if isinstance(status, m.SysStatus) and (
+        status.onboard_control_sensors_present & PREARM
+        or status.onboard_control_sensors_health & PREARM  # PX4 1.17 sets it in health only
+    ):
         is_healthy = bool(status.onboard_control_sensors_health & PREARM)
         findings.prearm = "ok" if is_healthy else "not ok"
 

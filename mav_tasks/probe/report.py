@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mav_tasks.mavlink.enums import MavResult, MavType
 from mav_tasks.probe.findings import Drive, Findings, Rate
-from mav_tasks.settings import SET_FAILSAFE, Identity
+from mav_tasks.settings import SET_FAILSAFE, Identity, Turning
 
 NOT_TRIED = "not tried: that needs --drive"
 UNKNOWN = "not known"
@@ -80,6 +80,11 @@ def _lines(findings: Findings) -> Iterator[Line]:
     yield from _arming(findings)
     yield from _mission(findings)
     yield _without_setpoints(findings.loss_by_parameters)
+    if findings.turning:
+        radius = findings.turning_radius
+        circle = "" if radius is None else f", least radius {radius:.1f} m"
+        words = "on the spot" if findings.turning == Turning.ON_SPOT.value else "as a car"
+        yield Line("turns", f"{words}, by its parameters{circle}")
     if findings.failsafe_set:
         yield Line("loss failsafe", findings.failsafe_set, Mark.GOOD)
     for name, value in findings.parameters.items():

@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.settings import Settings, VehicleProfile
+from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.parameters import INT16, Parameter
 from rover_sim.personas import Persona
 from tests.kit.car import Car
+from tests.kit.client import DENIED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_PX4, go_to
 from tests.kit.store import PromptSqliteStore
@@ -119,3 +122,25 @@ def test_who_names_a_heading_reads_that_it_is_left_out(make_car: Drive) -> None:
     assert any(words in text for text in world.client.texts())
     world.until_idle(tasks=2, within=90)
     assert world.state(2)[0] is S.COMPLETED
+
+
+class TestOneOfWhichNobodyHasAProfile:
+    """Its parameters say that it steers as a car: SERVO1_FUNCTION 26."""
+
+    @pytest.fixture
+    def world(self, make_world: MakeWorld) -> World:
+        outputs = (Parameter("SERVO1_FUNCTION", 26, INT16), Parameter("SERVO3_FUNCTION", 70, INT16))
+        car = replace(PROMPT, parameters=(*PROMPT.parameters, *outputs))
+        return make_world(persona=car, body=partial(Car, radius=RADIUS))
+
+    def test_a_go_to_is_driven_all_the_same(self, world: World) -> None:
+        go_to(world, -3.0, 4.0)
+        world.until_idle(tasks=1, within=90)
+        assert world.state(1)[0] is S.COMPLETED
+        assert is_at(world, -3.0, 4.0)
+
+    def test_a_turn_on_the_spot_is_refused(self, world: World) -> None:
+        sent = world.client.rotate(90)
+        world.run(0.5)
+        assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+        assert any("steers as a car" in text for text in world.client.texts())

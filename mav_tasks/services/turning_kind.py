@@ -1,0 +1,93 @@
+"""How a vehicle can turn, as its parameters have it: on the spot, or as a car.
+
+ArduPilot Rover 4.6: SERVOn_FUNCTION 26 is steering, 73 and 74 are the throttles of the left and the
+right side; one that has both is skid-steered. TURN_RADIUS is the least radius, m. PX4 1.15 to 1.17:
+CA_AIRFRAME 5 is Ackermann, 6 differential, 13 mecanum; where that is not there the thousands of
+SYS_AUTOSTART (51 Ackermann). Its least radius is RA_WHEEL_BASE over the tangent of RA_MAX_STR_ANG.
+MAVLink guide, "Parameter Protocol".
+"""
+
+from math import isfinite, pi, tan
+from struct import pack, unpack
+
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.messages import ParamRequestRead, ParamValue
+from mav_tasks.services.persona import Persona
+from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning
+
+OUTPUTS = 8  # of which a rover's steering and throttles are some
+STEERING, LEFT, RIGHT = 26, 73, 74  # SERVOn_FUNCTION
+FUNCTIONS = tuple(f"SERVO{number}_FUNCTION" for number in range(1, OUTPUTS + 1))
+RADIUS = "TURN_RADIUS"  # m
+AIRFRAME, AUTOSTART = "CA_AIRFRAME", "SYS_AUTOSTART"
+BASE, ANGLE = "RA_WHEEL_BASE", "RA_MAX_STR_ANG"  # m, rad
+BY_AIRFRAME = {5: Turning.STEERED, 6: Turning.ON_SPOT, 13: Turning.ON_SPOT}
+BY_AUTOSTART = {50: Turning.ON_SPOT, 51: Turning.STEERED, 52: Turning.ON_SPOT}
+ARDUPILOT = (*FUNCTIONS, RADIUS)
+PX4 = (AIRFRAME, AUTOSTART, BASE, ANGLE)
+ASKS = 5  # times that a parameter is asked for
+REAL32 = 9  # MAV_PARAM_TYPE
+
+
+class TurningKind:
+    """What is known of one vehicle's way of turning."""
+
+    def __init__(self, target: Address, persona: Persona) -> None:
+        self._target = target
+        self._is_bytewise = persona.has_main_modes  # PX4: an integer's bytes stand in the float
+        self._names = PX4 if persona.has_main_modes else ARDUPILOT
+        self._values: dict[str, float] = {}
+        self._asked = 0
+
+    def __repr__(self) -> str:
+        return f"TurningKind({self.turning})"
+
+    @property
+    def turning(self) -> Turning | None:
+        """Return how it turns; None: it has not said so."""
+        if self._is_bytewise:
+            return self._by_airframe()
+        functions = {int(self._values[name]) for name in FUNCTIONS if name in self._values}
+        if {LEFT, RIGHT} <= functions:
+            return Turning.ON_SPOT
+        return Turning.STEERED if STEERING in functions else None
+
+    @property
+    def radius(self) -> float | None:
+        """Return its least turning radius, m; None: no more than is taken for granted."""
+        radius = self._values.get(RADIUS)
+        if BASE in self._values and 0.0 < self._values.get(ANGLE, 0.0) < pi / 2:
+            radius = self._values[BASE] / tan(self._values[ANGLE])
+        # asked for less it swings beyond: its steering takes its time (ArduPilot 4.6.3)
+        return radius if radius is not None and radius > DEFAULT_TURNING_RADIUS else None
+
+    def requests(self) -> list[ParamRequestRead]:
+        """Return what is to be asked now; called about once a second."""
+        missing = [name for name in self._names if name not in self._values]
+        if not missing or self._asked >= ASKS:
+            return []
+        self._asked += 1
+        return [ParamRequestRead(*self._target, name.encode(), -1) for name in missing]
+
+    def receive(self, message: ParamValue) -> None:
+        """Take in a parameter of the vehicle; whoever asked for it, or changed it."""
+        param_id = message.param_id
+        name = param_id.decode("ascii", "replace") if isinstance(param_id, bytes) else param_id
+        name = name.rstrip("\0")
+        if name not in self._names:
+            return
+        value = float(message.param_value)
+        if self._is_bytewise and message.param_type != REAL32:
+            (value,) = unpack("<i", pack("<f", message.param_value))
+        if isfinite(value):
+            self._values[name] = value
+
+    def forget(self) -> None:
+        """The vehicle has restarted, or is another one: it is asked again."""
+        self._asked = 0
+        self._values.clear()
+
+    def _by_airframe(self) -> Turning | None:
+        if AIRFRAME in self._values:
+            return BY_AIRFRAME.get(int(self._values[AIRFRAME]))
+        return BY_AUTOSTART.get(int(self._values.get(AUTOSTART, 0)) // 1000)
