@@ -27,7 +27,10 @@ SetFailsafe = Annotated[
 ]
 DriveFlag = Annotated[
     bool,
-    typer.Option("--drive", help="Arm it and drive it, slowly, within 1 m of where it stands."),
+    typer.Option(
+        "--drive",
+        help="Arm it and drive it, slowly, within 1 m of where it stands (a car: 4 m).",
+    ),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="With --drive: do not ask first.")]
 Speed = Annotated[
@@ -66,7 +69,8 @@ Keys = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 QUESTION = """\
-The rover will be armed and driven, at up to {speed:g} m/s, within a box of 2 m about its place.
+The rover will be armed and driven, at up to {speed:g} m/s, within a box of 2 m about its place,
+of 8 m or more if its parameters say that it steers as a car.
 Is there room, is nobody near it, and can you stop it by hand? If this program is killed, only the
 rover's own time-out stops it. Type "yes" to drive: """
 SIGNALLED = 128  # as a shell reports a signal

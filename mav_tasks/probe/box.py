@@ -3,10 +3,14 @@
 from dataclasses import dataclass
 from math import cos, hypot, inf, sin
 
+from mav_tasks.settings import Turning
 from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.task import Pose
 
 HALF = 1.0  # m, from the middle to each side: the box measures 2 m
+#: m, the same for one that steers as a car: it has to come out of its turning circle, of 1.5 m and
+#: more, and needs more way to come to a speed
+HALF_OF_CAR = 4.0
 AHEAD = 0.5  # s, in which a slow rover can stop: where it would be then must still be inside
 
 
@@ -16,6 +20,13 @@ class Box:
 
     middle: Pose
     half: float = HALF
+
+    @classmethod
+    def about(cls, middle: Pose, *, turning: str, radius: float | None) -> "Box":
+        """Return the box for one that turns so; ``turning`` is the value of a Turning."""
+        if turning != Turning.STEERED.value:
+            return cls(middle)
+        return cls(middle, max(HALF_OF_CAR, 3.0 * (radius or 0.0)))
 
     def place_of(self, pose: Pose) -> tuple[float, float]:
         """Give where a pose is, metres ahead of and to the right of the middle."""

@@ -26,6 +26,7 @@ class Drive:
     refused: list[str] = field(default_factory=list)
     yaw_rate: str = ""  # "honoured" or "ignored"
     turned_of_wanted: float | None = None  # on the spot, a share
+    turned_standing_deg: float | None = None  # in 2 s of zeros
     reverse: str = ""  # "yes" or "no"
     speed: float | None = None  # at which the stop was measured
     stopping_distance: float | None = None

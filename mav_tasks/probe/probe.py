@@ -21,12 +21,13 @@ from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
 from mav_tasks.probe.wheel import DriveEnded, Wheel, is_fresh
 from mav_tasks.services.offboard import Phase
-from mav_tasks.settings import Identity, Watch
-from mav_tasks.tasks.guidance import Motion
+from mav_tasks.settings import Identity, Turning, Watch
 
 FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven
 DRIVEN_TYPES = frozenset({10, 11})  # MAV_TYPE: ground rover, surface boat
 SETTER = Address(244, 191)  # beside the address of scripts
+#: a rover at rest says up to 0.07 m/s (ArduPilot 4.6.3, PX4 1.17); none is driven slower than 0.1
+AT_REST = Watch(still_speed=0.08)
 NEEDED = ("LOCAL_POSITION_NED", "ATTITUDE")
 
 
@@ -63,7 +64,7 @@ class Probe:
             source = SETTER
         self.findings = Findings()
         self.talk = Conversation(
-            source, system_id=options.system_id, watch=watch or Watch(), now=now
+            source, system_id=options.system_id, watch=watch or AT_REST, now=now
         )
         self._options = options
         self._has_rates = False
@@ -172,9 +173,11 @@ class Probe:
         if why or persona is None or motion is None:
             drive.ended = f"not driven: {why}"
             return
-        wheel = Wheel(talk, persona, drive, Box(motion.pose))
+        found = self.findings
+        box = Box.about(motion.pose, turning=found.turning, radius=found.turning_radius)
+        wheel = Wheel(talk, persona, drive, box)
         with_loss = self._may_try_loss(drive)
-        self.stage = "driving in a box of 2 m: keep clear; Ctrl-C stops it"
+        self.stage = f"driving in a box of {2 * box.half:g} m: keep clear; Ctrl-C stops it"
         try:
             yield from wheel.take()
             trials = Trials(
@@ -182,7 +185,8 @@ class Probe:
                 persona,
                 drive,
                 speed=self._options.speed,
-                loss_time=loss_time_of(self.findings),
+                loss_time=loss_time_of(found),
+                is_car=found.turning == Turning.STEERED.value,
             )
             yield from trials.run(with_loss=with_loss)
         except DriveEnded as end:
@@ -215,10 +219,6 @@ class Probe:
         if slow:
             each = ", ".join(f"{rate.name} at {rate.granted:.1f} Hz" for rate in slow)
             return f"{each}: too seldom to drive by"
-        if not _is_still(motion, talk.watch):
+        if motion is None or motion.speed >= talk.watch.still_speed:
             return "it moves"
         return ""
-
-
-def _is_still(motion: Motion | None, watch: Watch) -> bool:
-    return motion is not None and motion.speed < watch.still_speed

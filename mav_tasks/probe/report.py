@@ -13,6 +13,7 @@ from mav_tasks.settings import SET_FAILSAFE, Identity, Turning
 NOT_TRIED = "not tried: that needs --drive"
 UNKNOWN = "not known"
 TYPES: Mapping[int, str] = {MavType.GROUND_ROVER: "ground rover", MavType.SURFACE_BOAT: "boat"}
+TURNS_STANDING = 5.0  # deg, more than the noise of a heading
 SETPOINT_BIT, COMMAND_INT_BIT = 128, 8  # MAV_PROTOCOL_CAPABILITY
 
 
@@ -170,6 +171,11 @@ def _drive(drive: Drive | None) -> Iterator[Line]:
         share = drive.turned_of_wanted
         turned = "" if share is None else f" ({share:.0%} of the turn, on the spot)"
         yield Line("yaw rate", drive.yaw_rate + turned)
+    turned_standing = drive.turned_standing_deg
+    if turned_standing is not None:
+        is_turning = abs(turned_standing) > TURNS_STANDING
+        words = f"it turned by {turned_standing:.0f} deg in 2 s of zeros"
+        yield Line("standing", words, Mark.WARNING if is_turning else Mark.PLAIN)
     if drive.reverse:
         yield Line("reverse", drive.reverse)
     if drive.speed is not None:

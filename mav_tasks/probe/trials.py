@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, hypot, pi, sin
+from math import cos, degrees, hypot, pi, sin
 
 from mav_tasks.mavlink.enums import MavFrame
 from mav_tasks.probe.findings import Drive
@@ -22,6 +22,7 @@ TURN_RATE = 0.4  # rad/s
 TURN_TIME = 1.5  # s
 TURNED = 0.5  # of the wanted turn: it turns on the spot
 STRAIGHT = 0.3  # rad, of heading that driving backwards may change
+STAND_TIME = 2.0  # s of zeros
 RUN_UP = 10.0  # s at the most: it may have to turn round first
 AT_SPEED = 0.85  # of the speed wanted
 STEADY = 0.3  # s
@@ -74,9 +75,20 @@ class Trials:
     """Goes through them, and writes down what came of each."""
 
     def __init__(
-        self, wheel: Wheel, persona: Persona, drive: Drive, *, speed: float, loss_time: float
+        self,
+        wheel: Wheel,
+        persona: Persona,
+        drive: Drive,
+        *,
+        speed: float,
+        loss_time: float,
+        is_car: bool = False,
     ) -> None:
-        """``speed`` m/s of the stop; ``loss_time`` s without setpoints until it is to stop."""
+        """``speed`` m/s of the stop; ``loss_time`` s without setpoints until it is to stop.
+
+        ``is_car``: it turns only while it rolls, and is not asked to do so on the spot.
+        """
+        self._is_car = is_car
         self._wheel = wheel
         self._persona = persona
         self._drive = drive
@@ -91,6 +103,7 @@ class Trials:
         """All of them; DriveEnded if one cannot go on."""
         for kind in kinds_of(self._persona):
             yield from self._try_kind(kind)
+        yield from self._look_at_standing()
         yield from self._try_turning()
         yield from self._try_reverse()
         self._wheel.speak(self._own.persona)
@@ -128,10 +141,22 @@ class Trials:
         rate = Kind(self._persona, ARDUPILOT.setpoint_mask, MavFrame.BODY_NED, by_course=False)
         return rate if rate.name in self._drive.accepted else None
 
+    def _look_at_standing(self) -> Steps[None]:
+        """A PX4 takes a velocity of zero for a course: does it turn where it is to stand?"""
+        wheel = self._wheel
+        wheel.speak(self._own.persona)
+        before, end = wheel.motion.pose.yaw, wheel.now + STAND_TIME
+        while wheel.now < end:
+            yield from wheel.drive(STANDING)
+        self._drive.turned_standing_deg = round(degrees(wrap(wheel.motion.pose.yaw - before)), 1)
+
     def _try_turning(self) -> Steps[None]:
         kind, wheel, drive = self._rate_kind, self._wheel, self._drive
         if kind is None:
             drive.yaw_rate = "ignored"
+            return
+        if self._is_car:
+            drive.yaw_rate = "honoured"
             return
         shares: list[float] = []
         for rate in (TURN_RATE, -TURN_RATE):
@@ -233,7 +258,8 @@ class Trials:
         """Give the direction, ahead or where it can turn to by itself, with the most room; m."""
         wheel = self._wheel
         yaw = wheel.motion.pose.yaw
-        courses = [yaw, yaw + pi] if self._own.by_course else [yaw]
+        turns_round = self._own.by_course and not self._is_car
+        courses = [yaw, yaw + pi] if turns_round else [yaw]
         return max(((c, wheel.box.room(wheel.motion.pose, c)) for c in courses), key=lambda x: x[1])
 
 

@@ -1,10 +1,13 @@
 """Driving in the box: what is measured, and that it ends well, whatever happens on the way."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
+from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.links.memory import Conditions
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -16,7 +19,9 @@ from mav_tasks.probe.profile import profile_of, why_none
 from mav_tasks.probe.report import Mark, lines_of
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
+from rover_sim.parameters import INT16, Parameter
 from rover_sim.personas import ARDUPILOT, GENERIC, PX4, Mode, Persona
+from tests.kit.car import Car
 from tests.kit.probing import BOX, ProbeWorld, is_moving
 
 TURNING_PX4 = replace(PX4, honours_yaw_rate=True)
@@ -81,7 +86,7 @@ def test_setpoints_come_at_20_hertz_but_for_the_silence_that_is_meant() -> None:
 @TWO
 def test_a_bad_radio_spoils_the_figures_and_not_the_end(persona: Persona) -> None:
     world = ProbeWorld(drive=True, persona=persona)
-    world.net.conditions = Conditions(delay=0.05, jitter=0.05, loss=0.1, duplication=0.05)
+    world.net.conditions = Conditions(delay=0.05, jitter=0.05, loss=0.08, duplication=0.05)
     world.finish()
     world.run(2.0)
     assert (world.driven.ended, world.driven.loss_stop) == ("", "yes")
@@ -324,3 +329,47 @@ class TestInterrupt:
         assert world.probe.last_words() == []
         world.finish()
         assert world.probe.last_words() == []
+
+
+class TestCar:
+    """One that steers as a car, of which its parameters tell."""
+
+    def world(self) -> ProbeWorld:
+        outputs = (Parameter("SERVO1_FUNCTION", 26, INT16), Parameter("SERVO3_FUNCTION", 70, INT16))
+        persona = replace(ARDUPILOT, parameters=(*ARDUPILOT.parameters, *outputs))
+        return ProbeWorld(drive=True, persona=persona, body=partial(Car, radius=1.2))
+
+    def test_it_is_driven_in_a_larger_box_and_gets_a_profile_that_says_so(self) -> None:
+        world = self.world()
+        found = world.finish().findings
+        assert (world.driven.ended, world.rests()) == ("", True)
+        profile = profile_of(found, probed="2026-11-22T10:00:00Z")
+        assert (profile.turning, profile.yaw_rate, profile.reverse) == (
+            "steered",
+            "honoured",
+            "yes",
+        )
+        assert world.farthest < 4.0
+
+    def test_it_is_not_asked_to_turn_on_the_spot(self) -> None:
+        world = self.world()
+        world.finish()
+        assert not [each for _, each in world.setpoints() if each.vx == 0.0 and each.yaw_rate]
+
+
+def test_a_rover_that_says_at_rest_that_it_creeps_is_driven_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Real ones say up to 0.07 m/s while they stand."""
+    receive = MotionMonitor.receive
+
+    def noisy(self: MotionMonitor, message: Any, *, now: float) -> None:
+        if isinstance(message, m.LocalPositionNed):
+            message.vx += 0.05
+            message.vy += 0.05
+        receive(self, message, now=now)
+
+    monkeypatch.setattr(MotionMonitor, "receive", noisy)
+    world = ProbeWorld(drive=True)
+    world.finish()
+    assert (world.driven.ended, world.rests()) == ("", True)
