@@ -5,7 +5,7 @@ from struct import pack, unpack
 from typing import Any
 
 from rover_sim.check_vehicle.context import Context
-from rover_sim.check_vehicle.probe import AUTOPILOT
+from rover_sim.check_vehicle.probe import AUTOPILOT, Heard
 
 PARAM_VALUE, REAL32, UINT32 = 22, 9, 5
 LIST_LIMIT = 60.0  # s for all of them
@@ -36,14 +36,14 @@ def _read_list(context: Context) -> dict[str, Any]:
     heard: list[Any] = []
     while probe.now - last < QUIET and probe.now - began < LIST_LIMIT:
         probe.pump()
-        found = [each.message for each in probe.since(mark, PARAM_VALUE)]
+        found = _listed(probe.since(mark, PARAM_VALUE))
         if len(found) > len(heard):
             last = probe.now
         heard = found
         if heard and len(heard) >= heard[0].param_count:
             break
     probe.listen(0.3)  # one too many would come now
-    heard = [each.message for each in probe.since(mark, PARAM_VALUE)]
+    heard = _listed(probe.since(mark, PARAM_VALUE))
     if not report.expect(
         "list",
         bool(heard),
@@ -60,6 +60,14 @@ def _read_list(context: Context) -> dict[str, Any]:
     )
     _check_indices(context, heard, max(counts))
     return {each.param_id: each for each in heard}
+
+
+def _listed(heard: list[Heard]) -> list[Any]:
+    """Return those of the list: one without an index was sent for another reason.
+
+    An ArduPilot tells so of what it changes itself (4.6.3), a PX4 of its _HASH_CHECK (1.17).
+    """
+    return [each.message for each in heard if each.message.param_index != UNNUMBERED]
 
 
 def _check_indices(context: Context, heard: list[Any], count: int) -> None:

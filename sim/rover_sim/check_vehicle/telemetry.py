@@ -9,6 +9,7 @@ from rover_sim.check_vehicle.context import Context
 from rover_sim.check_vehicle.identity import REQUEST_MESSAGE
 
 ATTITUDE, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, GPS_RAW_INT = 30, 32, 33, 24
+EXTENDED_SYS_STATE = 245
 SYSTEM_TIME, POSITION_TARGET_LOCAL_NED = 2, 85
 WITH_BOOT_TIME = (ATTITUDE, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, SYSTEM_TIME)
 UNKNOWN = 65535
@@ -50,7 +51,9 @@ TELEMETRY: Mapping[int, Expected] = {
             and -1 <= m.battery_remaining <= 100
         ),
     ),
-    245: Expected("EXTENDED_SYS_STATE", "landed_state 1 to 4", lambda m: 1 <= m.landed_state <= 4),
+    EXTENDED_SYS_STATE: Expected(
+        "EXTENDED_SYS_STATE", "landed_state 1 to 4", lambda m: 1 <= m.landed_state <= 4
+    ),
     ATTITUDE: Expected(
         "ATTITUDE",
         "angles in rad, within ±π",
@@ -91,10 +94,19 @@ TELEMETRY: Mapping[int, Expected] = {
 }  # fmt: skip
 
 
+#: of one by whose landed_state nobody goes: an ArduPilot Rover says 0, undefined (4.6.3)
+ANY_LANDED_STATE = Expected(
+    "EXTENDED_SYS_STATE", "landed_state 0 to 4", lambda m: 0 <= m.landed_state <= 4
+)
+
+
 def check_telemetry(context: Context) -> None:
     """Each message has come by now, or comes on request; its last copy is looked at."""
     probe, report = context.probe, context.report
-    for message_id, expected in TELEMETRY.items():
+    asked = dict(TELEMETRY)
+    if not context.way.landed_state_counts:
+        asked[EXTENDED_SYS_STATE] = ANY_LANDED_STATE
+    for message_id, expected in asked.items():
         mark, answer = probe.mark(), None
         message = probe.last(message_id)
         if message is None:

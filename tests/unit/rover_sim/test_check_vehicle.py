@@ -502,3 +502,46 @@ def test_no_motion_is_asked_of_a_rover_that_is_armed_by_somebody_else() -> None:
     assert {line.outcome for line in report.lines} == {Outcome.SKIPPED}
     assert wire.setpoints == []
     assert wire.vehicle.autopilot.armed
+
+
+# -- what genuine ones do, and what is no fault
+
+
+def tells_of_a_change(name: str, kind: int) -> Callable[[Message], list[Message]]:
+    """A PARAM_VALUE without an index, as a genuine one sends unasked, before each of the list."""
+
+    def change(message: Message) -> list[Message]:
+        if not isinstance(message, m.ParamValue) or message.param_index == 65535:
+            return [message]
+        unasked = m.ParamValue(name.encode(), 0.0, kind, message.param_count, 65535)
+        return [unasked, message]
+
+    return change
+
+
+GENUINE = {
+    "an ArduPilot's landed_state": (ARDUPILOT, with_fields(m.ExtendedSysState, landed_state=0)),
+    "an ArduPilot that tells of a parameter": (ARDUPILOT, tells_of_a_change("STAT_RUNTIME", 6)),
+    "a PX4's _HASH_CHECK in its list": (PX4, tells_of_a_change("_HASH_CHECK", 5)),
+}
+
+
+@pytest.mark.parametrize("what", GENUINE)
+def test_what_genuine_ones_do_is_no_fault(what: str) -> None:
+    persona, says = GENUINE[what]
+    report = run(VirtualWire(persona, says=says), NOTHING)
+    assert [str(line) for line in report.failed] == []
+
+
+def test_a_message_that_is_accepted_and_not_sent_is_a_fault_only_where_it_is_needed() -> None:
+    def says(message: Message) -> list[Message]:
+        if isinstance(message, m.CommandAck) and message.command == REQUEST_MESSAGE:
+            message.result = 0
+        return [message]
+
+    report = run(VirtualWire(ARDUPILOT, says=says), NOTHING, ("identity", "commands"))
+    failed = {line.name for line in report.failed}
+    assert "GIMBAL_MANAGER_INFORMATION on request" not in failed
+    assert "an unknown message" in failed
+    none = run(VirtualWire(ARDUPILOT, says=no_refusals), NOTHING, ("identity", "commands"))
+    assert "GIMBAL_MANAGER_INFORMATION on request" in {line.name for line in none.failed}
