@@ -38,6 +38,7 @@ class Conventions:
     hold: int  # HEARTBEAT.custom_mode
     control: int  # the mode that follows setpoints: GUIDED, OFFBOARD
     nonsense: int  # a mode that there is not
+    accepts_nonsense: bool  # says ACCEPTED to it, and stays as it is
     mode_in_two_parts: bool  # DO_SET_MODE: main mode in param2, sub mode in param3
     control_needs_stream: bool  # setpoints first, then the mode; else the mode first
     bytewise: bool  # an integer parameter's bytes stand in the float; else it is cast
@@ -58,6 +59,7 @@ ARDUPILOT_WAY = Conventions(
     hold=4,
     control=15,
     nonsense=99,
+    accepts_nonsense=False,
     mode_in_two_parts=False,
     control_needs_stream=False,
     bytewise=False,
@@ -77,6 +79,7 @@ PX4_WAY = Conventions(
     hold=4 << 16 | 3 << 24,
     control=6 << 16,
     nonsense=99 << 16,
+    accepts_nonsense=True,  # 1.17
     mode_in_two_parts=True,
     control_needs_stream=True,
     bytewise=True,
@@ -97,6 +100,7 @@ GENERIC_WAY = Conventions(
     hold=PX4_WAY.hold,
     control=PX4_WAY.control,
     nonsense=PX4_WAY.nonsense,
+    accepts_nonsense=True,
     mode_in_two_parts=True,
     control_needs_stream=True,
     bytewise=True,

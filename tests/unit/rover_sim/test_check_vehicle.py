@@ -522,6 +522,7 @@ def tells_of_a_change(name: str, kind: int) -> Callable[[Message], list[Message]
 GENUINE = {
     "an ArduPilot's landed_state": (ARDUPILOT, with_fields(m.ExtendedSysState, landed_state=0)),
     "an ArduPilot that tells of a parameter": (ARDUPILOT, tells_of_a_change("STAT_RUNTIME", 6)),
+    "a PX4's airspeed, of which it has none": (PX4, with_fields(m.VfrHud, airspeed=math.nan)),
     "a PX4's _HASH_CHECK in its list": (PX4, tells_of_a_change("_HASH_CHECK", 5)),
 }
 
@@ -545,3 +546,14 @@ def test_a_message_that_is_accepted_and_not_sent_is_a_fault_only_where_it_is_nee
     assert "an unknown message" in failed
     none = run(VirtualWire(ARDUPILOT, says=no_refusals), NOTHING, ("identity", "commands"))
     assert "GIMBAL_MANAGER_INFORMATION on request" in {line.name for line in none.failed}
+
+
+def test_a_px4_that_accepts_a_mode_that_there_is_not_may_not_leave_its_own() -> None:
+    def says(message: Message) -> list[Message]:
+        if isinstance(message, m.CommandAck) and message.command == 176:
+            message.result = 0
+        return [message]
+
+    assert run(VirtualWire(PX4, says=says), NOTHING, ("identity", "modes")).failed == []
+    failed = run(VirtualWire(ARDUPILOT, says=says), NOTHING, ("identity", "modes")).failed
+    assert [line.name for line in failed] == ["a mode that there is not"]
