@@ -25,6 +25,7 @@ from rover_sim.motion import MotionControl
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
+from rover_sim.realism import Realism
 from rover_sim.setpoints import Destination
 from rover_sim.streams import Streams
 from rover_sim.telemetry import Telemetry
@@ -49,9 +50,13 @@ class Autopilot:
         unix_offset: float,
         truth: BodyState,
         now: float,
+        realism: Realism,
+        seed: int,
     ) -> None:
         self.address = Address(system_id, AUTOPILOT)
         self._persona = persona
+        self._realism = realism
+        self._seed = seed
         self._origin = origin
         self._unix_offset = unix_offset
         self._outbox = Outbox()
@@ -91,7 +96,7 @@ class Autopilot:
         self._announce(now)
         for message_id in self._streams.take_due(now=now):
             self._send(message_id, now)
-        return self._motion.step(demand, truth)
+        return self._motion.step(demand, truth, self._estimate)
 
     def take_messages(self) -> list[Message]:
         """Hand over what there is to say, to everybody on the link."""
@@ -152,7 +157,7 @@ class Autopilot:
         outbox, missions, persona = self._outbox, self._missions, self._persona
         self._up_at = up_at
         self._streams = Streams(persona.streams, now=up_at)
-        self._motion = MotionControl()
+        self._motion = MotionControl(self._realism.drive)
         rules = persona.rules(
             FlightParts(
                 origin=self._origin,

@@ -1,6 +1,8 @@
 """The speed and turn-rate controllers: demands into wheel speeds, within what a rover can do."""
 
 from rover_sim.body import BodyState
+from rover_sim.estimate import Estimate
+from rover_sim.realism import Drive
 from rover_sim.steering import MAX_YAW_RATE, Demand
 
 CONTROL_RATE = 40  # Hz. Divides 240 Hz physics; 20 and 10 Hz telemetry comes evenly spaced
@@ -18,7 +20,8 @@ class MotionControl:
     Speed needs no loop: wheels that push straight ahead hardly slip.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, drive: Drive) -> None:
+        self._drive = drive
         self._speed = 0.0
         self._yaw_rate = 0.0
         self._correction = 0.0
@@ -26,15 +29,19 @@ class MotionControl:
     def __repr__(self) -> str:
         return f"MotionControl({self._speed:.2f} m/s, {self._yaw_rate:.2f} rad/s)"
 
-    def step(self, demand: Demand, truth: BodyState) -> tuple[float, float]:
-        """Give forward speed and yaw rate for the wheels, for one control period."""
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+        """Return forward speed and yaw rate for the wheels, for one control period.
+
+        A real drive closes its loops on the estimate, an exact one on the truth.
+        """
+        yaw_rate = truth.yaw_rate if self._drive is Drive.EXACT else estimate.yaw_rate
         speed = self._speed = _ramped_speed(self._speed, demand)
         wanted = max(-MAX_YAW_RATE, min(MAX_YAW_RATE, demand.yaw_rate))
         rate = self._yaw_rate = _toward(self._yaw_rate, wanted, YAW_ACCELERATION * CONTROL_PERIOD)
-        if rate == 0.0 and (speed == 0.0 or abs(truth.yaw_rate) < 1e-6):
+        if rate == 0.0 and (speed == 0.0 or abs(yaw_rate) < 1e-6):
             self._correction = 0.0
             return speed, 0.0  # locked wheels are the exact stop
-        error = rate - truth.yaw_rate
+        error = rate - yaw_rate
         integral = self._correction + YAW_I * error * CONTROL_PERIOD
         self._correction = max(-YAW_I_LIMIT, min(YAW_I_LIMIT, integral))
         return speed, rate + YAW_P * error + self._correction

@@ -23,6 +23,7 @@ from rover_sim.parameters import Parameter, ParameterProtocol
 from rover_sim.px4_commands import px4_commands
 from rover_sim.px4_parameters import PX4_PARAMETERS, Bytewise
 from rover_sim.px4_rules import Px4Rules
+from rover_sim.realism import ARDUPILOT_REALISM, PX4_REALISM, Realism
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
 FENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot's is healthy unless it is breached
@@ -55,6 +56,7 @@ class Persona:
     system_id_parameter: str  # the name of the one that shows the system id
     speed_parameter: str  # the name of the one that limits its speed, m/s
     honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
+    realism: Realism  # how unkind it is, unless another is asked for
 
 
 ARDUPILOT = Persona(
@@ -104,6 +106,7 @@ ARDUPILOT = Persona(
     system_id_parameter="SYSID_THISMAV",
     speed_parameter="WP_SPEED",
     honours_yaw_rate=True,
+    realism=ARDUPILOT_REALISM,
 )
 
 STICKS = MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED
@@ -157,6 +160,7 @@ PX4 = Persona(
     system_id_parameter="MAV_SYS_ID",
     speed_parameter="RD_MAX_SPEED",
     honours_yaw_rate=False,
+    realism=PX4_REALISM,
 )
 
 #: speaks as PX4 does and says that it is none that anybody knows

@@ -14,6 +14,7 @@ from rover_sim.body import Body, BodyState
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.motion import CONTROL_PERIOD
 from rover_sim.personas import ARDUPILOT, Persona
+from rover_sim.realism import Realism
 from rover_sim.signatures import RoverSignatures
 
 PEER_TIMEOUT = 10.0  # s of silence after which a peer is no longer talked to
@@ -107,8 +108,12 @@ def make_vehicle(
     origin: Origin = DEFAULT_ORIGIN,
     unix_offset: float = 0.0,
     key: Key | None = None,
+    realism: Realism | None = None,
+    seed: int = 0,
 ) -> Vehicle:
     """Put an autopilot that has just been switched on into a body.
+
+    ``realism`` is how unkind it is, None as its make; ``seed`` draws what is chance in that.
 
     ``unix_offset`` is Unix time minus ``now``; 0 where there is no wall clock (SYSTEM_TIME then
     says unknown). With a ``key`` it signs, and hears only what is signed with it.
@@ -120,6 +125,8 @@ def make_vehicle(
         unix_offset=unix_offset,
         truth=body.state,
         now=now,
+        realism=persona.realism if realism is None else realism,
+        seed=seed,
     )
     signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
     return Vehicle(body=body, autopilot=autopilot, now=now, signatures=signatures)

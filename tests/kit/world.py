@@ -25,6 +25,7 @@ from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, Mode, Persona
+from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.client import ACK, REQUEST, FakeClient
@@ -61,6 +62,8 @@ def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
         unix_offset=0.0,
         truth=body.state,
         now=now,
+        realism=EXACT,
+        seed=0,
     )
     autopilot.address = Address(number, 1)
     return Vehicle(body=body, autopilot=autopilot, now=now)
@@ -117,6 +120,7 @@ class World(VirtualWorld):
                 persona=persona,
                 unix_offset=wall_offset or 0.0,
                 key=rover_key,
+                realism=EXACT,  # the scenarios were written for exact arithmetic
             )
             if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
                 # by default a PX4 rover drives home when setpoints stop, and is not driven at all;

@@ -29,6 +29,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.restored import Restored
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
+from rover_sim.realism import EXACT
 from rover_sim.vehicle import make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 
@@ -41,7 +42,8 @@ def recorded(folder: Path, *, seconds: float = 2.5, **options: Any) -> Path:
     decisions = Decisions(folder, Settings(), None, now=0.0, **options)
     net = MemoryNet()
     world = VirtualWorld(net)
-    rover = make_vehicle(KinematicBody(start=Pose(), slip=0.0, seed=None), system_id=1, now=0.0)
+    body = KinematicBody(start=Pose(), slip=0.0, seed=None)
+    rover = make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
     server = InMemoryServer(net, vehicles=("rover",), witnesses=[decisions])
     server.pump.handle(WallClock(UTC), now=0.0)
     world.join(RoverParty(rover, net.link("rover")), server)

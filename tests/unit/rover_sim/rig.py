@@ -14,6 +14,7 @@ from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import BodyState, Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4, Persona
+from rover_sim.realism import EXACT, Realism
 from rover_sim.vehicle import make_vehicle
 
 #: shows each change at once, so that a test need not wait for the next second
@@ -45,10 +46,14 @@ class Rig:
         slip: float = 0.3,
         wait: float = READY,
         persona: Persona = PROMPT,
+        realism: Realism = EXACT,
+        seed: int = 0,
     ) -> None:
         self.now = 1000.0
         body = KinematicBody(start=start, slip=slip, seed=None)
-        self.vehicle = make_vehicle(body, system_id=1, persona=persona, now=self.now)
+        self.vehicle = make_vehicle(
+            body, system_id=1, persona=persona, now=self.now, realism=realism, seed=seed
+        )
         self.autopilot = self.vehicle.autopilot
         self.heard: list[Message] = []
         self._decoder = Decoder()

@@ -12,13 +12,14 @@ from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode
+from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 from tests.unit.rover_sim.rig import heartbeat
 
 
 def fresh() -> Vehicle:
     body = KinematicBody(start=Pose(), slip=0.0, seed=None)
-    return make_vehicle(body, system_id=1, now=0.0)
+    return make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
 
 
 def run(vehicle: Vehicle, until: float) -> set[object]:

@@ -1,0 +1,197 @@
+"""How unkind a simulated rover is: its estimator, its boot, its links and its drive train.
+
+Values only; the parts that read them do the work. The figures are those of recordings of real
+autopilots (ArduPilot Rover 4.6.3, PX4 1.17.0, each on a simulated vehicle of its own). ``EXACT``
+is the opposite: a rover that knows where it is, is ready at once and does what it is told.
+"""
+
+from dataclasses import dataclass, fields, replace
+from enum import Enum
+from math import radians
+
+
+class Drive(Enum):
+    """How the rover follows what its flight stack demands."""
+
+    EXACT = "exact"  # the speed asked for, ramped; zero and HOLD are a stop
+    REAL = "real"  # overshoot, least speed, free rolling, as the make's controllers do
+
+
+class Home(Enum):
+    """When home moves by itself."""
+
+    AS_ARMED = "as armed"  # when it is armed, if its make does so; else never
+    FOLLOWS = "follows"  # also while it is disarmed, to where it is
+
+
+class Gps(Enum):
+    """The class of the satellite receiver."""
+
+    FINE = "fine"  # centimetres
+    METRE = "metre"  # 0.2 m and 0.06 to 0.08 m/s of noise
+
+
+@dataclass(frozen=True, slots=True)
+class Wander:
+    """An error that wanders over seconds about a fixed value: a first-order Gauss-Markov process.
+
+    Not white noise: neighbouring samples are nearly equal, and a mean over a second is as wrong.
+    """
+
+    spread: float  # standard deviation of one axis, about the fixed value
+    time: float  # s, in which it forgets (autocorrelation 1/e)
+    least: float = 0.0  # the fixed value is drawn between these two, for a vector its length
+    most: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorError:
+    """By how much the estimate is off. Each axis wanders on its own; a seed decides how."""
+
+    velocity: Wander  # m/s, north and east
+    position: Wander  # m, north and east
+    yaw: Wander  # rad
+    yaw_rate: Wander  # rad/s
+    pushing: Wander | None = None  # m/s, added after it has pushed and stood; None: no more
+
+
+@dataclass(frozen=True, slots=True)
+class BootTimes:
+    """When what is there, s after switching on."""
+
+    initialised: float  # ArduPilot: INITIALISING ends, in MANUAL; arming says what it waits for
+    mode_lost: float  # a mode entered before is lost, once: ArduPilot is in MANUAL again
+    heading: float  # the estimate has a heading; before it says north
+    fix: float  # the receiver has a position
+    position: float  # the estimate has a position; home is there, without its altitude
+    origin: float  # GPS_GLOBAL_ORIGIN, and home as it should be
+    healthy: float  # the pre-arm bit of SYS_STATUS
+    armable: float
+    uses_gps: float  # the text that says so
+
+    def scaled(self, factor: float) -> "BootTimes":
+        """Return the same boot, all of it so much longer."""
+        return BootTimes(*(getattr(self, field.name) * factor for field in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTiming:
+    """What it sends, when."""
+
+    first_answer: float  # s, from a command to its COMMAND_ACK, at least
+    last_answer: float  # s, at most
+    in_pairs: bool  # positions that are due come late, two at a time
+    announces_changes: bool  # a HEARTBEAT at once when mode or arming changed
+
+
+@dataclass(frozen=True, slots=True)
+class Realism:
+    """How unkind the rover is."""
+
+    estimator: EstimatorError | None  # None: the estimate is the truth
+    boot: BootTimes
+    timing: LinkTiming | None  # None: it answers at once and sends evenly
+    drive: Drive
+    home: Home
+    stick_adds_speed: bool  # ArduPilot: the throttle stick counts in GUIDED
+    tells_origin: bool = True  # GPS_GLOBAL_ORIGIN
+
+    def with_boot(self, boot: BootTimes) -> "Realism":
+        """Return the same with another boot."""
+        return replace(self, boot=boot)
+
+
+NO_BOOT = BootTimes(  # everything but arming is there at once, and that as fast as tests want it
+    initialised=0.25,
+    mode_lost=0.0,
+    heading=0.0,
+    fix=0.0,
+    position=0.0,
+    origin=0.0,
+    healthy=0.0,
+    armable=0.5,
+    uses_gps=float("inf"),
+)
+SHORT = 0.05  # of the real times: ArduPilot can be armed after 1.25 s instead of 25 s
+
+EXACT = Realism(
+    estimator=None,
+    boot=NO_BOOT,
+    timing=None,
+    drive=Drive.EXACT,
+    home=Home.AS_ARMED,
+    stick_adds_speed=False,
+)
+
+ARDUPILOT_BOOT = BootTimes(  # recorded, s from the first message
+    initialised=1.0,
+    mode_lost=2.2,
+    heading=0.0,
+    fix=9.7,
+    position=10.2,
+    origin=21.0,
+    healthy=23.3,
+    armable=25.0,
+    uses_gps=41.8,
+)
+PX4_BOOT = BootTimes(
+    initialised=0.0,
+    mode_lost=0.0,
+    heading=1.0,
+    fix=0.0,
+    position=0.0,
+    origin=1.0,
+    healthy=4.0,
+    armable=4.1,
+    uses_gps=float("inf"),
+)
+
+ARDUPILOT_ESTIMATOR = {
+    Gps.FINE: EstimatorError(  # standing 0.029 / 0.035 m/s, 0.02 m; yaw +0.7 to +1.1 deg
+        velocity=Wander(0.004, 2.0, least=0.024, most=0.030),
+        position=Wander(0.015, 15.0),
+        yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
+        yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
+    ),
+    Gps.METRE: EstimatorError(  # as with noisy sensors, standing 0.037 / 0.059 m/s
+        velocity=Wander(0.016, 2.0, least=0.024, most=0.034),
+        position=Wander(0.11, 60.0),  # of PX4's: the noise of that recording was of speed only
+        yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
+        yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
+    ),
+}
+PX4_ESTIMATOR = {
+    Gps.FINE: EstimatorError(  # standing 0.003 / 0.006 m/s, 0.006 m; yaw -0.1 to +0.1 deg
+        velocity=Wander(0.0025, 2.0),
+        position=Wander(0.006, 15.0),
+        yaw=Wander(radians(0.06), 20.0),
+        yaw_rate=Wander(radians(0.022), 0.5),
+    ),
+    Gps.METRE: EstimatorError(  # standing 0.037 / 0.064 m/s, 0.08 m; yaw -4.8 to +9.2 deg
+        velocity=Wander(0.022, 2.0, least=0.015, most=0.035),
+        position=Wander(0.11, 60.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
+        yaw=Wander(radians(0.15), 10.0, least=radians(-5.0), most=radians(9.0)),
+        yaw_rate=Wander(radians(0.33), 0.5),
+    ),
+}
+PUSHING = Wander(0.2, 5.0, least=0.1, most=0.3)  # standing 0.284 / 0.472 m/s, for minutes
+
+ARDUPILOT_TIMING = LinkTiming(0.010, 0.024, in_pairs=True, announces_changes=True)
+PX4_TIMING = LinkTiming(0.004, 0.062, in_pairs=False, announces_changes=False)
+
+ARDUPILOT_REALISM = Realism(
+    estimator=ARDUPILOT_ESTIMATOR[Gps.FINE],
+    boot=ARDUPILOT_BOOT.scaled(SHORT),
+    timing=ARDUPILOT_TIMING,
+    drive=Drive.REAL,
+    home=Home.FOLLOWS,
+    stick_adds_speed=True,
+)
+PX4_REALISM = Realism(
+    estimator=PX4_ESTIMATOR[Gps.FINE],
+    boot=PX4_BOOT.scaled(SHORT),
+    timing=PX4_TIMING,
+    drive=Drive.REAL,
+    home=Home.FOLLOWS,
+    stick_adds_speed=False,
+)
