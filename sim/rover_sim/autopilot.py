@@ -15,6 +15,7 @@ from rover_sim.body import BodyState
 from rover_sim.commands import CommandParts, CommandReceiver
 from rover_sim.dispatch import Handler
 from rover_sim.estimate import Estimate, estimate_from
+from rover_sim.estimator import Estimator
 from rover_sim.faults import NO_FAULTS, Faults
 from rover_sim.file_transfer import refusal_of
 from rover_sim.flight import FlightControl
@@ -56,7 +57,10 @@ class Autopilot:
         self.address = Address(system_id, AUTOPILOT)
         self._persona = persona
         self._realism = realism
-        self._seed = seed
+        self._estimator = (
+            None if realism.estimator is None else Estimator(realism.estimator, seed=seed)
+        )
+        self._asked = 0.0  # m/s, of the wheels
         self._origin = origin
         self._unix_offset = unix_offset
         self._outbox = Outbox()
@@ -65,7 +69,7 @@ class Autopilot:
         self._missions = MissionStorage(
             conventions=persona.missions, origin=origin, outbox=self._outbox
         )
-        self._estimate: Estimate = estimate_from(truth, NO_FAULTS, None)
+        self._estimate: Estimate = estimate_from(self._seen(truth), NO_FAULTS, None)
         self._faults = NO_FAULTS
         self._clock_stopped_at = now  # while that fault lasts; until then it goes
         self._start(now)
@@ -86,7 +90,7 @@ class Autopilot:
 
     def step(self, truth: BodyState, *, now: float) -> tuple[float, float]:
         """Live through one control period; give forward speed and yaw rate for the wheels."""
-        self._estimate = estimate_from(truth, self._faults, self._estimate)
+        self._estimate = estimate_from(self._seen(truth), self._faults, self._estimate)
         if not self._faults.clock_frozen:
             self._clock_stopped_at = now
         if now < self._up_at:
@@ -96,7 +100,8 @@ class Autopilot:
         self._announce(now)
         for message_id in self._streams.take_due(now=now):
             self._send(message_id, now)
-        return self._motion.step(demand, truth, self._estimate)
+        self._asked, yaw_rate = self._motion.step(demand, truth, self._estimate)
+        return self._asked, yaw_rate
 
     def take_messages(self) -> list[Message]:
         """Hand over what there is to say, to everybody on the link."""
@@ -152,6 +157,9 @@ class Autopilot:
         component = getattr(message, "target_component", BROADCAST)
         ours = (BROADCAST, self.address.component_id)
         return component in ours or not self._persona.heeds_component
+
+    def _seen(self, truth: BodyState) -> BodyState:
+        return truth if self._estimator is None else self._estimator.see(truth, asked=self._asked)
 
     def _start(self, up_at: float) -> None:
         outbox, missions, persona = self._outbox, self._missions, self._persona

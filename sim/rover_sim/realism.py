@@ -40,7 +40,7 @@ class Wander:
 
     spread: float  # standard deviation of one axis, about the fixed value
     time: float  # s, in which it forgets (autocorrelation 1/e)
-    least: float = 0.0  # the fixed value is drawn between these two, for a vector its length
+    least: float = 0.0  # the fixed value is drawn between these two
     most: float = 0.0
 
 
@@ -48,7 +48,8 @@ class Wander:
 class EstimatorError:
     """By how much the estimate is off. Each axis wanders on its own; a seed decides how."""
 
-    velocity: Wander  # m/s, north and east
+    forward_speed: Wander  # m/s; recorded, the fixed part turns with the rover
+    lateral_speed: Wander  # m/s to the right
     position: Wander  # m, north and east
     yaw: Wander  # rad
     yaw_rate: Wander  # rad/s
@@ -148,13 +149,15 @@ PX4_BOOT = BootTimes(
 
 ARDUPILOT_ESTIMATOR = {
     Gps.FINE: EstimatorError(  # standing 0.029 / 0.035 m/s, 0.02 m; yaw +0.7 to +1.1 deg
-        velocity=Wander(0.004, 2.0, least=0.024, most=0.030),
+        forward_speed=Wander(0.004, 2.0, least=-0.021, most=-0.018),
+        lateral_speed=Wander(0.004, 2.0, least=0.018, most=0.021),
         position=Wander(0.015, 15.0),
         yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
         yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
     ),
     Gps.METRE: EstimatorError(  # as with noisy sensors, standing 0.037 / 0.059 m/s
-        velocity=Wander(0.016, 2.0, least=0.024, most=0.034),
+        forward_speed=Wander(0.015, 2.0, least=-0.026, most=-0.018),
+        lateral_speed=Wander(0.015, 2.0, least=0.018, most=0.026),
         position=Wander(0.11, 60.0),  # of PX4's: the noise of that recording was of speed only
         yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
         yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
@@ -162,13 +165,15 @@ ARDUPILOT_ESTIMATOR = {
 }
 PX4_ESTIMATOR = {
     Gps.FINE: EstimatorError(  # standing 0.003 / 0.006 m/s, 0.006 m; yaw -0.1 to +0.1 deg
-        velocity=Wander(0.0025, 2.0),
+        forward_speed=Wander(0.0025, 2.0),
+        lateral_speed=Wander(0.0025, 2.0),
         position=Wander(0.006, 15.0),
         yaw=Wander(radians(0.06), 20.0),
         yaw_rate=Wander(radians(0.022), 0.5),
     ),
     Gps.METRE: EstimatorError(  # standing 0.037 / 0.064 m/s, 0.08 m; yaw -4.8 to +9.2 deg
-        velocity=Wander(0.022, 2.0, least=0.015, most=0.035),
+        forward_speed=Wander(0.020, 2.0, least=0.018, most=0.026),
+        lateral_speed=Wander(0.020, 2.0, least=-0.022, most=-0.014),
         position=Wander(0.11, 60.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
         yaw=Wander(radians(0.15), 10.0, least=radians(-5.0), most=radians(9.0)),
         yaw_rate=Wander(radians(0.33), 0.5),

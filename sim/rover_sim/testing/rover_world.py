@@ -21,6 +21,7 @@ from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import PERSONAS
+from rover_sim.realism import EXACT
 from rover_sim.testing.by_hand import BodyByHand
 from rover_sim.testing.lossy import LossyLink, LossyNet, Text
 from rover_sim.testing.options import RoverOptions
@@ -158,7 +159,14 @@ class RoverWorld:
         body = BodyByHand(self._make_body(number))
         self._bodies.append(body)
         persona = PERSONAS[self.options.persona]
-        vehicle = make_vehicle(body, system_id=number, now=0.0, persona=persona)
+        vehicle = make_vehicle(
+            body,
+            system_id=number,
+            now=0.0,
+            persona=persona,
+            realism=EXACT if self.options.noise == "off" else None,
+            seed=self.seed + number,
+        )
         if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
             # Hold: by default a PX4 rover drives home when setpoints stop, and no task is driven
             vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
