@@ -53,6 +53,7 @@ Ping = d.MAVLink_ping_message
 PositionTargetGlobalInt = d.MAVLink_position_target_global_int_message
 PositionTargetLocalNed = d.MAVLink_position_target_local_ned_message
 ProtocolVersion = d.MAVLink_protocol_version_message
+RcChannels = d.MAVLink_rc_channels_message
 RcChannelsOverride = d.MAVLink_rc_channels_override_message
 RequestDataStream = d.MAVLink_request_data_stream_message
 SetActuatorControlTarget = d.MAVLink_set_actuator_control_target_message

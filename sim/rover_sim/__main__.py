@@ -24,7 +24,16 @@ from rover_sim.errors import MissingExtra, SimulatedCrash
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PERSONAS, Persona
 from rover_sim.real_time import Clock, drive
-from rover_sim.vehicle import make_vehicle
+from rover_sim.realism import Realism
+from rover_sim.realism_options import (
+    Place,
+    StickPulses,
+    add_realism_arguments,
+    peers_of,
+    realism_of,
+    with_home_joined,
+)
+from rover_sim.vehicle import Peers, make_vehicle
 
 DEFAULT_PORT = 14580
 SPACING = 3.0  # m between rovers, side by side
@@ -58,6 +67,10 @@ class Options:
     truth: str | None  # file name
     sign: str  # name of a key, "" for none
     keys: str  # file name of the key ring, "" for the user's own
+    realism: Realism
+    peers: Peers
+    home: Place
+    sticks: StickPulses | None  # None: no transmitter
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -107,7 +120,9 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     add("--truth", metavar="FILE", help="append the true poses at 10 Hz as CSV")
     add("--sign", metavar="NAME", default="", help="sign with this key, hear nothing else")
     add("--keys", metavar="FILE", default="", help="the key ring (default: the user's own)")
-    values = parser.parse_args(arguments)
+    add_realism_arguments(parser)
+    given = sys.argv[1:] if arguments is None else arguments
+    values = parser.parse_args(with_home_joined(given))
     if values.count < 1:
         parser.error("--count must be 1 or more")
     if not 1 <= values.system_id <= 256 - values.count:
@@ -126,13 +141,14 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         speed = 0.0
     if not 0.0 < speed <= 1000.0:
         parser.error("--speed must be 'real' or a number above 0, at most 1000")
+    persona = _persona(values.persona, honours_yaw_rate=values.honours_yaw_rate)
     return Options(
         host=values.host,
         port=values.port,
         insecure=values.insecure,
         count=values.count,
         body=values.body,
-        persona=_persona(values.persona, honours_yaw_rate=values.honours_yaw_rate),
+        persona=persona,
         system_id=values.system_id,
         seed=values.seed,
         friction=values.friction,
@@ -142,6 +158,10 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         truth=values.truth,
         sign=values.sign,
         keys=values.keys,
+        realism=realism_of(values, persona),
+        peers=peers_of(values, persona),
+        home=values.home,
+        sticks=values.sticks,
     )
 
 
@@ -168,9 +188,16 @@ def run(options: Options, stack: ExitStack) -> None:
             persona=options.persona,
             unix_offset=time.time() - now,
             key=key,
+            origin=options.home.origin,
+            realism=options.realism,
+            seed=(options.seed or 0) + index,
+            peers=options.peers,
         )
         for index, body in enumerate(bodies)
     ]
+    if options.sticks is not None:
+        for vehicle in vehicles:
+            vehicle.autopilot.operator_pulses(*options.sticks)
     host, port = server.getsockname()[:2]
     for vehicle in vehicles:
         number = vehicle.autopilot.address.system_id
@@ -258,7 +285,7 @@ def _make_body(options: Options, index: int, stack: ExitStack) -> Body:
 
 
 def _new_body(options: Options, index: int) -> Body:
-    start = Pose(east=SPACING * index)
+    start = Pose(east=SPACING * index, yaw=options.home.yaw)
     seed = None if options.seed is None else options.seed + index
     if options.body == "kinematic":
         return KinematicBody(start=start, slip=KINEMATIC_SLIP, seed=seed)

@@ -7,7 +7,7 @@ starts to when armed.
 from mav_tasks.mavlink.enums import MavSeverity, MavState
 from rover_sim.estimate import Estimate
 from rover_sim.failsafe import OperatorFailsafe
-from rover_sim.flight_rules import SETTLING_TIME, FlightParts, Intervention
+from rover_sim.flight_rules import FlightParts, Intervention
 from rover_sim.guided import Guided
 from rover_sim.modes import Mode
 from rover_sim.route import Route, square_around
@@ -68,7 +68,7 @@ class ArduPilotRules:
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
         """Refuse too early; forcing skips the check."""
         del mode
-        if not forced and now - self._parts.started < SETTLING_TIME:
+        if not forced and now - self._parts.started < self._parts.settling_time:
             return "Arm: AHRS: not using configured AHRS type"
         return None
 

@@ -12,6 +12,7 @@ from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Message
 from rover_sim.available_modes import available_modes
 from rover_sim.body import BodyState
+from rover_sim.boot import Boot
 from rover_sim.commands import CommandParts, CommandReceiver
 from rover_sim.dispatch import Handler
 from rover_sim.estimate import Estimate, estimate_from
@@ -21,17 +22,22 @@ from rover_sim.file_transfer import refusal_of
 from rover_sim.flight import FlightControl
 from rover_sim.flight_rules import FlightParts
 from rover_sim.geo import Origin
+from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.motion import MotionControl
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
-from rover_sim.realism import Realism
+from rover_sim.realism import Home, Realism, Wire
 from rover_sim.setpoints import Destination
-from rover_sim.streams import Streams
+from rover_sim.sticks import Sticks
+from rover_sim.streams import Streams, with_sticks
 from rover_sim.telemetry import Telemetry
+from rover_sim.timing import Departures
 
 MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # what it is driven by
+UNASKED_STICKS = 1.0  # s, RC_CHANNELS where nobody has asked for another interval
+RUNTIME_INTERVAL = 30.0  # s, AP_Stats' flush_interval_ms
 REBOOT_TIME = 1.0  # s in which a restarting autopilot neither hears nor says anything
 
 
@@ -60,11 +66,19 @@ class Autopilot:
         self._estimator = (
             None if realism.estimator is None else Estimator(realism.estimator, seed=seed)
         )
+        self._departures = Departures(realism.timing, seed=seed)
+        self._sticks = Sticks(realism.stick_speed)
         self._asked = 0.0  # m/s, of the wheels
         self._origin = origin
         self._unix_offset = unix_offset
         self._outbox = Outbox()
-        self._parameters = Parameters(persona.parameters, persona.parameter_protocol, self._outbox)
+        listed = persona.parameters
+        self._runtime = persona.runtime_parameter if realism.wire is Wire.REAL else None
+        if self._runtime is not None:
+            listed += (self._runtime,)
+        self._parameters = Parameters(
+            listed, persona.parameter_protocol, self._outbox, wire=realism.wire
+        )
         self._parameters[persona.system_id_parameter] = system_id
         self._missions = MissionStorage(
             conventions=persona.missions, origin=origin, outbox=self._outbox
@@ -97,6 +111,7 @@ class Autopilot:
             return 0.0, 0.0
         demand = self._flight.demand(self._estimate, now=now)
         self._missions.step(now=now)
+        self._count_runtime(now)
         self._announce(now)
         for message_id in self._streams.take_due(now=now):
             self._send(message_id, now)
@@ -106,6 +121,15 @@ class Autopilot:
     def take_messages(self) -> list[Message]:
         """Hand over what there is to say, to everybody on the link."""
         return self._outbox.take()
+
+    @property
+    def next_release(self) -> float:
+        """When something is to be sent that was held back; infinity: nothing is."""
+        return self._outbox.next_release
+
+    def release(self, *, now: float) -> None:
+        """Send what was held back until now."""
+        self._outbox.release(now=now)
 
     @property
     def armed(self) -> bool:
@@ -145,6 +169,12 @@ class Autopilot:
     def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
         """Hold the sticks so (m/s, rad/s); has an effect in MANUAL, until the mode changes."""
         self._flight.set_sticks(forward_speed, yaw_rate)
+        if self._realism.wire is Wire.REAL:
+            self._sticks.hold(forward_speed, yaw_rate)
+
+    def operator_pulses(self, throttle: int, steering: int) -> None:
+        """Hold the transmitter's sticks so, in microseconds."""
+        self._sticks.hold_pulses(throttle, steering)
 
     def reboot(self, *, now: float) -> None:
         """Restart: time and state begin anew; parameters and missions are kept."""
@@ -163,8 +193,14 @@ class Autopilot:
 
     def _start(self, up_at: float) -> None:
         outbox, missions, persona = self._outbox, self._missions, self._persona
+        realism = self._realism
         self._up_at = up_at
-        self._streams = Streams(persona.streams, now=up_at)
+        self._runtime_due = up_at + RUNTIME_INTERVAL
+        table = persona.streams
+        if realism.wire is Wire.REAL:
+            table = with_sticks(table, UNASKED_STICKS)
+        self._streams = Streams(table, now=up_at)
+        boot = Boot(realism.boot, persona.boot_script, started=up_at)
         self._motion = MotionControl(self._realism.drive)
         rules = persona.rules(
             FlightParts(
@@ -175,6 +211,7 @@ class Autopilot:
                 speed_limit=lambda: self._parameters[persona.speed_parameter],
                 honours_yaw_rate=persona.honours_yaw_rate,
                 started=up_at,
+                settling_time=realism.boot.armable if realism.boot.is_none else 0.0,
             )
         )
         self._flight = FlightControl(
@@ -183,7 +220,9 @@ class Autopilot:
             missions=missions,
             outbox=outbox,
             home=Destination(self._estimate.north, self._estimate.east),
-            now=up_at,
+            boot=boot,
+            sticks=self._sticks,
+            follower=Follower(persona.home) if realism.home is Home.FOLLOWS else None,
         )
         self._flight.faults = self._faults
         missions.go_to = self._go_to_item
@@ -195,6 +234,9 @@ class Autopilot:
             missions=missions,
             unix_offset=self._unix_offset,
             started=up_at,
+            realism=realism,
+            boot=boot,
+            sticks=self._sticks,
         )
         commands = CommandParts(
             origin=self._origin,
@@ -206,7 +248,7 @@ class Autopilot:
             reboot=lambda now: self.reboot(now=now),
             modes=available_modes(persona.offered_modes, persona.modes),
         )
-        self._commands = CommandReceiver(persona.commands(commands), outbox)
+        self._commands = CommandReceiver(persona.commands(commands), outbox, self._departures)
         self._handlers = self._make_handlers()
 
     def _make_handlers(self) -> Mapping[int, Handler]:
@@ -220,6 +262,7 @@ class Autopilot:
             messages.RequestDataStream.id: self._handle_request_data_stream,
             messages.MissionSetCurrent.id: self._handle_mission_set_current,
             messages.Timesync.id: self._handle_timesync,
+            messages.RcChannelsOverride.id: self._handle_override,
             messages.FileTransferProtocol.id: self._handle_file_transfer,
         }
 
@@ -233,8 +276,18 @@ class Autopilot:
             now = self._clock_stopped_at
         message = self._telemetry.build(message_id, estimate, now=now)
         if message is not None:
-            self._outbox.send(message)
+            is_position = message_id == messages.LocalPositionNed.id
+            at = self._departures.position_at(now=now) if is_position else now
+            self._outbox.send_at(message, at, now=now)
         return True
+
+    def _count_runtime(self, now: float) -> None:
+        """ArduPilot keeps its running time in a parameter, and sends that unasked."""
+        if self._runtime is not None and now >= self._runtime_due:
+            self._runtime_due += RUNTIME_INTERVAL
+            self._parameters.change(
+                self._runtime.name, self._parameters[self._runtime.name] + RUNTIME_INTERVAL
+            )
 
     def _go_to_item(self, place: Destination, now: float) -> bool:
         flight = self._flight
@@ -242,7 +295,9 @@ class Autopilot:
 
     def _announce(self, now: float) -> None:
         """A heartbeat at once when mode or arming changed, if this autopilot does so."""
-        if self._flight.announce() and self._persona.announces_changes:
+        timing = self._realism.timing
+        at_once = self._persona.announces_changes if timing is None else timing.announces_changes
+        if self._flight.announce() and at_once:
             self._send(messages.Heartbeat.id, now)
 
     def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:
@@ -257,6 +312,12 @@ class Autopilot:
         self, message: messages.SetPositionTargetGlobalInt, _sender: Address, now: float
     ) -> None:
         self._flight.take_global(message, self._estimate, now=now)
+
+    def _handle_override(
+        self, message: messages.RcChannelsOverride, _sender: Address, now: float
+    ) -> None:
+        if self._realism.stick_speed is not None:
+            self._sticks.take_override(message, now=now)
 
     def _handle_request_data_stream(
         self, message: messages.RequestDataStream, _sender: Address, now: float

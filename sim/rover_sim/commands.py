@@ -18,6 +18,7 @@ from rover_sim.geo import Origin
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.outbox import Outbox
 from rover_sim.streams import Streams
+from rover_sim.timing import Departures
 
 DO_SET_MISSION_CURRENT = 224  # MAV_CMD
 
@@ -59,9 +60,10 @@ class CommandTable(NamedTuple):
 class CommandReceiver:
     """Answers commands by a table."""
 
-    def __init__(self, table: CommandTable, outbox: Outbox) -> None:
+    def __init__(self, table: CommandTable, outbox: Outbox, departures: Departures) -> None:
         self._table = table
         self._outbox = outbox
+        self._departures = departures
         self.handlers: Mapping[int, Handler] = {
             messages.CommandLong.id: self._handle_long,
             messages.CommandInt.id: self._handle_int,
@@ -84,15 +86,16 @@ class CommandReceiver:
     def _handle_set_mode(self, message: messages.SetMode, sender: Address, now: float) -> None:
         """The old message, which autopilots answer as if it were a command."""
         result = self._table.set_mode(message.base_mode, message.custom_mode, now)
-        self._ack(self._table.set_mode_acked_as, result, sender)
+        self._ack(self._table.set_mode_acked_as, result, sender, now)
 
     def _answer(self, number: int, command: Command, sender: Address, now: float) -> None:
         action = self._table.actions.get(number)
         result = action(command, now) if action else MavResult.UNSUPPORTED
-        self._ack(number, result, sender)
+        self._ack(number, result, sender, now)
 
-    def _ack(self, command: int, result: MavResult, sender: Address) -> None:
-        self._outbox.send(messages.CommandAck(command, result, 0, 0, *sender))
+    def _ack(self, command: int, result: MavResult, sender: Address, now: float) -> None:
+        ack = messages.CommandAck(command, result, 0, 0, *sender)
+        self._outbox.send_at(ack, self._departures.answer_at(now=now), now=now)
 
 
 def _first_four(

@@ -5,17 +5,18 @@ What every make does; what they do differently is asked of the persona's ``Fligh
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavSeverity, MavState
+from rover_sim.boot import Boot
 from rover_sim.estimate import Estimate
 from rover_sim.faults import NO_FAULTS, Faults
 from rover_sim.flight_rules import FlightRules
+from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode, ModeNumbers
 from rover_sim.outbox import Outbox
 from rover_sim.route import Route, Waypoint
-from rover_sim.setpoints import Destination, Global, Local, Target
+from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
 from rover_sim.steering import COAST, STOP, Demand
-
-INITIALISING_TIME = 0.25  # s after start, then MANUAL. The real one takes seconds; tests do not
+from rover_sim.sticks import Sticks
 
 
 class FlightControl:
@@ -29,7 +30,9 @@ class FlightControl:
         missions: MissionStorage,
         outbox: Outbox,
         home: Destination,
-        now: float,
+        boot: Boot,
+        sticks: Sticks,
+        follower: Follower | None,
     ) -> None:
         self.home = home
         self.faults: Faults = NO_FAULTS
@@ -40,7 +43,9 @@ class FlightControl:
         self._missions = missions
         self._missions.complete = False
         self._outbox = outbox
-        self._started = now
+        self._boot = boot
+        self._radio = sticks
+        self._follower = follower  # None: home never moves by itself, but where it is armed
         self._route: Route | None = None
         self._sticks = STOP
         self._home_due = False  # home is to be where it is now
@@ -48,6 +53,12 @@ class FlightControl:
 
     def __repr__(self) -> str:
         return f"FlightControl({self.mode.name}, {'armed' if self.armed else 'disarmed'})"
+
+    @property
+    def _home_follows_arming(self) -> bool:
+        if self._follower is not None:
+            return self._follower.follows_arming
+        return self._rules.home_is_where_armed
 
     @property
     def custom_mode(self) -> int:
@@ -95,7 +106,9 @@ class FlightControl:
 
     def request_mode(self, mode: Mode, *, now: float) -> bool:
         """Change the mode at a client's wish."""
-        refusal = self._rules.mode_refusal(mode, self.mode, now=now)
+        refusal = None
+        if self.mode is not Mode.INITIALISING or not self._boot.takes_modes(now=now):
+            refusal = self._rules.mode_refusal(mode, self.mode, now=now)
         if self.faults.refuse_mode:
             refusal = "Flight mode change failed"
         if refusal is not None:
@@ -150,6 +163,11 @@ class FlightControl:
         if self.faults.refuse_arm:
             self._outbox.say(MavSeverity.CRITICAL, "Arm: refused by a simulated fault")
             return False
+        not_ready = () if forced else self._boot.arming_refusal(now=now)
+        for text in not_ready:
+            self._outbox.say(MavSeverity.CRITICAL, text)
+        if not_ready:
+            return False
         refusal = self._rules.arming_refusal(self.mode, forced=forced, now=now)
         if refusal is not None:
             self._outbox.say(MavSeverity.CRITICAL, refusal)
@@ -161,13 +179,15 @@ class FlightControl:
         """Arm or disarm, without checks. Disarming always works: the rover coasts."""
         if armed is not self.armed:
             self.armed = armed
-            self._home_due = armed and self._rules.home_is_where_armed
+            self._home_due = armed and self._home_follows_arming
             self._rules.choose(self.mode)
             self._outbox.say(MavSeverity.INFO, self._rules.arming_text(armed=armed))
 
     def set_home(self, place: Destination | None) -> None:
         """Put home at a place; None: where the rover is."""
         self._home_due = place is None
+        if self._follower is not None:
+            self._follower.name(here=place is None)
         if place is not None:
             self.home = place
 
@@ -193,15 +213,19 @@ class FlightControl:
         if self._home_due:
             self.home = Destination(estimate.north, estimate.east)
             self._home_due = False
+        elif self._follower is not None and not self.armed:
+            self.home = self._follower.moved(self.home, estimate, now=now)
         match self.mode:
             case Mode.INITIALISING:
                 return COAST
             case Mode.MANUAL | Mode.POSITION:
-                demand = self._sticks
+                demand = self._radio.demand(now=now) or self._sticks
             case Mode.HOLD:
                 demand = self._rules.hold(estimate)
             case Mode.GUIDED:  # asked also while disarmed: its time-out goes on
                 demand = self._rules.follow_setpoints(estimate, now=now)
+                if isinstance(self.target, Heading | TurnRate):
+                    demand = self._radio.nudged(demand, now=now)
             case Mode.AUTO | Mode.RTL:
                 demand = self._follow_route(estimate) if self.armed else STOP
         return demand if self.armed else COAST
@@ -223,7 +247,10 @@ class FlightControl:
             self._route = Route((Waypoint(None, self.home),), loop=False)
 
     def _pass_time(self, now: float) -> None:
-        if self.mode is Mode.INITIALISING and now - self._started >= INITIALISING_TIME:
+        for severity, text in self._boot.texts_due(now=now):
+            self._outbox.say(severity, text)
+        started = self.mode is Mode.INITIALISING and self._boot.is_initialised(now=now)
+        if self._boot.loses_mode(now=now) or started:
             self.enter(Mode.MANUAL)
         intervention = self._rules.intervene(self.mode, armed=self.armed, now=now)
         if intervention is None:

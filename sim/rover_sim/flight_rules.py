@@ -32,6 +32,7 @@ class FlightParts:
     speed_limit: Callable[[], float]  # m/s
     honours_yaw_rate: bool
     started: float  # s
+    settling_time: float = SETTLING_TIME  # s; 0 where a boot says when it can be armed
 
 
 class Intervention(NamedTuple):

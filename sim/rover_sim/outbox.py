@@ -1,11 +1,15 @@
 """What the flight stack has to say, in order, until the vehicle takes it."""
 
+import math
+from operator import itemgetter
+
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Message
 from rover_sim.faults import NO_FAULTS, Faults
 
 TEXT_LENGTH = 50  # bytes of one STATUSTEXT
+LAST_TEXT_ID = 65535
 
 
 class Outbox:
@@ -14,6 +18,8 @@ class Outbox:
     def __init__(self) -> None:
         self.faults: Faults = NO_FAULTS
         self._messages: list[Message] = []
+        self._long_texts = 0  # the id of the last text that took more than one STATUSTEXT
+        self._late: list[tuple[float, Message]] = []  # when to send it, the earliest first
 
     def __repr__(self) -> str:
         return f"Outbox({len(self._messages)} waiting)"
@@ -25,8 +31,31 @@ class Outbox:
             self._messages.append(message)
 
     def say(self, severity: MavSeverity, text: str) -> None:
-        """Add a STATUSTEXT; every text of the flight stack fits into one."""
-        self.send(messages.Statustext(severity, text.encode()[:TEXT_LENGTH]))
+        """Add a STATUSTEXT, or as many as the text takes, with one id and numbered."""
+        pieces = [text[at : at + TEXT_LENGTH] for at in range(0, len(text), TEXT_LENGTH)]
+        if len(pieces) > 1:
+            self._long_texts = self._long_texts % LAST_TEXT_ID + 1
+        number = self._long_texts if len(pieces) > 1 else 0
+        for sequence, piece in enumerate(pieces):
+            self.send(messages.Statustext(severity, piece.encode(), number, sequence))
+
+    def send_at(self, message: Message, at: float, *, now: float) -> None:
+        """Add a message at that time; whoever keeps the time calls ``release``."""
+        if at <= now:
+            self.send(message)
+            return
+        self._late.append((at, message))
+        self._late.sort(key=itemgetter(0))
+
+    @property
+    def next_release(self) -> float:
+        """When ``release`` is due."""
+        return self._late[0][0] if self._late else math.inf
+
+    def release(self, *, now: float) -> None:
+        """Add what was to be sent by now."""
+        while self._late and self._late[0][0] <= now:
+            self.send(self._late.pop(0)[1])
 
     def take(self) -> list[Message]:
         """Hand over what was collected."""

@@ -12,6 +12,7 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
 from rover_sim.dispatch import Handler
 from rover_sim.outbox import Outbox
+from rover_sim.realism import Wire
 
 INT8, INT16, UINT32, INT32, REAL32 = 2, 4, 5, 6, 9  # MAV_PARAM_TYPE
 BY_NAME = -1  # param_index in a request
@@ -55,8 +56,14 @@ class Parameters:
     """The values, and what answers the parameter messages. They survive a reboot."""
 
     def __init__(
-        self, parameters: Iterable[Parameter], protocol: ParameterProtocol, outbox: Outbox
+        self,
+        parameters: Iterable[Parameter],
+        protocol: ParameterProtocol,
+        outbox: Outbox,
+        *,
+        wire: Wire,
     ) -> None:
+        self._wire = wire
         self._listed = tuple(parameters)
         self._protocol = protocol
         self._indices = {each.name: index for index, each in enumerate(self._listed)}
@@ -82,9 +89,16 @@ class Parameters:
             value = round(value)
         self._values[name] = value
 
+    def change(self, name: str, value: float) -> None:
+        """Set a value as the autopilot itself does, and tell everybody."""
+        self[name] = value
+        self._send(self._indices[name], UNNUMBERED)
+
     def _handle_request_list(
         self, _message: messages.ParamRequestList, _sender: Address, _now: float
     ) -> None:
+        if self._wire is Wire.REAL:  # PX4 sends its digest first (mavlink_parameters.cpp)
+            self._send_digest()
         for index in range(len(self._listed)):
             self._send(index, index)
 

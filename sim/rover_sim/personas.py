@@ -14,16 +14,29 @@ from rover_sim.ardupilot_commands import ardupilot_commands
 from rover_sim.ardupilot_parameters import ARDUPILOT_PARAMETERS, Cast
 from rover_sim.ardupilot_rules import ArduPilotRules
 from rover_sim.available_modes import PX4_OFFERED, OfferedMode
+from rover_sim.boot import ARDUPILOT_SCRIPT, PX4_SCRIPT, BootScript
 from rover_sim.commands import CommandParts, CommandTable
 from rover_sim.flight_rules import FlightParts, FlightRules
+from rover_sim.home import ARDUPILOT_HOME, PX4_HOME, HomeRule
 from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, PX4_MISSIONS, MissionConventions
 from rover_sim.modes import Mode as Mode
 from rover_sim.modes import ModeNumbers
-from rover_sim.parameters import Parameter, ParameterProtocol
+from rover_sim.parameters import INT32, Parameter, ParameterProtocol
 from rover_sim.px4_commands import px4_commands
 from rover_sim.px4_parameters import PX4_PARAMETERS, Bytewise
 from rover_sim.px4_rules import Px4Rules
-from rover_sim.realism import ARDUPILOT_REALISM, PX4_REALISM, Realism
+from rover_sim.realism import (
+    ARDUPILOT_BOOT,
+    ARDUPILOT_ESTIMATOR,
+    ARDUPILOT_REALISM,
+    PX4_BOOT,
+    PX4_ESTIMATOR,
+    PX4_REALISM,
+    BootTimes,
+    EstimatorError,
+    Gps,
+    Realism,
+)
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
 FENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot's is healthy unless it is breached
@@ -57,6 +70,14 @@ class Persona:
     speed_parameter: str  # the name of the one that limits its speed, m/s
     honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
     realism: Realism  # how unkind it is, unless another is asked for
+    estimators: Mapping[Gps, EstimatorError]
+    boot: BootTimes  # as long as it really takes
+    boot_script: BootScript
+    home: HomeRule
+    tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined, where words are real
+    shows_prearm_in_health_only: bool  # SYS_STATUS, likewise
+    answers_first_peer: bool  # on a socket, and nobody else until it is started again
+    runtime_parameter: Parameter | None  # in which it counts the seconds that it runs, likewise
 
 
 ARDUPILOT = Persona(
@@ -107,6 +128,14 @@ ARDUPILOT = Persona(
     speed_parameter="WP_SPEED",
     honours_yaw_rate=True,
     realism=ARDUPILOT_REALISM,
+    estimators=ARDUPILOT_ESTIMATOR,
+    boot=ARDUPILOT_BOOT,
+    boot_script=ARDUPILOT_SCRIPT,
+    home=ARDUPILOT_HOME,
+    tells_no_landed_state=True,
+    shows_prearm_in_health_only=False,
+    answers_first_peer=False,
+    runtime_parameter=Parameter("STAT_RUNTIME", 0, INT32),
 )
 
 STICKS = MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED
@@ -161,6 +190,14 @@ PX4 = Persona(
     speed_parameter="RD_MAX_SPEED",
     honours_yaw_rate=False,
     realism=PX4_REALISM,
+    estimators=PX4_ESTIMATOR,
+    boot=PX4_BOOT,
+    boot_script=PX4_SCRIPT,
+    home=PX4_HOME,
+    tells_no_landed_state=False,
+    shows_prearm_in_health_only=True,
+    answers_first_peer=True,
+    runtime_parameter=None,
 )
 
 #: speaks as PX4 does and says that it is none that anybody knows
@@ -170,6 +207,7 @@ GENERIC = replace(
     autopilot=MavAutopilot.GENERIC,
     flight_sw_version=1 << 24 | 255,
     firmware_hash=bytes(8),
+    answers_first_peer=False,
 )
 
 PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT, PX4, GENERIC)}

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 
 from mav_tasks.mavlink.enums import MavSeverity, MavState
 from rover_sim.estimate import Estimate
-from rover_sim.flight_rules import SETTLING_TIME, FlightParts, Intervention
+from rover_sim.flight_rules import FlightParts, Intervention
 from rover_sim.modes import Mode
 from rover_sim.offboard import Offboard
 from rover_sim.px4_setpoints import Setpoint, read_px4_global, read_px4_local
@@ -102,7 +102,7 @@ class Px4Rules:
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
         """Refuse too early, or in a mode that could not run; forcing skips nothing from outside."""
         del forced
-        if now - self._parts.started < SETTLING_TIME:
+        if now - self._parts.started < self._parts.settling_time:
             return "Arming denied: health checks not passed yet"
         if not self._can_run(mode, now):
             return f"Arming denied: {NAMES[mode]} cannot run"

@@ -4,7 +4,7 @@ MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals b
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mav_tasks.mavlink import messages as m
 
@@ -13,6 +13,7 @@ NEVER = float("inf")
 LONGEST_TOLD = 2**31 - 1  # µs, what MESSAGE_INTERVAL has room for
 JITTER = 1e-6  # s; clock readings are not exact multiples of anything
 ALL_STREAMS = 0  # MAV_DATA_STREAM
+RC_GROUP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +88,15 @@ PX4_STREAMS = StreamTable(
     shortest_interval=0.001,
     groups={},  # it does not know REQUEST_DATA_STREAM
 )
+
+
+def with_sticks(table: StreamTable, unasked: float) -> StreamTable:
+    """Return the table of a rover that also shows its remote control, every so many seconds."""
+    message_id = m.RcChannels.id
+    groups = dict(table.groups)
+    if RC_GROUP in groups:
+        groups[RC_GROUP] = (*groups[RC_GROUP], message_id)
+    return replace(table, intervals={**table.intervals, message_id: unasked}, groups=groups)
 
 
 class Streams:

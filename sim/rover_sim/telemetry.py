@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavFrame, MavLandedState, MavModeFlag, MavType
 from mav_tasks.mavlink.messages import Message
 from rover_sim.available_modes import standard_mode_of
+from rover_sim.boot import Boot
 from rover_sim.estimate import Estimate
 from rover_sim.flight import FlightControl
 from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
@@ -14,13 +16,18 @@ from rover_sim.mission_conventions import FENCE, MISSION, RALLY
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
 from rover_sim.personas import Persona
+from rover_sim.realism import Realism, Wire
 from rover_sim.setpoints import Destination, Heading, TurnRate
+from rover_sim.sticks import Sticks
 
 MAVLINK_VERSION = 3
 UNKNOWN_U16 = 65535
 # MAV_SYS_STATUS_SENSOR: gyro, accelerometer, compass, GPS, yaw and position control, motors, AHRS,
 # pre-arm check. MAVSDK takes "healthy" from these.
 SENSORS = 0x1 | 0x2 | 0x4 | 0x20 | 0x1000 | 0x4000 | 0x8000 | 0x200000 | 0x10000000
+PREARM = 0x10000000
+NO_ALTITUDE = 140  # mm, recorded of ArduPilot before it has an origin
+RSSI_UNKNOWN = 255
 CELL_VOLTAGES = (12600,) + (UNKNOWN_U16,) * 9  # mV; ArduPilot puts a pack's total into the first
 GPS_FIX_3D = 3
 TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_*
@@ -42,7 +49,13 @@ class Telemetry:
         missions: MissionStorage,
         unix_offset: float,
         started: float,
+        realism: Realism,
+        boot: Boot,
+        sticks: Sticks,
     ) -> None:
+        self._realism = realism
+        self._boot = boot
+        self._sticks = sticks
         self._persona = persona
         self._system_id = system_id
         self._origin = origin
@@ -70,6 +83,8 @@ class Telemetry:
             m.ProtocolVersion.id: self._protocol_version,
             m.CurrentMode.id: self._current_mode,
         }
+        if realism.wire is Wire.REAL:
+            self._builders = {**self._builders, m.RcChannels.id: self._rc_channels}
 
     def __repr__(self) -> str:
         return f"Telemetry({self._persona.name}, system {self._system_id})"
@@ -98,14 +113,21 @@ class Telemetry:
             MAVLINK_VERSION,
         )
 
-    def _sys_status(self, _estimate: Estimate, _boot_ms: int) -> Message:
-        healthy = SENSORS | self._persona.also_healthy
+    def _sys_status(self, _estimate: Estimate, boot_ms: int) -> Message:
+        present = SENSORS
+        if self._realism.wire is Wire.REAL and self._persona.shows_prearm_in_health_only:
+            present &= ~PREARM
+        healthy = present | self._persona.also_healthy | PREARM
+        if not self._boot.is_healthy(now=self._time(boot_ms)):
+            healthy &= ~PREARM
         return m.SysStatus(
-            SENSORS, SENSORS, healthy, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
+            present, present, healthy, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
         )  # load 10 %, 12.6 V, 5 A, 100 %
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
         armed = self._flight.armed
+        if self._realism.wire is Wire.REAL and self._persona.tells_no_landed_state:
+            return m.ExtendedSysState(0, MavLandedState.UNDEFINED)
         return m.ExtendedSysState(
             0, self._persona.landed_state_armed if armed else MavLandedState.ON_GROUND
         )
@@ -115,16 +137,23 @@ class Telemetry:
         return m.SystemTime(int(unix * 1e6), boot_ms)
 
     def _attitude(self, estimate: Estimate, boot_ms: int) -> Message:
+        if not self._boot.has_heading(now=self._time(boot_ms)):
+            estimate = replace(estimate, yaw=0.0)
         return m.Attitude(
             boot_ms, estimate.roll, estimate.pitch, estimate.yaw, 0.0, 0.0, estimate.yaw_rate
         )
 
-    def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Message:
+    def _local_position_ned(self, estimate: Estimate, boot_ms: int) -> Message | None:
+        if not self._boot.has_position(now=self._time(boot_ms)):
+            return None
         e = estimate
         return m.LocalPositionNed(boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0)
 
     def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Message:
         latitude, longitude = self._origin.to_global(estimate.north, estimate.east)
+        if not self._boot.has_position(now=self._time(boot_ms)):
+            heading = _centidegrees(estimate.yaw)
+            return m.GlobalPositionInt(boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading)
         return m.GlobalPositionInt(
             boot_ms,
             latitude,
@@ -138,6 +167,8 @@ class Telemetry:
         )
 
     def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Message:
+        if not self._boot.has_fix(now=self._time(boot_ms)):
+            return m.GpsRawInt(boot_ms * 1000, 0, 0, 0, 0, UNKNOWN_U16, UNKNOWN_U16, 0, 0, 0)
         latitude, longitude = self._origin.to_global(estimate.north, estimate.east)
         return m.GpsRawInt(
             boot_ms * 1000,
@@ -159,20 +190,40 @@ class Telemetry:
         altitude = self._origin.altitude - estimate.down
         return m.VfrHud(speed, speed, heading, throttle, altitude, 0.0)
 
-    def _home_position(self, _estimate: Estimate, boot_ms: int) -> Message:
+    def _home_position(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+        now = self._time(boot_ms)
+        if not self._boot.has_position(now=now):
+            return None
         north, east = self._flight.home
         latitude, longitude = self._origin.to_global(north, east)
-        altitude = round(self._origin.altitude * 1e3)
+        altitude, down = round(self._origin.altitude * 1e3), 0.0
+        if not self._boot.has_origin(now=now):  # recorded
+            altitude, north, east, down = NO_ALTITUDE, math.nan, math.nan, math.nan
         return m.HomePosition(
-            latitude, longitude, altitude, north, east, 0.0, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
+            latitude, longitude, altitude, north, east, down, LEVEL, 0.0, 0.0, 0.0, boot_ms * 1000
         )
 
-    def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Message:
+    def _gps_global_origin(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+        told = self._realism.tells_origin and self._boot.has_origin(now=self._time(boot_ms))
+        if not told:
+            return None
         origin = self._origin
         altitude = round(origin.altitude * 1e3)
         return m.GpsGlobalOrigin(
             origin.latitude_degE7, origin.longitude_degE7, altitude, boot_ms * 1000
         )
+
+    def _rc_channels(self, _estimate: Estimate, boot_ms: int) -> Message | None:
+        if not self._sticks.is_there:
+            return None
+        one, two, three, four, *others = self._sticks.channels(now=self._time(boot_ms))
+        five, six, seven, eight = others
+        return m.RcChannels(
+            boot_ms, 8, one, two, three, four, five, six, seven, eight, *(0,) * 10, RSSI_UNKNOWN
+        )
+
+    def _time(self, boot_ms: int) -> float:
+        return self._started + boot_ms * 1e-3
 
     def _battery_status(self, _estimate: Estimate, _boot_ms: int) -> Message:
         return m.BatteryStatus(0, 0, 0, 32767, CELL_VOLTAGES, 500, 0, -1, 100)

@@ -5,6 +5,7 @@ and, as the real one does on a link, tells every one of them everything.
 """
 
 from collections.abc import Hashable
+from enum import Enum
 
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.packet import split_datagram
@@ -21,6 +22,13 @@ PEER_TIMEOUT = 10.0  # s of silence after which a peer is no longer talked to
 MAX_CATCH_UP = 0.5  # s; a vehicle held up for longer loses the time, as a stalled machine does
 
 
+class Peers(Enum):
+    """Whom a rover answers on its socket."""
+
+    ALL = "all"
+    FIRST = "first"  # PX4's own link: the first that it heard, until it is started again
+
+
 class Vehicle:
     """One rover. Time is the caller's, in seconds, and starts with ``now`` of the constructor."""
 
@@ -31,7 +39,9 @@ class Vehicle:
         autopilot: Autopilot,
         now: float,
         signatures: RoverSignatures | None = None,
+        peers: Peers = Peers.ALL,
     ) -> None:
+        self._answers = peers
         self.body = body
         self._signatures = signatures
         self.autopilot = autopilot
@@ -56,13 +66,13 @@ class Vehicle:
                 continue
             message = self._decoder.decode(packet)
             if message is not None:
-                self._peers[peer] = now
+                self._meet(peer, now)
                 self.autopilot.handle(message, packet.source, now=now)
         self._collect()
 
     def next_deadline(self) -> float:
-        """When the next control step is due."""
-        return self._next_step
+        """When the next control step is due, or something held back is to leave."""
+        return min(self._next_step, self.autopilot.next_release)
 
     def handle_deadline(self, *, now: float) -> None:
         """Live through every control step that is due by ``now``; early or twice does nothing."""
@@ -70,16 +80,23 @@ class Vehicle:
             self._next_step = now - MAX_CATCH_UP
         while self._next_step <= now:
             at = self._next_step
+            self.autopilot.release(now=at)
             forward_speed, yaw_rate = self.autopilot.step(self.body.state, now=at)
             self._collect()
             self.body.drive(forward_speed, yaw_rate)
             self.body.advance(CONTROL_PERIOD)
             self._next_step = at + CONTROL_PERIOD
+        self.autopilot.release(now=now)
+        self._collect()
 
     def take_packets(self) -> list[tuple[Hashable, bytes]]:
         """Hand over what is to be sent: one datagram each, in order."""
         taken, self._outgoing = self._outgoing, []
         return taken
+
+    def _meet(self, peer: Hashable, now: float) -> None:
+        if self._answers is Peers.ALL or not self._peers or peer in self._peers:
+            self._peers[peer] = now
 
     def _collect(self) -> None:
         messages = self.autopilot.take_messages()
@@ -93,6 +110,8 @@ class Vehicle:
             self._outgoing.extend((peer, packet) for peer in self._peers)
 
     def _forget_silent_peers(self) -> None:
+        if self._answers is Peers.FIRST:
+            return
         oldest = self._next_step - PEER_TIMEOUT
         silent = [peer for peer, heard in self._peers.items() if heard < oldest]
         for peer in silent:
@@ -110,6 +129,7 @@ def make_vehicle(
     key: Key | None = None,
     realism: Realism | None = None,
     seed: int = 0,
+    peers: Peers = Peers.ALL,
 ) -> Vehicle:
     """Put an autopilot that has just been switched on into a body.
 
@@ -129,4 +149,4 @@ def make_vehicle(
         seed=seed,
     )
     signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
-    return Vehicle(body=body, autopilot=autopilot, now=now, signatures=signatures)
+    return Vehicle(body=body, autopilot=autopilot, now=now, signatures=signatures, peers=peers)

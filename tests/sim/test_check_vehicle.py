@@ -25,7 +25,17 @@ LIMIT = 50.0  # s
 @contextmanager
 def rover(folder: Path, *options: str) -> Iterator[str]:
     """Run a simulated rover; gives its URL."""
-    arguments = ("-m", "rover_sim", "--port", "0", "--body", "kinematic", *options)
+    arguments = (
+        "-m",
+        "rover_sim",
+        "--port",
+        "0",
+        "--body",
+        "kinematic",
+        "--noise",
+        "off",
+        *options,
+    )
     with process(*arguments, folder=folder, name="rover") as running:
         found = running.wait_for(r"on udp 127\.0\.0\.1:(\d+)")
         yield f"udpout:127.0.0.1:{found[1]}"

@@ -37,7 +37,7 @@ def environment(**extra: str) -> dict[str, str]:
 def simulator(*arguments: str, **extra: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """Run it on a free port; give the process and the port."""
     process = subprocess.Popen(
-        command("--port", "0", *arguments),
+        command("--port", "0", "--noise", "off", *arguments),  # the tests arm at once
         env=environment(**extra),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -44,7 +44,7 @@ def child(
 @contextmanager
 def simulated_rovers(count: int, port: int) -> Iterator[None]:
     """Run kinematic rovers on a UDP port while the block runs."""
-    command = [sys.executable, "-m", "rover_sim", "--body", "kinematic"]
+    command = [sys.executable, "-m", "rover_sim", "--body", "kinematic", "--noise", "off"]
     command += ["--count", str(count), "--port", str(port)]
     simulator = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:

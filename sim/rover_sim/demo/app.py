@@ -56,8 +56,21 @@ def _drive(
     screen: Screen, options: argparse.Namespace, body: str
 ) -> tuple[ThirdParty, list[Place]]:
     if options.fast:
-        return fast.drive(screen, body=body, seed=options.seed, record=options.record)
-    return real.drive(screen, body=body, gui=options.gui, seed=options.seed, record=options.record)
+        return fast.drive(
+            screen,
+            body=body,
+            noise=options.noise,
+            seed=options.seed,
+            record=options.record,
+        )
+    return real.drive(
+        screen,
+        body=body,
+        noise=options.noise,
+        gui=options.gui,
+        seed=options.seed,
+        record=options.record,
+    )
 
 
 def _conclude(console: Console, party: ThirdParty, track: list[Place], picture: Path | None) -> int:
@@ -84,6 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="mav-tasks demo", description=__doc__.partition("\n")[0])
     add = parser.add_argument
     add("--fast", action="store_true", help="one process, virtual time, no sockets")
+    add("--noise", choices=("on", "off"), default="on", help="off: an exact rover, no noise")
     add("--gui", action="store_true", help="open pybullet's window; no picture then")
     add("--body", choices=("bullet", "kinematic"), help="default: bullet where it is installed")
     add("--record", metavar="FOLDER", default="", help="keep a record for mav-tasks replay")

@@ -11,6 +11,7 @@ from rover_sim.bullet import BulletBody
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import Place, ThirdParty
 from rover_sim.kinematic import KinematicBody
+from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 
@@ -19,7 +20,9 @@ TRACK_INTERVAL = 0.1  # virtual s
 START = Pose()
 
 
-def drive(screen: Screen, *, body: str, seed: int, record: str) -> tuple[ThirdParty, list[Place]]:
+def drive(
+    screen: Screen, *, body: str, noise: str, seed: int, record: str
+) -> tuple[ThirdParty, list[Place]]:
     """Run server, rover and third party; gives what the latter saw, and the true track.
 
     ``record`` is the folder for a record of the server's decisions, "" for none.
@@ -27,7 +30,8 @@ def drive(screen: Screen, *, body: str, seed: int, record: str) -> tuple[ThirdPa
     settings = Settings()
     recorders = witnesses(Recording(decisions=record), settings, None, now=0.0)
     net = MemoryNet()
-    vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0)
+    realism = EXACT if noise == "off" else None
+    vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0, realism=realism, seed=seed)
     world = VirtualWorld(net)
     member = _Member(net.link("third party"), vehicle, screen)
     rover = RoverParty(vehicle, net.link("rover"))

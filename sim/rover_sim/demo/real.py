@@ -29,14 +29,14 @@ class DemoError(Exception):
 
 
 def drive(
-    screen: Screen, *, body: str, gui: bool, seed: int, record: str
+    screen: Screen, *, body: str, noise: str, gui: bool, seed: int, record: str
 ) -> tuple[ThirdParty, list[Place]]:
     """Run server, rover and third party; gives what the latter saw, and the true track."""
     with tempfile.TemporaryDirectory(prefix="mav-tasks-demo-") as folder:
         truth_file = Path(folder) / "truth.csv"
         rover_port, client_port = free_ports(2)
         rover = [sys.executable, "-m", "rover_sim", "--port", str(rover_port), "--body", body]
-        rover += ["--truth", str(truth_file)]
+        rover += ["--truth", str(truth_file), "--noise", noise]
         rover += ["--seed", str(seed), "--friction-variation", "0.3"] if seed else []
         rover += ["--gui"] if gui else []
         server = [sys.executable, "-m", "mav_tasks.cli", "serve", "--config", ""]

@@ -131,7 +131,10 @@ class SimulatedRover:
         self._vehicle.autopilot.operator_mode(Mode(mode), now=self._clock())
 
     def hold_sticks(self, *, forward: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Hold the sticks of its remote control so, m/s and rad/s; heeded in "manual" only."""
+        """Hold the sticks of its remote control so, m/s and rad/s.
+
+        Heeded in "manual"; a rover as unkind as a real ArduPilot adds the throttle in "guided".
+        """
         self._vehicle.autopilot.operator_sticks(forward, yaw_rate)
 
     def reboot(self) -> None:

@@ -1,0 +1,125 @@
+"""The first seconds of an autopilot: what it does not know yet, and why it cannot be armed.
+
+The times are ``BootTimes``, the words each make's ``BootScript``; both were recorded.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from mav_tasks.mavlink.enums import MavSeverity
+from rover_sim.realism import BootTimes
+
+
+class Event(Enum):
+    """What a boot text is said at; the value names the field of ``BootTimes``."""
+
+    READY = "mode_lost"
+    ORIGIN = "origin"
+    USES_GPS = "uses_gps"
+
+
+@dataclass(frozen=True, slots=True)
+class BootScript:
+    """What one make says meanwhile."""
+
+    refusals: tuple[tuple[float, tuple[str, ...]], ...]  # up to this part of ``armable``: texts
+    texts: tuple[tuple[Event, MavSeverity, str], ...]
+    keeps_to_its_first_mode: bool  # ArduPilot: a mode entered early is lost
+
+
+ARDUPILOT_SCRIPT = BootScript(
+    # recorded: at 1.1 s the first, from 4.1 to 13.1 s the second, from 16.1 to 22.2 s the third
+    refusals=(
+        (0.095, ("Arm: System not initialised",)),
+        (0.63, ("Arm: Accels inconsistent",)),
+        (1.0, ("Arm: Gyros inconsistent",)),
+    ),
+    texts=(
+        (Event.READY, MavSeverity.INFO, "ArduPilot Ready"),
+        (Event.READY, MavSeverity.INFO, "AHRS: DCM active"),
+        (Event.ORIGIN, MavSeverity.INFO, "EKF3 IMU0 origin set"),
+        (Event.ORIGIN, MavSeverity.INFO, "EKF3 IMU1 origin set"),
+        (Event.USES_GPS, MavSeverity.INFO, "EKF3 IMU0 is using GPS"),
+        (Event.USES_GPS, MavSeverity.INFO, "EKF3 IMU1 is using GPS"),
+        (Event.USES_GPS, MavSeverity.INFO, "AHRS: EKF3 active"),
+    ),
+    keeps_to_its_first_mode=True,
+)
+PX4_SCRIPT = BootScript(
+    refusals=(
+        (
+            1.0,
+            (
+                "Preflight Fail: system power unavailable",
+                "Arming denied: Resolve system health failures first",
+            ),
+        ),
+    ),
+    texts=(),
+    keeps_to_its_first_mode=False,
+)
+
+
+class Boot:
+    """One boot, from switching on at ``started``."""
+
+    def __init__(self, times: BootTimes, script: BootScript, *, started: float) -> None:
+        self._times = times
+        self._script = script
+        self._started = started
+        self._unsaid = () if times.is_none else script.texts
+        self._mode_to_lose = script.keeps_to_its_first_mode and not times.is_none
+
+    def __repr__(self) -> str:
+        return f"Boot({len(self._unsaid)} texts to come)"
+
+    def takes_modes(self, *, now: float) -> bool:
+        """Whether a mode can be entered already, though only to be lost again."""
+        return self._mode_to_lose and now - self._started >= self._times.initialised
+
+    def is_initialised(self, *, now: float) -> bool:
+        """Whether INITIALISING is over."""
+        return now - self._started >= max(self._times.initialised, self._times.mode_lost)
+
+    def loses_mode(self, *, now: float) -> bool:
+        """Return True once: at the moment at which a mode that was entered before is lost."""
+        if not self._mode_to_lose or now - self._started < self._times.mode_lost:
+            return False
+        self._mode_to_lose = False
+        return True
+
+    def has_heading(self, *, now: float) -> bool:
+        """Whether the estimate has a heading."""
+        return now - self._started >= self._times.heading
+
+    def has_fix(self, *, now: float) -> bool:
+        """Whether the receiver has a position."""
+        return now - self._started >= self._times.fix
+
+    def has_position(self, *, now: float) -> bool:
+        """Whether the estimate has a position."""
+        return now - self._started >= self._times.position
+
+    def has_origin(self, *, now: float) -> bool:
+        """Whether the origin is known."""
+        return now - self._started >= self._times.origin
+
+    def is_healthy(self, *, now: float) -> bool:
+        """Whether the pre-arm checks pass."""
+        return now - self._started >= self._times.healthy
+
+    def arming_refusal(self, *, now: float) -> tuple[str, ...]:
+        """Return the texts with which arming is refused; none: nothing speaks against it here."""
+        part = (now - self._started) / self._times.armable
+        if self._times.is_none or part >= 1.0:
+            return ()
+        return next(texts for end, texts in self._script.refusals if part < end)
+
+    def texts_due(self, *, now: float) -> list[tuple[MavSeverity, str]]:
+        """Return what is to be said since the last call."""
+        if not self._unsaid:
+            return []
+        at = now - self._started
+        due = [each for each in self._unsaid if at >= getattr(self._times, each[0].value)]
+        self._unsaid = tuple(each for each in self._unsaid if each not in due)
+        return [(severity, text) for _, severity, text in due]

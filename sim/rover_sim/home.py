@@ -1,0 +1,58 @@
+"""Home: where it is, and when it moves by itself, as the real ones' does.
+
+Read in the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17
+(HomePosition.cpp): while disarmed, home follows the rover. A place that a person names is kept:
+on ArduPilot whatever DO_SET_HOME says, until a restart; on PX4 a place, but not "here".
+"""
+
+import math
+from dataclasses import dataclass
+
+from rover_sim.estimate import Estimate
+from rover_sim.setpoints import Destination
+
+LOOK = 1.0  # s; ArduPilot's one_second_loop. PX4 looks in every loop
+
+
+@dataclass(frozen=True, slots=True)
+class HomeRule:
+    """When one make moves home."""
+
+    where_armed: bool  # at each arming
+    least_move: float  # m; disarmed, it follows a rover that is farther off than this
+    here_is_kept: bool  # DO_SET_HOME "here" is a person's word, too
+
+
+ARDUPILOT_HOME = HomeRule(where_armed=False, least_move=0.5, here_is_kept=True)
+PX4_HOME = HomeRule(where_armed=True, least_move=1.0, here_is_kept=False)
+
+
+class Follower:
+    """Moves home after a disarmed rover."""
+
+    def __init__(self, rule: HomeRule) -> None:
+        self._rule = rule
+        self._looked_at = float("-inf")
+        self.is_kept = False  # a person has named it
+
+    def __repr__(self) -> str:
+        return f"Follower(is_kept={self.is_kept})"
+
+    @property
+    def follows_arming(self) -> bool:
+        """Whether home is to be where it is armed now."""
+        return self._rule.where_armed and not self.is_kept
+
+    def name(self, *, here: bool) -> None:
+        """Note that a person has set home."""
+        self.is_kept = self._rule.here_is_kept or not here
+
+    def moved(self, home: Destination, estimate: Estimate, *, now: float) -> Destination:
+        """Return where home of a disarmed rover is now."""
+        if self.is_kept or now - self._looked_at < LOOK:
+            return home
+        self._looked_at = now
+        distance = math.hypot(estimate.north - home.north, estimate.east - home.east)
+        if distance < self._rule.least_move:
+            return home
+        return Destination(estimate.north, estimate.east)

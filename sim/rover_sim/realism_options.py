@@ -1,0 +1,131 @@
+"""The command line's words for where a rover is and how unkind it is."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite, radians
+from typing import NamedTuple
+
+from rover_sim.body import wrap_angle
+from rover_sim.geo import DEFAULT_ORIGIN, Origin
+from rover_sim.personas import Persona
+from rover_sim.realism import EXACT, NO_BOOT, SHORT, Gps, Realism
+from rover_sim.vehicle import Peers
+
+HOME_FIELDS = 4
+PULSES = (800, 2200)  # µs, what a receiver can say
+
+
+class Place(NamedTuple):
+    """Where a rover starts, and the origin of its local frame."""
+
+    origin: Origin
+    yaw: float  # rad, clockwise from north
+
+
+class StickPulses(NamedTuple):
+    """What the transmitter sends, µs."""
+
+    throttle: int
+    steering: int
+
+
+def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of realism, of the place, and of a transmitter."""
+    add = parser.add_argument
+    add(
+        "--home",
+        type=read_place,
+        metavar="LAT,LON,ALT,HEADING",
+        default=Place(DEFAULT_ORIGIN, 0.0),
+        help="where it starts: degrees, m above sea, degrees from north",
+    )
+    add(
+        "--noise",
+        choices=("on", "off"),
+        default="on",
+        help="off: exact, ready at once, does what it is told (default: as real ones are)",
+    )
+    receivers = [each.value for each in Gps]
+    add("--gps", choices=receivers, default="fine", help="class of its receiver (%(default)s)")
+    add(
+        "--boot",
+        choices=("short", "real", "none"),
+        help="how long until it can be armed; real is 23 s for ardupilot (default: short, a"
+        " twentieth; none with --noise off)",
+    )
+    add("--origin", choices=("told", "silent"), default="told", help="GPS_GLOBAL_ORIGIN, or never")
+    add(
+        "--peers",
+        choices=[each.value for each in Peers],
+        help="whom it answers: px4 the first that it heard until it is started again, the others"
+        " all (and px4 with --noise off)",
+    )
+    add(
+        "--sticks",
+        type=read_sticks,
+        metavar="THROTTLE[,STEERING]",
+        help="a transmitter that is held so, in microseconds (1500 is neutral)",
+    )
+
+
+def with_home_joined(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with ``--home`` and its value as one.
+
+    argparse takes a value that begins with a minus, as southern latitudes do, for an option.
+    """
+    joined: list[str] = []
+    for each in arguments:
+        if joined and joined[-1] == "--home":
+            joined[-1] = f"--home={each}"
+        else:
+            joined.append(each)
+    return joined
+
+
+def realism_of(values: argparse.Namespace, persona: Persona) -> Realism:
+    """Return how unkind the rover is that the command line asks for."""
+    noisy = values.noise == "on"
+    realism = persona.realism if noisy else EXACT
+    boots = {"short": persona.boot.scaled(SHORT), "real": persona.boot, "none": NO_BOOT}
+    realism = replace(
+        realism,
+        boot=boots[values.boot or ("short" if noisy else "none")],
+        tells_origin=values.origin == "told",
+    )
+    if noisy:
+        realism = replace(realism, estimator=persona.estimators[Gps(values.gps)])
+    return realism
+
+
+def peers_of(values: argparse.Namespace, persona: Persona) -> Peers:
+    """Return whom the rovers answer."""
+    if values.peers is not None:
+        return Peers(values.peers)
+    first = persona.answers_first_peer and values.noise == "on"
+    return Peers.FIRST if first else Peers.ALL
+
+
+def read_place(text: str) -> Place:
+    """Return where a rover starts. ArgumentTypeError."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != HOME_FIELDS or not all(isfinite(number) for number in numbers):
+        raise argparse.ArgumentTypeError(f"must be LAT,LON,ALT,HEADING in numbers, not {text!r}")
+    latitude, longitude, altitude, heading = numbers
+    if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):  # at a pole east is nowhere
+        raise argparse.ArgumentTypeError("latitude is within 90 degrees, longitude within 180")
+    return Place(Origin(latitude, longitude, altitude), wrap_angle(radians(heading)))
+
+
+def read_sticks(text: str) -> StickPulses:
+    """Return what a transmitter sends. ArgumentTypeError."""
+    least, most = PULSES
+    parts = text.split(",")
+    if not 1 <= len(parts) <= len(StickPulses._fields) or not all(
+        part.isdecimal() and least <= int(part) <= most for part in parts
+    ):
+        raise argparse.ArgumentTypeError(f"must be one or two pulses of {least} to {most}")
+    return StickPulses(int(parts[0]), int(parts[1]) if len(parts) > 1 else 1500)

@@ -1,0 +1,92 @@
+"""The remote control: what its transmitter sends, and what RC_CHANNELS_OVERRIDE puts over it.
+
+ArduPilot Rover heeds the throttle in GUIDED, too: the rover drives as fast as stick or setpoint
+asks, whichever is more (its mode.cpp, calc_speed_nudge). Channels are in microseconds.
+"""
+
+from dataclasses import replace
+
+from mav_tasks.mavlink import messages
+from rover_sim.steering import MAX_YAW_RATE, Demand
+
+STEERING, THROTTLE = 0, 2  # channels 1 and 3
+COUNT = 8  # channels
+NEUTRAL, REACH = 1500, 500  # µs
+DEAD_ZONE = 30  # µs, RCn_DZ
+NO_CHANGE, RELEASED = 65535, 0  # in RC_CHANNELS_OVERRIDE
+OVERRIDE_TIME = 3.0  # s, RC_OVERRIDE_TIME; then the transmitter counts again
+DEFAULT_TOP_SPEED = 4.0  # m/s at full throttle: SITL's rover-skid, 3 m/s at 75 %
+
+
+class Sticks:
+    """What the channels say now."""
+
+    def __init__(self, top_speed: float | None) -> None:
+        self._top_speed = DEFAULT_TOP_SPEED if top_speed is None else top_speed
+        self._adds_speed = top_speed is not None
+        self._held = [NEUTRAL] * COUNT
+        self._override: dict[int, int] = {}  # by channel
+        self._overridden_at = float("-inf")
+        self.is_there = self._adds_speed  # ArduPilot has receiver values even without one
+
+    def __repr__(self) -> str:
+        return f"Sticks({self._held}, {self._override})"
+
+    def hold(self, forward_speed: float, yaw_rate: float) -> None:
+        """Hold the transmitter's sticks so, m/s and rad/s."""
+        throttle, steering = forward_speed / self._top_speed, yaw_rate / MAX_YAW_RATE
+        self.hold_pulses(_pulse(throttle), _pulse(steering))
+
+    def hold_pulses(self, throttle: int, steering: int) -> None:
+        """Hold the transmitter's sticks so, µs."""
+        self.is_there = True
+        self._held[THROTTLE], self._held[STEERING] = throttle, steering
+
+    def take_override(self, message: messages.RcChannelsOverride, *, now: float) -> None:
+        """Put values over the transmitter's, or take them off."""
+        self._overridden_at = now
+        for channel in range(COUNT):
+            value = getattr(message, f"chan{channel + 1}_raw")
+            if value == RELEASED:
+                self._override.pop(channel, None)
+            elif value != NO_CHANGE:
+                self._override[channel] = value
+
+    def channels(self, *, now: float) -> tuple[int, ...]:
+        """Return the pulses of the first eight channels, µs."""
+        if now - self._overridden_at > OVERRIDE_TIME:
+            self._override.clear()
+        return tuple(self._override.get(n, held) for n, held in enumerate(self._held))
+
+    def demand(self, *, now: float) -> Demand | None:
+        """Return what they ask for in MANUAL; None: they are neutral."""
+        channels = self.channels(now=now)
+        speed = _part(channels[THROTTLE]) * self._top_speed
+        yaw_rate = _part(channels[STEERING]) * MAX_YAW_RATE
+        return None if speed == yaw_rate == 0.0 else Demand(speed, yaw_rate)
+
+    def nudged(self, demand: Demand, *, now: float) -> Demand:
+        """Return what is driven in GUIDED for a velocity that is asked for."""
+        if not self._adds_speed:
+            return demand
+        pilot = _part(self.channels(now=now)[THROTTLE]) * self._top_speed
+        if demand.speed < 0.0:
+            return replace(demand, speed=min(demand.speed, pilot))
+        return replace(demand, speed=max(demand.speed, pilot))
+
+
+def _part(pulse: int) -> float:
+    """How far a stick is out, -1..1; beyond its dead zone."""
+    off = pulse - NEUTRAL
+    if abs(off) <= DEAD_ZONE:
+        return 0.0
+    part = (abs(off) - DEAD_ZONE) / (REACH - DEAD_ZONE)
+    return min(part, 1.0) if off > 0 else -min(part, 1.0)
+
+
+def _pulse(part: float) -> int:
+    """The pulse for so much of a stick's reach."""
+    if part == 0.0:
+        return NEUTRAL
+    off = round(DEAD_ZONE + min(abs(part), 1.0) * (REACH - DEAD_ZONE))
+    return NEUTRAL + off if part > 0 else NEUTRAL - off
