@@ -32,6 +32,17 @@ class Origin:
         longitude = self.longitude + east / self._metres_per_degree_east(latitude)
         return round(latitude * 1e7), round(longitude * 1e7)
 
+    def to_global_cut(self, north: float, east: float) -> tuple[int, int]:
+        """Return latitude and longitude in degE7 as ArduPilot reckons: its offsets are cut off.
+
+        (Location::offset.) An origin that is worked out from a position is 1 degE7 off by chance.
+        """
+        latitude = self.latitude + north / METRES_PER_DEGREE
+        return (
+            self.latitude_degE7 + int(north / METRES_PER_DEGREE * 1e7),
+            self.longitude_degE7 + int(east / self._metres_per_degree_east(latitude) * 1e7),
+        )
+
     def to_local(self, latitude_degE7: int, longitude_degE7: int) -> tuple[float, float]:
         """Give north and east in metres."""
         latitude = latitude_degE7 * 1e-7

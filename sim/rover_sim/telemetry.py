@@ -150,7 +150,9 @@ class Telemetry:
         return m.LocalPositionNed(boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0)
 
     def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Message:
-        latitude, longitude = self._origin.to_global(estimate.north, estimate.east)
+        origin, is_tidy = self._origin, self._realism.wire is Wire.TIDY
+        to_global = origin.to_global if is_tidy else origin.to_global_cut
+        latitude, longitude = to_global(estimate.north, estimate.east)
         if not self._boot.has_position(now=self._time(boot_ms)):
             heading = _centidegrees(estimate.yaw)
             return m.GlobalPositionInt(boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading)

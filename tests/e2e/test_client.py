@@ -264,8 +264,8 @@ async def test_handles_outlive_the_server(
     tmp_path: Path, number: int, state: TaskState, end: TaskState
 ) -> None:
     client_port, rover_port = free_udp_ports(2)
-    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic")
-    rover += ("--noise", "off")  # exact arithmetic
+    exact = ("--noise", "off")
+    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *exact)
     with process(*rover, folder=tmp_path, name="rover"):
         with serve(tmp_path, client_port, rover_port, "first") as server:
             server.wait_for("vehicle 1: found")

@@ -35,8 +35,8 @@ OVER = 60  # s
 def rover(folder: Path, *options: str) -> Iterator[int]:
     """A simulated rover that tells its true poses; gives its port."""
     (port,) = free_udp_ports(1)
-    arguments = ("--port", str(port), "--body", "kinematic", "--noise", "off")
-    arguments += ("--truth", str(folder / "truth.csv"))
+    where = ("--port", str(port), "--truth", str(folder / "truth.csv"))
+    arguments = (*where, "--body", "kinematic", "--noise", "off")
     with process("-m", "rover_sim", *arguments, *options, folder=folder, name="rover") as it:
         it.wait_for("rover_sim: rover 1")
         yield port

@@ -1,0 +1,76 @@
+"""When an unkind rover answers and sends, against the recordings of real ones."""
+
+from itertools import pairwise
+from statistics import quantiles
+
+import pytest
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavCmd
+from rover_sim.personas import ARDUPILOT, PX4, Persona
+from tests.unit.rover_sim.real_rig import RealRig
+from tests.unit.rover_sim.rig import HOLD
+
+
+def delays_of(persona: Persona) -> list[float]:
+    rig = RealRig(persona, wait=3.0)
+    delays = []
+    for number in range(200):
+        rig.run(0.1 + number * 1e-4)
+        asked, heard = rig.now, len(rig.times(m.CommandAck))
+        rig.send(m.CommandLong(1, 1, MavCmd.REQUEST_MESSAGE, 0, 30, 0, 0, 0, 0, 0, 0))
+        rig.run(0.1)
+        (at,) = rig.times(m.CommandAck)[heard:]
+        delays.append(at - asked)
+    return delays
+
+
+@pytest.mark.parametrize(
+    ("persona", "least", "most"), [(ARDUPILOT, 0.010, 0.024), (PX4, 0.004, 0.062)]
+)
+def test_commands_are_answered_as_late_as_by_real_ones(
+    persona: Persona, least: float, most: float
+) -> None:
+    delays = delays_of(persona)
+    assert least <= min(delays) < least * 1.5
+    assert most / 1.5 < max(delays) <= most + 1e-6
+
+
+def test_ardupilot_s_positions_come_in_pairs() -> None:
+    rig = RealRig(ARDUPILOT, wait=3.0)
+    rig.ask(MavCmd.SET_MESSAGE_INTERVAL, m.LocalPositionNed.id, 25_000)
+    begun = len(rig.times(m.LocalPositionNed))
+    rig.run(120.0)
+    times = rig.times(m.LocalPositionNed)[begun:]
+    gaps = [b - a for a, b in pairwise(times)]
+    cuts = quantiles(gaps, n=100)
+    assert len(times) == pytest.approx(120 * 40, rel=0.01)
+    assert 0.022 / 1.5 < cuts[49] < 0.022 * 1.5
+    assert 0.042 / 1.5 < cuts[94] < 0.042 * 1.5
+    assert 0.088 / 1.5 < max(gaps) < 0.088 * 1.5
+    assert 0.05 < sum(gap < 0.001 for gap in gaps) / len(gaps) < 0.2  # two at once
+
+
+def test_no_position_overtakes_another() -> None:
+    rig = RealRig(ARDUPILOT, wait=3.0)
+    rig.ask(MavCmd.SET_MESSAGE_INTERVAL, m.LocalPositionNed.id, 25_000)
+    rig.run(30.0)
+    stamps = [e.time_boot_ms for _, e in rig.arrivals if isinstance(e, m.LocalPositionNed)]
+    assert stamps == sorted(stamps)
+
+
+def test_ardupilot_shows_a_new_mode_at_once() -> None:
+    rig = RealRig(ARDUPILOT, wait=3.3)
+    rig.arrivals.clear()
+    asked = rig.now
+    rig.set_mode_by(HOLD)
+    assert rig.times(m.Heartbeat)[0] - asked < 0.03
+
+
+def test_px4_shows_a_new_mode_with_its_next_heartbeat() -> None:
+    rig = RealRig(PX4, wait=3.3)
+    rig.arrivals.clear()
+    asked = rig.now
+    rig.send(m.CommandLong(1, 1, MavCmd.DO_SET_MODE, 0, 1, 1, 0, 0, 0, 0, 0))
+    rig.run(1.0)
+    assert 0.3 < rig.times(m.Heartbeat)[0] - asked < 1.0
