@@ -24,6 +24,9 @@ ROOT = Path(__file__).parents[2]
 LIMIT = 15.0  # s for anything that a test waits for
 
 
+EXACT = ("--noise", "off")  # unless a test says otherwise: they arm at once
+
+
 def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "rover_sim", *arguments]
 
@@ -37,7 +40,7 @@ def environment(**extra: str) -> dict[str, str]:
 def simulator(*arguments: str, **extra: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """Run it on a free port; give the process and the port."""
     process = subprocess.Popen(
-        command("--port", "0", "--noise", "off", *arguments),  # the tests arm at once
+        command("--port", "0", *(arguments if "--noise" in arguments else EXACT + arguments)),
         env=environment(**extra),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -200,6 +203,23 @@ def test_several_rovers_share_the_socket_and_are_told_apart() -> None:
 def test_a_rover_is_of_the_make_asked_for(persona: str, autopilot: int, custom_mode: int) -> None:
     with simulator("--body", "kinematic", "--persona", persona) as (_, port), client(port) as c:
         assert c.wait("HEARTBEAT", shows(1, custom_mode)).autopilot == autopilot
+
+
+def test_px4_answers_the_first_that_it_heard_and_nobody_else() -> None:
+    px4 = ("--body", "kinematic", "--persona", "px4", "--noise", "on")
+    with simulator(*px4) as (_, port), client(port) as first:
+        first.wait("HEARTBEAT")
+        with client(port) as second:
+            assert second.link.recv_match(blocking=True, timeout=1.5) is None
+        first.wait("HEARTBEAT")
+
+
+def test_a_rover_starts_where_it_is_told() -> None:
+    place = ("--home", "-33.5,-70.25,1200,135")
+    with simulator("--body", "kinematic", *place) as (_, port), client(port) as c:
+        home = c.wait("HOME_POSITION")
+        assert (home.latitude, home.longitude, home.altitude) == (-335000000, -702500000, 1200000)
+        assert c.wait("VFR_HUD").heading == 135
 
 
 def test_interrupt_ends_it_orderly() -> None:
