@@ -52,6 +52,8 @@ ALLOWED = {
     ("tools/bench/client_flood.py", "random"): "noise of a flood, the same in every run",
     ("sim/rover_sim/bullet.py", "random"): "sensor noise of a simulated rover, by a seed",
     ("sim/rover_sim/kinematic.py", "random"): "sensor noise of a simulated rover, by a seed",
+    ("sim/rover_sim/estimator.py", "random"): "sensor noise of a simulated rover, by a seed",
+    ("sim/rover_sim/timing.py", "random"): "how late a simulated rover answers, by a seed",
 }
 
 
