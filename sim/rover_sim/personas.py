@@ -76,6 +76,7 @@ class Persona:
     home: HomeRule
     tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined, where words are real
     shows_prearm_in_health_only: bool  # SYS_STATUS, likewise
+    accepted_in_silence: frozenset[int]  # ids: REQUEST_MESSAGE is accepted, nothing comes; likewise
     answers_first_peer: bool  # on a socket, and nobody else until it is started again
     runtime_parameter: Parameter | None  # in which it counts the seconds that it runs, likewise
 
@@ -134,6 +135,7 @@ ARDUPILOT = Persona(
     home=ARDUPILOT_HOME,
     tells_no_landed_state=True,
     shows_prearm_in_health_only=False,
+    accepted_in_silence=frozenset({280}),  # GIMBAL_MANAGER_INFORMATION without a gimbal
     answers_first_peer=False,
     runtime_parameter=Parameter("STAT_RUNTIME", 0, INT32),
 )
@@ -196,6 +198,7 @@ PX4 = Persona(
     home=PX4_HOME,
     tells_no_landed_state=False,
     shows_prearm_in_health_only=True,
+    accepted_in_silence=frozenset(),
     answers_first_peer=True,
     runtime_parameter=None,
 )

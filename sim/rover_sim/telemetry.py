@@ -84,7 +84,8 @@ class Telemetry:
             m.CurrentMode.id: self._current_mode,
         }
         if realism.wire is Wire.REAL:
-            self._builders = {**self._builders, m.RcChannels.id: self._rc_channels}
+            silent = dict.fromkeys(persona.accepted_in_silence, _nothing)
+            self._builders = {**self._builders, m.RcChannels.id: self._rc_channels, **silent}
 
     def __repr__(self) -> str:
         return f"Telemetry({self._persona.name}, system {self._system_id})"
@@ -306,6 +307,10 @@ class Telemetry:
         flight = self._flight
         standard = standard_mode_of(flight.mode, self._persona.offered_modes)
         return m.CurrentMode(standard, flight.custom_mode, flight.intended_custom_mode)
+
+
+def _nothing(_estimate: Estimate, _boot_ms: int) -> Message | None:
+    return None
 
 
 def _cm(metres: float) -> int:

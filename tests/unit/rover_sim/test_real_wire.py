@@ -2,7 +2,7 @@
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.mavlink.enums import MavLandedState
+from mav_tasks.mavlink.enums import MavCmd, MavLandedState, MavResult
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4
@@ -42,6 +42,13 @@ def test_px4_sends_its_digest_before_its_parameters() -> None:
     first, *others = rig.take(m.ParamValue)
     assert (first.param_id, first.param_index) == ("_HASH_CHECK", UNNUMBERED)
     assert [v.param_index for v in others] == list(range(first.param_count))
+
+
+def test_ardupilot_accepts_to_tell_of_its_gimbal_and_has_none() -> None:
+    rig = RealRig(ARDUPILOT, wait=3.0)
+    assert rig.ask(MavCmd.REQUEST_MESSAGE, 280).result == MavResult.ACCEPTED
+    assert [e.get_msgId() for e in rig.heard if e.get_msgId() == 280] == []
+    assert rig.ask(MavCmd.REQUEST_MESSAGE, 12_000).result == MavResult.FAILED
 
 
 def test_an_exact_rover_sends_no_parameter_unasked() -> None:
