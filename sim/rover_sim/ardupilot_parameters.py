@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 
+from rover_sim.frames import ARDUPILOT_FRAMES, Frame
 from rover_sim.parameters import INT8, INT16, INT32, Parameter
 
 
@@ -50,7 +51,7 @@ def _setup_pages() -> Iterable[Parameter]:
 # The first 24 keep QGroundControl from complaining at connect, the setup pages' when those are
 # opened; the others steer this simulator. Rover 4.6 has no WPNAV_SPEED (a copter's) and no WP_SPD
 # (4.7's): QGroundControl therefore offers no "Change speed" for it, as for the real one.
-ARDUPILOT_PARAMETERS: tuple[Parameter, ...] = (
+COMMON: tuple[Parameter, ...] = (
     Parameter("SYSID_THISMAV", 1, INT16),
     Parameter("RCMAP_ROLL", 1, INT8),
     Parameter("RCMAP_PITCH", 2, INT8),
@@ -78,3 +79,10 @@ ARDUPILOT_PARAMETERS: tuple[Parameter, ...] = (
     Parameter("MODE_CH", 8, INT8),
     *_setup_pages(),
 )
+
+
+def ardupilot_parameters(frame: Frame) -> tuple[Parameter, ...]:
+    """Return the parameters of a rover; which outputs it has tells its frame."""
+    outputs = ARDUPILOT_FRAMES[frame].items()
+    first, *others = COMMON
+    return (first, *(Parameter(name, value, INT16) for name, value in outputs), *others)

@@ -12,7 +12,9 @@ from rover_sim.guided import Guided
 from rover_sim.modes import Mode
 from rover_sim.route import Route, square_around
 from rover_sim.setpoints import Destination, Global, Local, Target
-from rover_sim.steering import HOLD, Demand
+from rover_sim.steering import HOLD, Demand, arc_to_point, steer_to_point
+
+REACHED_RADIUS = 0.3  # m, of a mission's items
 
 
 class ArduPilotRules:
@@ -20,13 +22,18 @@ class ArduPilotRules:
 
     reposition_mode = Mode.GUIDED
     home_is_where_armed = False
+    sticks_present = False
     hold_destination: Destination | None = None  # HOLD stands
 
     def __init__(self, parts: FlightParts) -> None:
         self._parts = parts
+        self._steer = steer_to_point if parts.frame.turns_on_the_spot else arc_to_point
         self._outbox = parts.outbox
         self._guided = Guided(
-            origin=parts.origin, outbox=parts.outbox, speed_limit=parts.speed_limit
+            origin=parts.origin,
+            outbox=parts.outbox,
+            speed_limit=parts.speed_limit,
+            steer=self._steer,
         )
         self._failsafe = OperatorFailsafe(parts.parameters)
 
@@ -84,9 +91,11 @@ class ArduPilotRules:
         if mode is Mode.GUIDED:
             self._guided.clear()
 
-    def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:
+    def intervene(
+        self, mode: Mode, *, armed: bool, arrived: bool, now: float
+    ) -> Intervention | None:
         """HOLD when the operator is lost, if that failsafe is on."""
-        del mode
+        del mode, arrived
         if not self._failsafe.changed(now=now):
             return None
         if not self._failsafe.tripped:
@@ -123,6 +132,10 @@ class ArduPilotRules:
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
         """Say how to move in GUIDED."""
         return self._guided.demand(estimate, now=now)
+
+    def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
+        """Say how to move in AUTO and RTL; None once there."""
+        return self._steer(estimate, *place, speed_limit, radius=REACHED_RADIUS)
 
     def hold(self, estimate: Estimate) -> Demand:
         """Stand."""

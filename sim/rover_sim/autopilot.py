@@ -15,6 +15,7 @@ from rover_sim.body import BodyState
 from rover_sim.boot import Boot
 from rover_sim.commands import CommandParts, CommandReceiver
 from rover_sim.dispatch import Handler
+from rover_sim.drive_train import drive_train_of
 from rover_sim.estimate import Estimate, estimate_from
 from rover_sim.estimator import Estimator
 from rover_sim.faults import NO_FAULTS, Faults
@@ -24,7 +25,6 @@ from rover_sim.flight_rules import FlightParts
 from rover_sim.geo import Origin
 from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
-from rover_sim.motion import MotionControl
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
@@ -201,7 +201,9 @@ class Autopilot:
             table = with_sticks(table, UNASKED_STICKS)
         self._streams = Streams(table, now=up_at)
         boot = Boot(realism.boot, persona.boot_script, started=up_at)
-        self._motion = MotionControl(self._realism.drive)
+        self._motion = drive_train_of(
+            realism.drive, persona.drive, persona.frame, self._parameters
+        )
         rules = persona.rules(
             FlightParts(
                 origin=self._origin,
@@ -211,6 +213,8 @@ class Autopilot:
                 speed_limit=lambda: self._parameters[persona.speed_parameter],
                 honours_yaw_rate=persona.honours_yaw_rate,
                 started=up_at,
+                frame=persona.frame,
+                drive=realism.drive,
                 settling_time=realism.boot.armable if realism.boot.is_none else 0.0,
             )
         )

@@ -175,13 +175,13 @@ class FlightControl:
         self.set_armed(True)
         return True
 
-    def set_armed(self, armed: bool) -> None:
+    def set_armed(self, armed: bool, *, text: str | None = None) -> None:
         """Arm or disarm, without checks. Disarming always works: the rover coasts."""
         if armed is not self.armed:
             self.armed = armed
             self._home_due = armed and self._home_follows_arming
             self._rules.choose(self.mode)
-            self._outbox.say(MavSeverity.INFO, self._rules.arming_text(armed=armed))
+            self._outbox.say(MavSeverity.INFO, text or self._rules.arming_text(armed=armed))
 
     def set_home(self, place: Destination | None) -> None:
         """Put home at a place; None: where the rover is."""
@@ -194,6 +194,7 @@ class FlightControl:
     def set_sticks(self, speed: float, yaw_rate: float) -> None:
         """Drive by hand; has an effect only in MANUAL and POSITION."""
         self._sticks = Demand(speed, yaw_rate)
+        self._rules.sticks_present = True
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Note a heartbeat of any system."""
@@ -220,7 +221,7 @@ class FlightControl:
                 return COAST
             case Mode.MANUAL | Mode.POSITION:
                 demand = self._radio.demand(now=now) or self._sticks
-            case Mode.HOLD:
+            case Mode.HOLD | Mode.LAND:
                 demand = self._rules.hold(estimate)
             case Mode.GUIDED:  # asked also while disarmed: its time-out goes on
                 demand = self._rules.follow_setpoints(estimate, now=now)
@@ -252,18 +253,20 @@ class FlightControl:
         started = self.mode is Mode.INITIALISING and self._boot.is_initialised(now=now)
         if self._boot.loses_mode(now=now) or started:
             self.enter(Mode.MANUAL)
-        intervention = self._rules.intervene(self.mode, armed=self.armed, now=now)
+        arrived = self._route is not None and self._route.next is None
+        intervention = self._rules.intervene(self.mode, armed=self.armed, arrived=arrived, now=now)
         if intervention is None:
             return
         if intervention.mode is not None:
             self._switch(intervention.mode)
         if intervention.disarm:
-            self.set_armed(False)
+            self.set_armed(False, text=intervention.disarm_text)
 
     def _follow_route(self, estimate: Estimate) -> Demand:
         if self._route is None:
             return STOP
-        demand, reached = self._route.demand(estimate, self._rules.cruise_speed)
+        steer, cruise_speed = self._rules.steer_to, self._rules.cruise_speed
+        demand, reached = self._route.demand(estimate, cruise_speed, steer)
         if reached is not None and reached.seq is not None:
             self._outbox.send(messages.MissionItemReached(reached.seq))
             following = self._route.next

@@ -9,11 +9,13 @@ from typing import NamedTuple, Protocol
 
 from mav_tasks.mavlink.enums import MavState
 from rover_sim.estimate import Estimate
+from rover_sim.frames import Frame
 from rover_sim.geo import Origin
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
+from rover_sim.realism import Drive
 from rover_sim.route import Route
 from rover_sim.setpoints import Destination, Global, Local, Target
 from rover_sim.steering import Demand
@@ -32,6 +34,8 @@ class FlightParts:
     speed_limit: Callable[[], float]  # m/s
     honours_yaw_rate: bool
     started: float  # s
+    frame: Frame
+    drive: Drive
     settling_time: float = SETTLING_TIME  # s; 0 where a boot says when it can be armed
 
 
@@ -40,12 +44,14 @@ class Intervention(NamedTuple):
 
     mode: Mode | None = None
     disarm: bool = False
+    disarm_text: str | None = None  # None: as on anybody's command
 
 
 class FlightRules(Protocol):
     """Modes, arming, setpoints and failsafes of one make."""
 
     reposition_mode: Mode  # in which it drives to the place of DO_REPOSITION
+    sticks_present: bool  # somebody holds the sticks of its remote control
     home_is_where_armed: bool  # else where it was switched on
 
     @property
@@ -90,8 +96,13 @@ class FlightRules(Protocol):
         """Begin a mode, whoever wanted it."""
         ...
 
-    def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:
-        """Look at the clock, once per control step; give what follows from it."""
+    def intervene(
+        self, mode: Mode, *, armed: bool, arrived: bool, now: float
+    ) -> Intervention | None:
+        """Look at the clock, once per control step; give what follows from it.
+
+        ``arrived``: the way that AUTO or RTL drives is at its end.
+        """
         ...
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
@@ -116,6 +127,10 @@ class FlightRules(Protocol):
 
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
         """Say how to move in GUIDED."""
+        ...
+
+    def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
+        """Say how to move in AUTO and RTL; None once there."""
         ...
 
     def hold(self, estimate: Estimate) -> Demand:

@@ -19,7 +19,7 @@ from rover_sim.setpoints import (
     read_global,
     read_local,
 )
-from rover_sim.steering import STOP, Demand, steer_to_heading, steer_to_point
+from rover_sim.steering import STOP, Demand, SteerToPoint, steer_to_heading
 
 SETPOINT_TIMEOUT = 3.0  # s, a constant in ArduPilot's mode_guided.cpp
 ARRIVAL_RADIUS = 0.1  # m, before braking out
@@ -28,7 +28,15 @@ ARRIVAL_RADIUS = 0.1  # m, before braking out
 class Guided:
     """Keeps the last target, armed or not: armed within its time-out, the rover drives off."""
 
-    def __init__(self, *, origin: Origin, outbox: Outbox, speed_limit: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        *,
+        origin: Origin,
+        outbox: Outbox,
+        speed_limit: Callable[[], float],
+        steer: SteerToPoint,
+    ) -> None:
+        self._steer = steer
         self._origin = origin
         self._outbox = outbox
         self._speed_limit = speed_limit
@@ -97,7 +105,7 @@ class Guided:
     def _drive_to(self, estimate: Estimate, north: float, east: float) -> Demand:
         speed = self._destination_speed
         limit = self._speed_limit() if speed is None else min(speed, self._speed_limit())
-        demand = steer_to_point(estimate, north, east, limit, radius=ARRIVAL_RADIUS)
+        demand = self._steer(estimate, north, east, limit, radius=ARRIVAL_RADIUS)
         if demand is not None:
             return demand
         self._target = None

@@ -70,8 +70,8 @@ class KinematicBody:
         """Nothing is held."""
 
     def _step(self, dt: float) -> None:
-        speed = _approach(self._speed, self._demanded_speed, self._lag, MAX_ACCELERATION, dt)
-        yaw_rate = _approach(
+        speed = approach(self._speed, self._demanded_speed, self._lag, MAX_ACCELERATION, dt)
+        yaw_rate = approach(
             self._yaw_rate, self._demanded_yaw_rate, self._lag, MAX_YAW_ACCELERATION, dt
         )
         # The mean of both ends, along the heading in the middle: second order on arcs.
@@ -85,7 +85,7 @@ class KinematicBody:
         self._time += dt
 
 
-def _approach(value: float, target: float, lag: float, limit: float, dt: float) -> float:
+def approach(value: float, target: float, lag: float, limit: float, dt: float) -> float:
     """One step of a rate-limited first-order lag; lands on the target, so that a stop is one."""
     error = target - value
     if abs(error) < SNAP:

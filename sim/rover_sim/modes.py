@@ -14,6 +14,7 @@ class Mode(Enum):
     HOLD = "hold"  # PX4: AUTO.LOITER
     AUTO = "auto"  # PX4: AUTO.MISSION
     RTL = "rtl"
+    LAND = "land"  # PX4: AUTO.LAND; a rover stands in it, and is disarmed
     GUIDED = "guided"  # follows setpoints; PX4: OFFBOARD
 
 

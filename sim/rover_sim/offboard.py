@@ -14,7 +14,7 @@ class Offboard:
 
     def __init__(self) -> None:
         self.target: Target | None = None
-        self._speed: float | None = None
+        self.speed: float | None = None  # m/s towards a place, where one came with it
         self._last: float | None = None
         self._gap: float | None = None  # s between the last two
 
@@ -28,7 +28,7 @@ class Offboard:
 
     def follow(self, setpoint: Setpoint) -> None:
         """Take a setpoint's target."""
-        self.target, self._speed = setpoint
+        self.target, self.speed = setpoint
 
     def is_streaming(self, *, now: float) -> bool:
         """Whether setpoints come, two at least and the last one lately."""
@@ -48,7 +48,7 @@ class Offboard:
             case None:
                 return STOP
             case Destination(north, east):
-                limit = speed_limit if self._speed is None else min(self._speed, speed_limit)
+                limit = speed_limit if self.speed is None else min(self.speed, speed_limit)
                 radius = ARRIVAL_RADIUS
                 return steer_to_point(estimate, north, east, limit, radius=radius) or STOP
             case Heading(yaw, speed):

@@ -39,6 +39,10 @@ class Outbox:
         for sequence, piece in enumerate(pieces):
             self.send(messages.Statustext(severity, piece.encode(), number, sequence))
 
+    def inform(self, text: str) -> None:
+        """Add a STATUSTEXT of severity INFO."""
+        self.say(MavSeverity.INFO, text)
+
     def send_at(self, message: Message, at: float, *, now: float) -> None:
         """Add a message at that time; whoever keeps the time calls ``release``."""
         if at <= now:

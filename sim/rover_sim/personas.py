@@ -1,8 +1,8 @@
 """What tells one make of autopilot from another: its numbers and names, and its strategies.
 
-``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a differential rover on PX4 1.15
-after its sources, not observed; ``generic`` speaks as PX4 does. Behaviour that differs by make is
-in objects that a persona names (rules of flight, commands, conventions); nothing asks for its name.
+``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a rover on PX4 1.17, after its
+sources and as observed; ``generic`` speaks as PX4 does. Behaviour that differs by make is in
+objects that a persona names (rules of flight, commands, conventions); nothing asks for its name.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,20 +11,22 @@ from dataclasses import dataclass, replace
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavAutopilot, MavLandedState, MavModeFlag
 from rover_sim.ardupilot_commands import ardupilot_commands
-from rover_sim.ardupilot_parameters import ARDUPILOT_PARAMETERS, Cast
+from rover_sim.ardupilot_parameters import Cast, ardupilot_parameters
 from rover_sim.ardupilot_rules import ArduPilotRules
 from rover_sim.available_modes import PX4_OFFERED, OfferedMode
 from rover_sim.boot import ARDUPILOT_SCRIPT, PX4_SCRIPT, BootScript
 from rover_sim.commands import CommandParts, CommandTable
+from rover_sim.drive_train import DriveTrain, ardupilot_drive, px4_drive
 from rover_sim.flight_rules import FlightParts, FlightRules
+from rover_sim.frames import Frame
 from rover_sim.home import ARDUPILOT_HOME, PX4_HOME, HomeRule
 from rover_sim.mission_conventions import ARDUPILOT_MISSIONS, PX4_MISSIONS, MissionConventions
 from rover_sim.modes import Mode as Mode
 from rover_sim.modes import ModeNumbers
-from rover_sim.parameters import INT32, Parameter, ParameterProtocol
+from rover_sim.parameters import INT32, Parameter, ParameterProtocol, Parameters
 from rover_sim.px4_commands import px4_commands
-from rover_sim.px4_parameters import PX4_PARAMETERS, Bytewise
-from rover_sim.px4_rules import Px4Rules
+from rover_sim.px4_parameters import Bytewise, px4_parameters
+from rover_sim.px4_real_rules import px4_rules
 from rover_sim.realism import (
     ARDUPILOT_BOOT,
     ARDUPILOT_ESTIMATOR,
@@ -66,6 +68,7 @@ class Persona:
     missions: MissionConventions
     parameter_protocol: ParameterProtocol
     parameters: tuple[Parameter, ...]
+    parameters_of: Callable[[Frame], tuple[Parameter, ...]]
     system_id_parameter: str  # the name of the one that shows the system id
     speed_parameter: str  # the name of the one that limits its speed, m/s
     honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
@@ -79,6 +82,12 @@ class Persona:
     accepted_in_silence: frozenset[int]  # ids: REQUEST_MESSAGE is accepted, nothing comes; likewise
     answers_first_peer: bool  # on a socket, and nobody else until it is started again
     runtime_parameter: Parameter | None  # in which it counts the seconds that it runs, likewise
+    frame: Frame  # how it steers
+    drive: Callable[[Frame, Parameters], DriveTrain]  # where the drive is not exact
+
+    def on(self, frame: Frame) -> "Persona":
+        """Return the same make on another frame; its parameters tell which."""
+        return replace(self, frame=frame, parameters=self.parameters_of(frame))
 
 
 ARDUPILOT = Persona(
@@ -124,7 +133,8 @@ ARDUPILOT = Persona(
     commands=ardupilot_commands,
     missions=ARDUPILOT_MISSIONS,
     parameter_protocol=Cast(),
-    parameters=ARDUPILOT_PARAMETERS,
+    parameters=ardupilot_parameters(Frame.SKID),
+    parameters_of=ardupilot_parameters,
     system_id_parameter="SYSID_THISMAV",
     speed_parameter="WP_SPEED",
     honours_yaw_rate=True,
@@ -138,6 +148,8 @@ ARDUPILOT = Persona(
     accepted_in_silence=frozenset({280}),  # GIMBAL_MANAGER_INFORMATION without a gimbal
     answers_first_peer=False,
     runtime_parameter=Parameter("STAT_RUNTIME", 0, INT32),
+    frame=Frame.SKID,
+    drive=ardupilot_drive,
 )
 
 STICKS = MavModeFlag.CUSTOM_MODE_ENABLED | MavModeFlag.MANUAL_INPUT_ENABLED
@@ -158,6 +170,7 @@ PX4 = Persona(
             Mode.HOLD: 4 << 16 | 3 << 24,
             Mode.AUTO: 4 << 16 | 4 << 24,
             Mode.RTL: 4 << 16 | 5 << 24,
+            Mode.LAND: 4 << 16 | 6 << 24,
             Mode.GUIDED: 6 << 16,
         },
         first=Mode.HOLD,  # as a SITL without sticks
@@ -169,12 +182,13 @@ PX4 = Persona(
         Mode.HOLD: BY_ITSELF,
         Mode.AUTO: BY_ITSELF,
         Mode.RTL: BY_ITSELF,
+        Mode.LAND: BY_ITSELF,
         Mode.GUIDED: BY_ITSELF,
     },
     # MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE, FTP, SET_POSITION_TARGET_LOCAL_NED,
     # SET_POSITION_TARGET_GLOBAL_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
     capabilities=4 | 8 | 16 | 32 | 128 | 256 | 8192 | 16384 | 32768,
-    flight_sw_version=1 << 24 | 15 << 16 | 4 << 8 | 255,  # 1.15.4, official
+    flight_sw_version=1 << 24 | 17 << 16 | 0 << 8 | 255,  # 1.17.0, official
     firmware_hash=b"99c40407",
     announces_changes=False,  # 1 Hz
     heeds_component=True,
@@ -183,13 +197,14 @@ PX4 = Persona(
     no_mission_total=65535,
     lacks=frozenset(),
     streams=PX4_STREAMS,
-    rules=Px4Rules,
+    rules=px4_rules,
     commands=px4_commands,
     missions=PX4_MISSIONS,
     parameter_protocol=Bytewise(),
-    parameters=PX4_PARAMETERS,
+    parameters=px4_parameters(Frame.DIFFERENTIAL),
+    parameters_of=px4_parameters,
     system_id_parameter="MAV_SYS_ID",
-    speed_parameter="RD_MAX_SPEED",
+    speed_parameter="RO_SPEED_LIM",
     honours_yaw_rate=False,
     realism=PX4_REALISM,
     estimators=PX4_ESTIMATOR,
@@ -201,6 +216,8 @@ PX4 = Persona(
     accepted_in_silence=frozenset(),
     answers_first_peer=True,
     runtime_parameter=None,
+    frame=Frame.DIFFERENTIAL,
+    drive=px4_drive,
 )
 
 #: speaks as PX4 does and says that it is none that anybody knows

@@ -1,4 +1,6 @@
-"""Modes, arming and the offboard-loss failsafe of a PX4 1.15 rover, after its commander.
+"""Modes, arming and the offboard-loss failsafe of a PX4 rover, kinder than the real one.
+
+For tests of exact arithmetic; what the real one does instead is in ``px4_real_rules``.
 
 Modelled: what a mode needs to be entered or armed in (OFFBOARD a stream, MISSION a mission), the
 stream's loss (COM_OF_LOSS_T, COM_OBL_RC_ACT) and its return, places for HOLD (DO_REPOSITION).
@@ -31,6 +33,7 @@ NAMES: Mapping[Mode, str] = {
     Mode.HOLD: "Hold",
     Mode.AUTO: "Mission",
     Mode.RTL: "Return",
+    Mode.LAND: "Land",
     Mode.GUIDED: "Offboard",
 }
 
@@ -49,6 +52,7 @@ class Px4Rules:
 
     reposition_mode = Mode.HOLD
     home_is_where_armed = True
+    sticks_present = False
 
     def __init__(self, parts: FlightParts) -> None:
         self._parts = parts
@@ -123,14 +127,16 @@ class Px4Rules:
         del mode
         self._place = self._cruise = None
 
-    def intervene(self, mode: Mode, *, armed: bool, now: float) -> Intervention | None:
+    def intervene(
+        self, mode: Mode, *, armed: bool, arrived: bool, now: float
+    ) -> Intervention | None:
         """Leave OFFBOARD when the stream is lost, and MISSION when there is nothing left of it.
 
         When the stream returns, so does OFFBOARD, unasked and driving: the failsafe holds only
         while its cause does.
         """
-        missions = self._parts.missions
-        if armed and mode is Mode.AUTO and (missions.complete or missions.item_count == 0):
+        del arrived
+        if armed and self._mission_is_over(mode):
             self.choose(Mode.HOLD)
             return Intervention(Mode.HOLD)
         if not armed or self._intended is not Mode.GUIDED:
@@ -148,6 +154,10 @@ class Px4Rules:
             return Intervention(Mode.GUIDED)
         return None
 
+    def _mission_is_over(self, mode: Mode) -> bool:
+        missions = self._parts.missions
+        return mode is Mode.AUTO and (missions.complete or missions.item_count == 0)
+
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Nothing hangs on a ground station (NAV_DLL_ACT is 0)."""
 
@@ -158,7 +168,8 @@ class Px4Rules:
 
     def take_global(self, message: Global, estimate: Estimate, *, mode: Mode, now: float) -> None:
         """Count a setpoint; in OFFBOARD follow it."""
-        self._take(read_px4_global(message, estimate, self._parts.origin), mode, now)
+        del estimate
+        self._take(read_px4_global(message, self._parts.origin), mode, now)
 
     def go_to(self, destination: Destination | None, *, now: float) -> None:
         """Drive to a place in HOLD; None: stay here."""
@@ -177,6 +188,10 @@ class Px4Rules:
         """Say how to move in OFFBOARD."""
         del now
         return self._offboard.demand(estimate, self._parts.speed_limit())
+
+    def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
+        """Say how to move in AUTO and RTL; None once there."""
+        return steer_to_point(estimate, *place, speed_limit, radius=ARRIVAL_RADIUS)
 
     def hold(self, estimate: Estimate) -> Demand:
         """Drive to the place of DO_REPOSITION, if there is one; stand."""

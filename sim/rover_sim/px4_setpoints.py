@@ -1,7 +1,8 @@
 """SET_POSITION_TARGET_*: what a PX4 rover makes of them. Pure reading; nothing is ever answered.
 
-After PX4 1.15's receiver: a field counts as given if its own bit of the mask is clear and it is a
-number (NaN is "not given", and harmless). In BODY_NED there are velocities only, and only whole.
+After the receiver of PX4 1.15 to 1.17: a field counts as given if its own bit of the mask is clear
+and it is a number (NaN is "not given", and harmless). In BODY_NED there are velocities only, and
+only whole.
 """
 
 import math
@@ -18,6 +19,8 @@ X, VX, AX = 1, 8, 64
 FORCE = 512
 YAW_RATE_IGNORED = 2048
 GLOBAL_INT_FRAMES = (5, 6, 11)  # the INT forms only
+
+LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 
 Vector = tuple[float | None, float | None, float | None]
 
@@ -38,21 +41,21 @@ def read_px4_local(message: Local, estimate: Estimate, *, yaw_rate: bool) -> Set
     velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
     acceleration = _given(message.type_mask, AX, (message.afx, message.afy, message.afz))
     if message.coordinate_frame == MavFrame.LOCAL_NED:
-        return _setpoint(message, position, velocity, acceleration, estimate)
+        return _setpoint(message, position, velocity, acceleration)
     if message.coordinate_frame != MavFrame.BODY_NED:
-        return f"Setpoint frame {message.coordinate_frame} unsupported"
+        return f"{LOCAL} coordinate frame {message.coordinate_frame} unsupported"
     forward, right, down = velocity
     if forward is None or right is None or down is None:
-        return _setpoint(message, NOTHING, NOTHING, acceleration, estimate)
+        return _setpoint(message, NOTHING, NOTHING, acceleration)
     rate = message.yaw_rate
     if yaw_rate and not message.type_mask & YAW_RATE_IGNORED and math.isfinite(rate):
         return Setpoint(TurnRate(rate, forward))
     cos, sin = math.cos(estimate.yaw), math.sin(estimate.yaw)
     turned = (forward * cos - right * sin, forward * sin + right * cos, down)
-    return _setpoint(message, NOTHING, turned, acceleration, estimate)
+    return _setpoint(message, NOTHING, turned, acceleration)
 
 
-def read_px4_global(message: Global, estimate: Estimate, origin: Origin) -> Setpoint | str:
+def read_px4_global(message: Global, origin: Origin) -> Setpoint | str:
     """Read SET_POSITION_TARGET_GLOBAL_INT; a text says why it does not count."""
     position: Vector = NOTHING
     if not message.type_mask & (X | X << 1 | X << 2):
@@ -61,7 +64,7 @@ def read_px4_global(message: Global, estimate: Estimate, origin: Origin) -> Setp
         position = (*origin.to_local(message.lat_int, message.lon_int), 0.0)
     velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
     acceleration = _given(message.type_mask, AX, (message.afx, message.afy, message.afz))
-    return _setpoint(message, position, velocity, acceleration, estimate)
+    return _setpoint(message, position, velocity, acceleration)
 
 
 NOTHING: Vector = (None, None, None)
@@ -80,7 +83,6 @@ def _setpoint(
     position: Vector,
     velocity: Vector,
     acceleration: Vector,
-    estimate: Estimate,
 ) -> Setpoint | str:
     if acceleration != NOTHING and message.type_mask & FORCE:
         return "Setpoint with force unsupported"
@@ -94,5 +96,6 @@ def _setpoint(
     if speed is None or vn is None or ve is None:
         return Setpoint(None)
     # There is no backwards: a rover drives to where the vector points, and turns round for it.
-    yaw = math.atan2(ve, vn) if speed > 0.0 else estimate.yaw
+    # Zero has a course, too, by the signs of its zeros: that is what the real one turns to.
+    yaw = math.atan2(ve, vn)
     return Setpoint(Heading(wrap_angle(yaw), speed))

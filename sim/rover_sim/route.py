@@ -1,13 +1,17 @@
 """Places to drive to, one after the other: AUTO's mission or built-in track, RTL's home."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from rover_sim.estimate import Estimate
 from rover_sim.setpoints import Destination
-from rover_sim.steering import STOP, Demand, steer_to_point
+from rover_sim.steering import STOP, Demand
 
-REACHED_RADIUS = 0.3  # m
 TRACK_SIDE = 4.0  # m, of the square that AUTO drives when no mission is stored
+
+
+#: says how to drive to a place, at a speed at the most (m/s); None once there
+Steer = Callable[[Estimate, Destination, float], Demand | None]
 
 
 class Waypoint(NamedTuple):
@@ -38,12 +42,14 @@ class Route:
         numbers = [waypoint.seq or 0 for waypoint in self._waypoints]
         self._index = next((i for i, n in enumerate(numbers) if n >= seq), len(numbers))
 
-    def demand(self, estimate: Estimate, speed_limit: float) -> tuple[Demand, Waypoint | None]:
+    def demand(
+        self, estimate: Estimate, speed_limit: float, steer: Steer
+    ) -> tuple[Demand, Waypoint | None]:
         """Say how to move now, and which waypoint has just been reached."""
         waypoint = self.next
         if waypoint is None:
             return STOP, None
-        demand = steer_to_point(estimate, *waypoint.place, speed_limit, radius=REACHED_RADIUS)
+        demand = steer(estimate, waypoint.place, speed_limit)
         if demand is not None:
             return demand, None
         self._index += 1

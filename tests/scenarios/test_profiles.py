@@ -26,7 +26,7 @@ PX4_PROFILE = VehicleProfile(
     system_id=1,
     uid="1",
     autopilot="px4",
-    firmware="1.15.4 99c40407",
+    firmware="1.17.0 99c40407",
     probed="2026-11-20T10:00:00Z",
     yaw_rate="honoured",
 )

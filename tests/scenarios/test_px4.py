@@ -195,7 +195,7 @@ class TestStop:
         self, make_world: MakeWorld, persona: Persona
     ) -> None:
         world = make_world(persona=persona)
-        world.rover.autopilot.parameters["RD_MAX_SPEED"] = 1.0
+        world.rover.autopilot.parameters["RO_SPEED_LIM"] = 1.0
         world.operator_arm(True)
         other = world.net.link("other station")
         place = common.MAVLink_command_int_message(

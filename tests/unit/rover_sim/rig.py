@@ -12,7 +12,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import BodyState, Pose
-from rover_sim.kinematic import KinematicBody
+from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from rover_sim.realism import EXACT, Realism
 from rover_sim.vehicle import make_vehicle
@@ -50,7 +50,7 @@ class Rig:
         seed: int = 0,
     ) -> None:
         self.now = 1000.0
-        body = KinematicBody(start=start, slip=slip, seed=None)
+        body = kinematic_body(persona.frame, start=start, slip=slip, seed=None)
         self.vehicle = make_vehicle(
             body, system_id=1, persona=persona, now=self.now, realism=realism, seed=seed
         )
@@ -161,9 +161,14 @@ class Px4Rig(Rig):
     """One rover that speaks as PX4 does."""
 
     def __init__(
-        self, *, start: Pose = ORIGIN, wait: float = READY, persona: Persona = PX4
+        self,
+        *,
+        start: Pose = ORIGIN,
+        wait: float = READY,
+        persona: Persona = PX4,
+        realism: Realism = EXACT,
     ) -> None:
-        super().__init__(start=start, wait=wait, persona=persona)
+        super().__init__(start=start, wait=wait, persona=persona, realism=realism)
 
     def set_mode(self, custom_mode: int) -> MavResult:
         return self.command(

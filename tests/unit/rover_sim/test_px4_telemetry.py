@@ -45,7 +45,7 @@ def test_it_says_what_it_is() -> None:
     for wanted in (mission_int, command_int, bytewise, files, local, mavlink2, fence, rally):
         assert version.capabilities & wanted
     assert not version.capabilities & 2  # parameters are not cast to floats
-    assert version.flight_sw_version == 0x010F04FF
+    assert version.flight_sw_version == 0x011100FF
 
 
 def test_the_protocol_version_is_told_either_way() -> None:

@@ -47,7 +47,7 @@ def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
         [
             "*- simulated rover -*",
             "ardupilot, kinematic body, * s of virtual time",
-            "rover 1 at [12].* m north, * m east, heading * deg, 0.00 m/s, armed, hold",
+            "rover 1 at [12].* m north, * m east, heading * deg, * m/s, armed, hold",
             "tasks:",
             "     1 of rover 1: move 2 m: completed",
             "journal:",

@@ -1,0 +1,128 @@
+"""ArduPilot Rover's speed and steering controllers on the vehicles of its own simulator.
+
+A PI loop on the *estimated* speed drives a throttle in steps of 1 us, the throttle drives a
+vehicle that follows it slowly: that is where overshoot, swinging and free rolling come from, and
+why an error of the estimate becomes one of the true speed. Fitted to recordings of Rover 4.6.3
+(steps of 0.5, 1 and 2 m/s, HOLD and disarming at 1 m/s, 0.5 m/s with 20 deg/s).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from rover_sim.body import BodyState
+from rover_sim.estimate import Estimate
+from rover_sim.frames import TURN_RADIUS
+from rover_sim.motion import CONTROL_PERIOD, YawControl
+from rover_sim.steering import Demand, Output
+
+ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX, and for braking, too
+STOPPED = 0.1  # m/s, ATC_STOP_SPEED: at zero asked, slower than this, the throttle is cut
+PWM_STEPS = 500  # us from neutral to full
+SPEED_FILTER = 0.15  # s, of the speed that the loop sees
+ROLLED_OUT = 1e-3  # m/s; slower than this the vehicle stands
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedGains:
+    """The loop's gains and the vehicle's answer to the throttle."""
+
+    base: float  # throttle for each m/s asked (CRUISE_THROTTLE by CRUISE_SPEED), 0..1
+    p: float  # throttle for each m/s of error
+    i: float  # the same, for each second that it lasts
+    top: float  # m/s at full throttle
+    lag: float  # s, of the vehicle's speed behind its throttle; that of free rolling, too
+
+
+# SITL's "rover": 20 m/s and 10 m/s² at full throttle, so it rolls on with a time constant of 2 s
+ACKERMANN_GAINS = SpeedGains(base=0.02, p=0.12, i=0.2, top=20.0, lag=1.95)
+# "rover-skid": 4 m/s and 14 m/s². The body's own lag of 0.08 s is the rest of the 0.29 s
+SKID_GAINS = SpeedGains(base=0.18, p=0.1, i=0.3, top=4.0, lag=0.25)
+
+
+class Steering(Protocol):
+    """What makes a turn rate of a demand."""
+
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
+        """Return the turn rate for wheels that drive at ``speed``, rad/s."""
+        ...
+
+
+class ArduPilotDrive:
+    """Implements ``DriveTrain``."""
+
+    def __init__(self, gains: SpeedGains, steering: Steering) -> None:
+        self._gains = gains
+        self._steering = steering
+        self._asked = 0.0  # m/s, what is asked, within the acceleration limit
+        self._seen = 0.0  # m/s, the estimate, filtered
+        self._integral = 0.0  # throttle
+        self._speed = 0.0  # m/s, of the wheels
+
+    def __repr__(self) -> str:
+        return f"ArduPilotDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
+
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+        """Return forward speed and yaw rate for the wheels, for one control period."""
+        self._seen += (estimate.forward_speed - self._seen) * _part(SPEED_FILTER)
+        throttle = self._throttle(demand, estimate.forward_speed)
+        self._speed += (self._gains.top * throttle - self._speed) * _part(self._gains.lag)
+        if throttle == 0.0 and abs(self._speed) < ROLLED_OUT:
+            self._speed = 0.0
+        return self._speed, self._steering.step(demand, truth, estimate, self._speed)
+
+    def _throttle(self, demand: Demand, speed: float) -> float:
+        """Return the throttle, -1..1, as a whole number of microseconds makes it."""
+        if demand.output is not Output.CONTROLLED:
+            self._asked, self._integral = self._seen, 0.0
+            return 0.0
+        most = ACCELERATION * CONTROL_PERIOD
+        self._asked += max(-most, min(most, demand.speed - self._asked))
+        if demand.speed == 0.0 and abs(speed) < STOPPED:
+            self._asked = self._integral = 0.0
+            return 0.0
+        gains, error = self._gains, self._asked - self._seen
+        self._integral += gains.i * error * CONTROL_PERIOD
+        wanted = gains.base * self._asked + gains.p * error + self._integral
+        limited = max(-1.0, min(1.0, wanted))
+        self._integral -= wanted - limited
+        return round(limited * PWM_STEPS) / PWM_STEPS
+
+
+class SkidSteering:
+    """The rate loop turns the wheels against each other; implements ``Steering``."""
+
+    def __init__(self) -> None:
+        self._yaw = YawControl()
+
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
+        """Return the turn rate for the wheels; free wheels still resist a turn."""
+        del truth
+        wanted = demand.yaw_rate if demand.output is Output.CONTROLLED else 0.0
+        return self._yaw.step(wanted, estimate.yaw_rate, rolls=speed != 0.0)
+
+
+class WheelSteering:
+    """The rate loop's output is an angle of the front wheels; implements ``Steering``.
+
+    Default gains: it asks for too small an angle, 10 deg/s come of 20 at 0.5 m/s. While the
+    estimate says that it rolls backwards the angle is the other way round, as it should be.
+    """
+
+    FEED_FORWARD = 0.72  # of the lock for each rad/s asked
+    P = 0.25  # of the lock for each rad/s of error
+
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
+        """Return the turn rate that the front wheels' angle makes at this speed."""
+        del truth
+        if demand.output is not Output.CONTROLLED:
+            return 0.0
+        error = demand.yaw_rate - estimate.yaw_rate
+        lock = self.FEED_FORWARD * demand.yaw_rate + self.P * error if demand.yaw_rate else 0.0
+        lock = max(-1.0, min(1.0, lock if estimate.forward_speed >= 0.0 else -lock))
+        return speed * lock / TURN_RADIUS
+
+
+def _part(time: float) -> float:
+    """How much of an error a first-order lag makes up for in one control period."""
+    return 1.0 - math.exp(-CONTROL_PERIOD / time)

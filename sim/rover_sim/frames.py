@@ -1,0 +1,31 @@
+"""How a rover steers: what its wheels can do, and which parameters of its make say so."""
+
+from collections.abc import Mapping
+from enum import Enum
+
+WHEEL_BASE = 0.4  # m between the axles, as in both URDFs
+#: m, at full lock. ArduPilot's SITL rover has a turning circle of 1.8 m (and 2.9 m is what its
+#: default gains make of 20 deg/s at 0.5 m/s); PX4's own rover drove loops of 0.8 to 0.9 m.
+TURN_RADIUS = 0.9
+SERVO_RATE = 5.0  # rad/s; a standard servo turns 60 degrees in 0.2 s, PX4's RA_STR_RATE_LIM is 360
+
+
+class Frame(Enum):
+    """The kinds of rover there are here, as ``--frame`` names them."""
+
+    SKID = "skid"  # ArduPilot's name for left and right wheels that are driven apart
+    DIFFERENTIAL = "differential"  # PX4's name for the same
+    ACKERMANN = "ackermann"  # two front wheels are steered, as a car's
+
+    @property
+    def turns_on_the_spot(self) -> bool:
+        """Whether it can turn without rolling."""
+        return self is not Frame.ACKERMANN
+
+
+#: ArduPilot, SERVOn_FUNCTION: 26 ground steering and 70 throttle, or 73 left and 74 right
+ARDUPILOT_FRAMES: Mapping[Frame, Mapping[str, float]] = {
+    Frame.SKID: {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74},
+    Frame.DIFFERENTIAL: {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74},
+    Frame.ACKERMANN: {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70},
+}

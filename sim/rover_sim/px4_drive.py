@@ -1,0 +1,124 @@
+"""PX4 1.17's rover controllers, and what they drive: a differential and an Ackermann rover.
+
+Their figures are parameters (RO_*), read as they stand. Recorded on a differential rover whose
+wheels follow within 0.08 s, as this simulator's do, and on PX4's own Ackermann rover (SIH), whose
+friction holds it below a quarter of the throttle.
+"""
+
+import math
+
+from rover_sim.body import BodyState
+from rover_sim.estimate import Estimate
+from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
+from rover_sim.parameters import Parameters
+from rover_sim.steering import Demand, Output
+
+MANY = 1000.0  # m/s² or rad/s²: a limit parameter of 0 or less is none
+# SIH's vehicle, for each kg: 20 N at full throttle; what it takes to break away, and to roll on;
+# drag. The last two fitted: 1.37, 2.50 and 3.25 m/s for 1, 2 and 3 m/s asked.
+THRUST, BREAKAWAY, FRICTION, DRAG = 20.0, 4.9, 3.57, 1.43  # m/s², m/s², m/s², 1/m
+DEAD_TIME = 8  # control periods, from setpoint to thrust
+ROLLED_OUT = 0.03  # m/s
+FREE_ROLLING = 2.0  # s, disarmed. SIH's rolls on for ever, which is its model's and no vehicle's
+
+
+class DifferentialDrive:
+    """Feed-forward to wheels that do as they are told; implements ``DriveTrain``.
+
+    Disarmed or in HOLD it brakes as the wheels do: geared motors without current.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._yaw = YawControl(yaw_limits(parameters))
+        self._speed = 0.0
+
+    def __repr__(self) -> str:
+        return f"DifferentialDrive({self._speed:.2f} m/s)"
+
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+        """Return forward speed and yaw rate for the wheels, for one control period."""
+        del truth
+        if demand.output is Output.OFF:
+            self._speed = 0.0
+            return 0.0, self._yaw.step(0.0, estimate.yaw_rate, rolls=False)
+        self._speed = ramped(self._speed, demand.speed, self._parameters)
+        yaw_rate = self._yaw.step(demand.yaw_rate, estimate.yaw_rate, rolls=self._speed != 0.0)
+        return self._speed, yaw_rate
+
+
+class AckermannDrive:
+    """Throttle against friction and drag; implements ``DriveTrain``.
+
+    With the factory's gains (RO_SPEED_P and I nearly 0) it drives too fast, and at 0.5 m/s or
+    below not at all.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._asked = 0.0  # m/s, ramped
+        self._integral = 0.0  # throttle
+        self._speed = 0.0  # m/s, of the wheels
+        self._underway = [0.0] * DEAD_TIME  # throttles that have not reached the wheels
+
+    def __repr__(self) -> str:
+        return f"AckermannDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
+
+    def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
+        """Return forward speed and yaw rate for the wheels, for one control period."""
+        del truth
+        if demand.output is Output.OFF:
+            self._asked = self._integral = 0.0
+            self._underway = [0.0] * DEAD_TIME
+            self._speed *= math.exp(-CONTROL_PERIOD / FREE_ROLLING)
+            if abs(self._speed) < ROLLED_OUT:
+                self._speed = 0.0
+            return self._speed, 0.0
+        self._underway.append(self._throttle(demand, estimate))
+        self._speed = pushed(self._speed, self._underway.pop(0))
+        yaw = demand.yaw_rate
+        return self._speed, yaw if abs(self._speed) > ROLLED_OUT else 0.0
+
+    def _throttle(self, demand: Demand, estimate: Estimate) -> float:
+        values = self._parameters
+        self._asked = ramped(self._asked, demand.speed, values)
+        error = self._asked - estimate.forward_speed
+        self._integral += values["RO_SPEED_I"] * error * CONTROL_PERIOD
+        self._integral = max(-1.0, min(1.0, self._integral))
+        if demand.speed == 0.0 and self._asked == 0.0 and abs(self._speed) < ROLLED_OUT:
+            self._integral = 0.0
+        forward = self._asked / values["RO_MAX_THR_SPEED"]
+        return max(-1.0, min(1.0, forward + values["RO_SPEED_P"] * error + self._integral))
+
+
+def pushed(speed: float, throttle: float) -> float:
+    """Return the speed one control period later, under this throttle."""
+    thrust = THRUST * throttle
+    if abs(speed) < ROLLED_OUT:
+        if abs(thrust) <= BREAKAWAY:
+            return 0.0
+        return math.copysign((abs(thrust) - FRICTION) * CONTROL_PERIOD + ROLLED_OUT, thrust)
+    resistance = math.copysign(FRICTION + DRAG * speed * speed, speed)
+    after = speed + (thrust - resistance) * CONTROL_PERIOD
+    return after if after * speed > 0.0 else 0.0
+
+
+def ramped(speed: float, asked: float, parameters: Parameters) -> float:
+    """Return the speed that is asked for one control period later, within RO_*_LIM."""
+    limit = parameters["RO_SPEED_LIM"]
+    asked = max(-limit, min(limit, asked))
+    name = "RO_DECEL_LIM" if abs(asked) < abs(speed) else "RO_ACCEL_LIM"
+    return toward(speed, asked, _limit(parameters[name]) * CONTROL_PERIOD)
+
+
+def yaw_limits(parameters: Parameters) -> YawLimits:
+    """Return RO_YAW_RATE_LIM (deg/s), RO_YAW_ACCEL_LIM and RO_YAW_DECEL_LIM (deg/s²)."""
+    return YawLimits(
+        rate=math.radians(parameters["RO_YAW_RATE_LIM"]),
+        acceleration=math.radians(_limit(parameters["RO_YAW_ACCEL_LIM"])),
+        deceleration=math.radians(_limit(parameters["RO_YAW_DECEL_LIM"])),
+    )
+
+
+def _limit(value: float) -> float:
+    return value if value > 0.0 else MANY
