@@ -19,7 +19,9 @@ from random import Random
 from typing import Any
 
 from rover_sim.body import BodyState, Pose, wrap_angle
+from rover_sim.bullet_wheels import SkidWheels, SteeredWheels, Wheels
 from rover_sim.errors import MissingExtra
+from rover_sim.frames import Frame
 
 #: what is said where the kinematic body takes its place
 NO_PYBULLET = (
@@ -29,15 +31,12 @@ NO_PYBULLET = (
 PHYSICS_RATE = 240  # Hz, pybullet's own default; stepping and sub-stepping alike
 GRAVITY = 9.81  # m/s²
 SOLVER_ITERATIONS = 20  # turns within 8 % of 150 iterations, at 1.5 times the speed of 50
-URDF = Path(__file__).parent / "assets" / "rover.urdf"
-WHEEL_RADIUS = 0.1  # m, as in the URDF, like the next two
-HALF_TRACK = 0.23  # m, middle to wheel
-RIDE_HEIGHT = 0.15  # m, ground to the base's origin
-MAX_TORQUE = 20.0  # N·m a wheel; a turn on the spot takes 9 at friction 1.1, and 6 stall there
+ASSETS = Path(__file__).parent / "assets"
+RIDE_HEIGHT = 0.15  # m, ground to the base's origin, as in the URDFs
 SETTLING = 0.5  # s, from the drop onto the wheels to rest
 WHEEL_SPREAD = 0.05  # of the friction; how far one wheel may be off the ground's value
+WHEELS = 4
 VIEW_DISTANCE = 4.0  # m, of the window's camera
-LEFT_RIGHT = (0, 1, 2, 3)  # joints: front left, front right, rear left, rear right
 
 
 class BulletBody:
@@ -52,6 +51,7 @@ class BulletBody:
         self,
         *,
         start: Pose,
+        frame: Frame = Frame.SKID,
         friction: float = 0.8,
         variation: float = 0.0,
         seed: int | None = None,
@@ -64,7 +64,12 @@ class BulletBody:
         self._steps = 1  # physics steps to one stepSimulation
         self._demand = (0.0, 0.0)
         self._time = 0.0
-        self._rover = self._build(start, _wheel_frictions(friction, variation, seed))
+        skids = frame.turns_on_the_spot
+        urdf = ASSETS / ("rover.urdf" if skids else "ackermann.urdf")
+        self._rover = self._build(start, urdf)
+        wheels = SkidWheels if skids else SteeredWheels
+        self._wheels: Wheels = wheels(self._p, self._client, self._rover)
+        self._spread(_wheel_frictions(friction, variation, seed))
         self.advance(SETTLING)
         self._time = 0.0
 
@@ -96,7 +101,8 @@ class BulletBody:
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
         """Demand a motion; kept until the next call."""
         if (forward_speed, yaw_rate) != self._demand:  # velocity motors keep their target
-            self._set_motors(forward_speed, yaw_rate)
+            self._demand = (forward_speed, yaw_rate)
+            self._wheels.drive(*self._demand, steps=self._steps)
 
     def advance(self, duration: float) -> None:
         """Step the physics; a multiple of 1/240 s, the same each time for best speed."""
@@ -108,7 +114,7 @@ class BulletBody:
                 physicsClientId=self._client,
             )
             self._steps = steps
-            self._set_motors(*self._demand)
+            self._wheels.drive(*self._demand, steps=self._steps)
         self._p.stepSimulation(self._client)
         self._time += duration
 
@@ -117,21 +123,6 @@ class BulletBody:
         if self._client >= 0:
             self._p.disconnect(self._client)
             self._client = -1
-
-    def _set_motors(self, forward_speed: float, yaw_rate: float) -> None:
-        left = (forward_speed + yaw_rate * HALF_TRACK) / WHEEL_RADIUS  # clockwise: left runs ahead
-        right = (forward_speed - yaw_rate * HALF_TRACK) / WHEEL_RADIUS
-        # Bullet turns a torque limit into an impulse limit with the length of the whole step, and
-        # applies it in every sub-step: without the division the motors are that much stronger.
-        self._p.setJointMotorControlArray(
-            self._rover,
-            LEFT_RIGHT,
-            self._p.VELOCITY_CONTROL,
-            targetVelocities=(left, right, left, right),
-            forces=(MAX_TORQUE / self._steps,) * 4,
-            physicsClientId=self._client,
-        )
-        self._demand = (forward_speed, yaw_rate)
 
     def _show_ground(self, start: Pose) -> None:
         """Show the ground from above and behind the start, north up, without any panels."""
@@ -145,7 +136,7 @@ class BulletBody:
             physicsClientId=client,
         )
 
-    def _build(self, start: Pose, frictions: list[float]) -> int:
+    def _build(self, start: Pose, urdf: Path) -> int:
         p, client = self._p, self._client
         p.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
         # Bullet lays friction along the world's axes, so a steady demand turns the rover faster
@@ -158,7 +149,7 @@ class BulletBody:
         ground = p.createMultiBody(0, plane, physicsClientId=client)
         p.changeDynamics(ground, -1, lateralFriction=1.0, physicsClientId=client)
         rover: int = p.loadURDF(
-            str(URDF),
+            str(urdf),
             basePosition=(start.north, -start.east, RIDE_HEIGHT),
             baseOrientation=p.getQuaternionFromEuler((0.0, 0.0, -wrap_angle(start.yaw))),
             flags=p.URDF_USE_INERTIA_FROM_FILE,
@@ -166,17 +157,21 @@ class BulletBody:
         )
         # Damping only on the base: given for a wheel, pybullet 3.2.7 drops the friction with it.
         p.changeDynamics(rover, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
-        for joint, friction in zip(LEFT_RIGHT, frictions, strict=True):
-            p.changeDynamics(rover, joint, lateralFriction=friction, physicsClientId=client)
         return rover
+
+    def _spread(self, frictions: list[float]) -> None:
+        for joint, friction in zip(self._wheels.joints, frictions, strict=True):
+            self._p.changeDynamics(
+                self._rover, joint, lateralFriction=friction, physicsClientId=self._client
+            )
 
 
 def _wheel_frictions(friction: float, variation: float, seed: int | None) -> list[float]:
     if variation == 0.0:
-        return [friction] * 4
+        return [friction] * WHEELS
     draw = Random(seed)
     ground = friction * draw.uniform(1.0 - variation, 1.0 + variation)
-    return [ground * draw.uniform(1.0 - WHEEL_SPREAD, 1.0 + WHEEL_SPREAD) for _ in LEFT_RIGHT]
+    return [ground * draw.uniform(1.0 - WHEEL_SPREAD, 1.0 + WHEEL_SPREAD) for _ in range(WHEELS)]
 
 
 def has_pybullet() -> bool:
