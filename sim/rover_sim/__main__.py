@@ -20,8 +20,12 @@ from mav_tasks.key_ring.ring_file import load, path_of_ring
 from mav_tasks.mavlink.signing import Key
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
+from rover_sim.by_hand import BodyByHand
 from rover_sim.errors import MissingExtra, SimulatedCrash
-from rover_sim.kinematic import KinematicBody
+from rover_sim.fault_plan import HELP, PlanError, PlannedFault, check_rovers, read_fault
+from rover_sim.fault_player import FaultPlayer, HandledRover
+from rover_sim.frames import Frame
+from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import ARDUPILOT, PERSONAS, Persona
 from rover_sim.real_time import Clock, drive
 from rover_sim.realism import Realism
@@ -71,6 +75,8 @@ class Options:
     peers: Peers
     home: Place
     sticks: StickPulses | None  # None: no transmitter
+    faults: tuple[PlannedFault, ...]
+    shown_frame: str  # "", or what was asked for
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -120,6 +126,12 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     add("--truth", metavar="FILE", help="append the true poses at 10 Hz as CSV")
     add("--sign", metavar="NAME", default="", help="sign with this key, hear nothing else")
     add("--keys", metavar="FILE", default="", help="the key ring (default: the user's own)")
+    add(
+        "--frame",
+        choices=tuple(frame.value for frame in Frame),
+        help="how it steers: skid and differential are one (default: as its make's persona)",
+    )
+    add("--fault", metavar="TEXT", action="append", default=[], help=HELP)
     add_realism_arguments(parser)
     given = sys.argv[1:] if arguments is None else arguments
     values = parser.parse_args(with_home_joined(given))
@@ -142,6 +154,14 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     if not 0.0 < speed <= 1000.0:
         parser.error("--speed must be 'real' or a number above 0, at most 1000")
     persona = _persona(values.persona, honours_yaw_rate=values.honours_yaw_rate)
+    if values.frame is not None:
+        persona = persona.on(Frame(values.frame))
+    last = values.system_id + values.count - 1
+    try:
+        faults = tuple(read_fault(text, persona.frame) for text in values.fault)
+        check_rovers(faults, range(values.system_id, last + 1))
+    except PlanError as error:
+        parser.error(f"--fault: {error}")
     return Options(
         host=values.host,
         port=values.port,
@@ -162,6 +182,8 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         peers=peers_of(values, persona),
         home=values.home,
         sticks=values.sticks,
+        faults=faults,
+        shown_frame="" if values.frame is None else f", {values.frame}",
     )
 
 
@@ -202,10 +224,11 @@ def run(options: Options, stack: ExitStack) -> None:
     for vehicle in vehicles:
         number = vehicle.autopilot.address.system_id
         where = f"udp {host}:{port}"
-        what = f"{options.persona.name}, {options.body}"
+        what = f"{options.persona.name}, {options.body}{options.shown_frame}"
         sys.stdout.write(f"rover_sim: rover {number} ({what}) on {where}\n")
     sys.stdout.flush()
-    drive(server, stop, vehicles, clock, truth)
+    rovers = [HandledRover(*each) for each in zip(vehicles, bodies, strict=True)]
+    drive(server, stop, vehicles, clock, truth, FaultPlayer(options.faults, rovers))
 
 
 def _with_body(options: Options) -> Options:
@@ -278,8 +301,8 @@ def _open_truth(options: Options, stack: ExitStack) -> TextIO | None:
     return truth
 
 
-def _make_body(options: Options, index: int, stack: ExitStack) -> Body:
-    body = _new_body(options, index)
+def _make_body(options: Options, index: int, stack: ExitStack) -> BodyByHand:
+    body = BodyByHand(_new_body(options, index), frame=options.persona.frame)
     stack.callback(body.close)
     return body
 
@@ -288,10 +311,11 @@ def _new_body(options: Options, index: int) -> Body:
     start = Pose(east=SPACING * index, yaw=options.home.yaw)
     seed = None if options.seed is None else options.seed + index
     if options.body == "kinematic":
-        return KinematicBody(start=start, slip=KINEMATIC_SLIP, seed=seed)
+        return kinematic_body(options.persona.frame, start=start, slip=KINEMATIC_SLIP, seed=seed)
     try:
         return BulletBody(
             start=start,
+            frame=options.persona.frame,
             friction=options.friction,
             variation=options.variation,
             seed=seed,

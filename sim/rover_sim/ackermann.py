@@ -23,7 +23,7 @@ class AckermannBody:
 
     def __init__(self, *, start: Pose, seed: int | None) -> None:
         variation = Random(seed) if seed is not None else None
-        self._lag = LAG * variation.uniform(0.8, 1.2) if variation else LAG
+        self.lag = LAG * variation.uniform(0.8, 1.2) if variation else LAG
         # rad; a linkage that is off by half a degree bends 10 m of way by 1 m
         self._off_centre = math.radians(variation.uniform(-0.3, 0.3)) if variation else 0.0
         self._time = 0.0
@@ -70,7 +70,7 @@ class AckermannBody:
 
     def _step(self, dt: float) -> None:
         before, speed_before = self._yaw_rate, self._speed
-        self._speed = approach(self._speed, self._demanded_speed, self._lag, MAX_ACCELERATION, dt)
+        self._speed = approach(self._speed, self._demanded_speed, self.lag, MAX_ACCELERATION, dt)
         change, most = self._demanded_steering - self._steering, SERVO_RATE * dt
         self._steering += max(-most, min(most, change))
         # The mean of both ends, along the heading in the middle: second order on arcs.

@@ -23,6 +23,7 @@ class ArduPilotRules:
     reposition_mode = Mode.GUIDED
     home_is_where_armed = False
     sticks_present = False
+    no_position_text = "Arm: Need Position Estimate"
     hold_destination: Destination | None = None  # HOLD stands
 
     def __init__(self, parts: FlightParts) -> None:
@@ -104,6 +105,11 @@ class ArduPilotRules:
         # The real one says Radio: the RC check shares the failsafe bits.
         self._outbox.say(MavSeverity.WARNING, "Radio Failsafe")
         return Intervention(Mode.HOLD) if armed else None
+
+    def position_lost(self) -> Intervention:
+        """HOLD: FS_EKF_ACTION is 1."""
+        self._outbox.say(MavSeverity.CRITICAL, "EKF failsafe")
+        return Intervention(Mode.HOLD)
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Note a heartbeat of any system."""

@@ -10,6 +10,7 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Message
+from rover_sim.actuators import Motion, with_frozen
 from rover_sim.available_modes import available_modes
 from rover_sim.body import BodyState
 from rover_sim.boot import Boot
@@ -23,6 +24,7 @@ from rover_sim.file_transfer import refusal_of
 from rover_sim.flight import FlightControl
 from rover_sim.flight_rules import FlightParts
 from rover_sim.geo import Origin
+from rover_sim.gps_loss import GpsLoss
 from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.outbox import Outbox
@@ -38,6 +40,7 @@ from rover_sim.timing import Departures
 MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # what it is driven by
 UNASKED_STICKS = 1.0  # s, RC_CHANNELS where nobody has asked for another interval
 RUNTIME_INTERVAL = 30.0  # s, AP_Stats' flush_interval_ms
+POSITIONS = (messages.LocalPositionNed.id, messages.GlobalPositionInt.id)
 REBOOT_TIME = 1.0  # s in which a restarting autopilot neither hears nor says anything
 
 
@@ -68,7 +71,8 @@ class Autopilot:
         )
         self._departures = Departures(realism.timing, seed=seed)
         self._sticks = Sticks(realism.stick_speed)
-        self._asked = 0.0  # m/s, of the wheels
+        self._asked = 0.0  # m/s
+        self._outputs: Motion = (0.0, 0.0)  # of the motors
         self._origin = origin
         self._unix_offset = unix_offset
         self._outbox = Outbox()
@@ -109,14 +113,20 @@ class Autopilot:
             self._clock_stopped_at = now
         if now < self._up_at:
             return 0.0, 0.0
+        if self._gps.watch(self._faults, now=now):
+            self._flight.lose_position()
         demand = self._flight.demand(self._estimate, now=now)
         self._missions.step(now=now)
         self._count_runtime(now)
         self._announce(now)
         for message_id in self._streams.take_due(now=now):
             self._send(message_id, now)
-        self._asked, yaw_rate = self._motion.step(demand, truth, self._estimate)
-        return self._asked, yaw_rate
+        self._asked = demand.speed
+        outputs = self._motion.step(demand, truth, self._estimate)
+        if self._flight.armed:
+            outputs = with_frozen(outputs, self._outputs, self._faults.outputs_frozen)
+        self._outputs = outputs
+        return outputs
 
     def take_messages(self) -> list[Message]:
         """Hand over what there is to say, to everybody on the link."""
@@ -150,6 +160,11 @@ class Autopilot:
     def parameters(self) -> Parameters:
         """The parameters, to read or to set beforehand."""
         return self._parameters
+
+    @property
+    def faults(self) -> Faults:
+        """What is broken."""
+        return self._faults
 
     def set_faults(self, faults: Faults) -> None:
         """Break something, or with ``Faults()`` mend it all."""
@@ -195,15 +210,14 @@ class Autopilot:
         outbox, missions, persona = self._outbox, self._missions, self._persona
         realism = self._realism
         self._up_at = up_at
+        self._gps = GpsLoss()
         self._runtime_due = up_at + RUNTIME_INTERVAL
         table = persona.streams
         if realism.wire is Wire.REAL:
             table = with_sticks(table, UNASKED_STICKS)
         self._streams = Streams(table, now=up_at)
         boot = Boot(realism.boot, persona.boot_script, started=up_at)
-        self._motion = drive_train_of(
-            realism.drive, persona.drive, persona.frame, self._parameters
-        )
+        self._motion = drive_train_of(realism.drive, persona.drive, persona.frame, self._parameters)
         rules = persona.rules(
             FlightParts(
                 origin=self._origin,
@@ -273,6 +287,8 @@ class Autopilot:
     def _send(self, message_id: int, now: float) -> bool:
         if not self._telemetry.knows(message_id):
             return False
+        if self._gps.is_position_gone and message_id in POSITIONS:
+            return True
         estimate = self._estimate
         if self._faults.not_finite and message_id in MEASURED:
             estimate = estimate.without_numbers

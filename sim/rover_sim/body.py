@@ -37,7 +37,12 @@ class Pose:
 
 
 class Body(Protocol):
-    """A skid-steered rover. One process may hold many; each is stepped on its own."""
+    """A rover on wheels. One process may hold many; each is stepped on its own."""
+
+    @property
+    def lag(self) -> float:
+        """How late the wheels do what ``drive`` demands, s."""
+        ...
 
     @property
     def state(self) -> BodyState:

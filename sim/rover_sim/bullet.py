@@ -47,6 +47,8 @@ class BulletBody:
     Raises MissingExtra where pybullet is not installed.
     """
 
+    lag = 0.0  # s; its motors have torque enough for at once
+
     def __init__(
         self,
         *,

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from rover_sim.actuators import Actuator
+
 
 @dataclass(frozen=True, slots=True)
 class Faults:
@@ -16,6 +18,8 @@ class Faults:
     heading_frozen: bool = False
     not_finite: bool = False  # ATTITUDE and LOCAL_POSITION_NED are full of NaN
     clock_frozen: bool = False  # time_boot_ms stays as it is
+    outputs_frozen: frozenset[Actuator] = frozenset()  # stay as they were, while it is armed
+    gps_lost: bool = False  # no satellites; the position holds for some seconds
     refuse_arm: bool = False  # even a forced one
     refuse_mode: bool = False  # of clients; the operator's switch works
     withheld: frozenset[int] = frozenset()  # ids of messages that are not sent

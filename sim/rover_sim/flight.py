@@ -8,7 +8,7 @@ from mav_tasks.mavlink.enums import MavSeverity, MavState
 from rover_sim.boot import Boot
 from rover_sim.estimate import Estimate
 from rover_sim.faults import NO_FAULTS, Faults
-from rover_sim.flight_rules import FlightRules
+from rover_sim.flight_rules import FlightRules, Intervention
 from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode, ModeNumbers
@@ -17,6 +17,8 @@ from rover_sim.route import Route, Waypoint
 from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
 from rover_sim.steering import COAST, STOP, Demand
 from rover_sim.sticks import Sticks
+
+NEEDS_POSITION = (Mode.GUIDED, Mode.AUTO, Mode.RTL)
 
 
 class FlightControl:
@@ -168,6 +170,9 @@ class FlightControl:
             self._outbox.say(MavSeverity.CRITICAL, text)
         if not_ready:
             return False
+        if self.faults.gps_lost:
+            self._outbox.say(MavSeverity.CRITICAL, self._rules.no_position_text)
+            return False
         refusal = self._rules.arming_refusal(self.mode, forced=forced, now=now)
         if refusal is not None:
             self._outbox.say(MavSeverity.CRITICAL, refusal)
@@ -199,6 +204,11 @@ class FlightControl:
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Note a heartbeat of any system."""
         self._rules.hear_heartbeat(system_id, now=now)
+
+    def lose_position(self) -> None:
+        """Note that there is no position any more: what drives by one ends."""
+        if self.armed and self.mode in NEEDS_POSITION:
+            self._intervene(self._rules.position_lost())
 
     def take_local(self, message: Local, estimate: Estimate, *, now: float) -> None:
         """Take SET_POSITION_TARGET_LOCAL_NED."""
@@ -248,6 +258,7 @@ class FlightControl:
             self._route = Route((Waypoint(None, self.home),), loop=False)
 
     def _pass_time(self, now: float) -> None:
+        self._rules.sticks_present = self._rules.sticks_present or self._radio.is_there
         for severity, text in self._boot.texts_due(now=now):
             self._outbox.say(severity, text)
         started = self.mode is Mode.INITIALISING and self._boot.is_initialised(now=now)
@@ -255,6 +266,9 @@ class FlightControl:
             self.enter(Mode.MANUAL)
         arrived = self._route is not None and self._route.next is None
         intervention = self._rules.intervene(self.mode, armed=self.armed, arrived=arrived, now=now)
+        self._intervene(intervention)
+
+    def _intervene(self, intervention: Intervention | None) -> None:
         if intervention is None:
             return
         if intervention.mode is not None:

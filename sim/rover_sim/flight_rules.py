@@ -52,6 +52,7 @@ class FlightRules(Protocol):
 
     reposition_mode: Mode  # in which it drives to the place of DO_REPOSITION
     sticks_present: bool  # somebody holds the sticks of its remote control
+    no_position_text: str  # with which arming is refused then
     home_is_where_armed: bool  # else where it was switched on
 
     @property
@@ -103,6 +104,10 @@ class FlightRules(Protocol):
 
         ``arrived``: the way that AUTO or RTL drives is at its end.
         """
+        ...
+
+    def position_lost(self) -> Intervention:
+        """Say what it does, armed in a mode that needs a position, when that is gone."""
         ...
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:

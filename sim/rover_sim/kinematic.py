@@ -28,7 +28,7 @@ class KinematicBody:
         if not 0.0 <= slip < 1.0:
             raise ValueError(f"slip must be in [0, 1), not {slip}")
         variation = Random(seed) if seed is not None else None
-        self._lag = LAG * variation.uniform(0.8, 1.2) if variation else LAG
+        self.lag = LAG * variation.uniform(0.8, 1.2) if variation else LAG
         spread = variation.uniform(-SLIP_SPREAD, SLIP_SPREAD) if variation else 0.0
         self._grip = 1.0 - min(slip * (1.0 + spread), 0.95)
         self._time = 0.0
@@ -70,9 +70,9 @@ class KinematicBody:
         """Nothing is held."""
 
     def _step(self, dt: float) -> None:
-        speed = approach(self._speed, self._demanded_speed, self._lag, MAX_ACCELERATION, dt)
+        speed = approach(self._speed, self._demanded_speed, self.lag, MAX_ACCELERATION, dt)
         yaw_rate = approach(
-            self._yaw_rate, self._demanded_yaw_rate, self._lag, MAX_YAW_ACCELERATION, dt
+            self._yaw_rate, self._demanded_yaw_rate, self.lag, MAX_YAW_ACCELERATION, dt
         )
         # The mean of both ends, along the heading in the middle: second order on arcs.
         distance = 0.5 * (self._speed + speed) * dt

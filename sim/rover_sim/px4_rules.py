@@ -53,6 +53,7 @@ class Px4Rules:
     reposition_mode = Mode.HOLD
     home_is_where_armed = True
     sticks_present = False
+    no_position_text = "Arming denied: Resolve system health failures first"
 
     def __init__(self, parts: FlightParts) -> None:
         self._parts = parts
@@ -157,6 +158,12 @@ class Px4Rules:
     def _mission_is_over(self, mode: Mode) -> bool:
         missions = self._parts.missions
         return mode is Mode.AUTO and (missions.complete or missions.item_count == 0)
+
+    def position_lost(self) -> Intervention:
+        """Land, the first failsafe that needs no position: it stands, and is disarmed."""
+        self._say("Failsafe activated")
+        self._intended = Mode.LAND  # it does not go back to OFFBOARD by itself
+        return Intervention(Mode.LAND)
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Nothing hangs on a ground station (NAV_DLL_ACT is 0)."""

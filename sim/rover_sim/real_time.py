@@ -2,9 +2,11 @@
 
 import selectors
 import socket
+import sys
 import time
 from typing import Any, TextIO, cast
 
+from rover_sim.fault_player import FaultPlayer
 from rover_sim.vehicle import Vehicle
 
 MAX_DATAGRAM = 65535
@@ -38,6 +40,7 @@ def drive(
     vehicles: list[Vehicle],
     clock: Clock,
     truth: TextIO | None,
+    faults: FaultPlayer,
 ) -> None:
     """Run the vehicles on the (non-blocking) server socket until ``stop`` is readable."""
     selector = selectors.DefaultSelector()
@@ -53,6 +56,9 @@ def drive(
             if ready:
                 _read(server, vehicles, clock)
             now = clock.now()
+            for line in faults.play(clock.elapsed(now), now=now):
+                sys.stdout.write(f"rover_sim: {line}\n")
+                sys.stdout.flush()
             for vehicle in vehicles:
                 vehicle.handle_deadline(now=now)
                 _send(server, vehicle)

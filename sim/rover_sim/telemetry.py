@@ -170,7 +170,7 @@ class Telemetry:
         )
 
     def _gps_raw_int(self, estimate: Estimate, boot_ms: int) -> Message:
-        if not self._boot.has_fix(now=self._time(boot_ms)):
+        if self._flight.faults.gps_lost or not self._boot.has_fix(now=self._time(boot_ms)):
             return m.GpsRawInt(boot_ms * 1000, 0, 0, 0, 0, UNKNOWN_U16, UNKNOWN_U16, 0, 0, 0)
         latitude, longitude = self._origin.to_global(estimate.north, estimate.east)
         return m.GpsRawInt(

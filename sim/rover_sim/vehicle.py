@@ -14,8 +14,9 @@ from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.motion import CONTROL_PERIOD
+from rover_sim.motors import LAGS, Motors
 from rover_sim.personas import ARDUPILOT, Persona
-from rover_sim.realism import Realism
+from rover_sim.realism import Drive, Realism
 from rover_sim.signatures import RoverSignatures
 
 PEER_TIMEOUT = 10.0  # s of silence after which a peer is no longer talked to
@@ -40,7 +41,10 @@ class Vehicle:
         now: float,
         signatures: RoverSignatures | None = None,
         peers: Peers = Peers.ALL,
+        motors: Motors | None = None,
     ) -> None:
+        """``motors``: what is between autopilot and body; None: nothing."""
+        self._motors = motors
         self._answers = peers
         self.body = body
         self._signatures = signatures
@@ -81,9 +85,9 @@ class Vehicle:
         while self._next_step <= now:
             at = self._next_step
             self.autopilot.release(now=at)
-            forward_speed, yaw_rate = self.autopilot.step(self.body.state, now=at)
+            motion = self.autopilot.step(self.body.state, now=at)
             self._collect()
-            self.body.drive(forward_speed, yaw_rate)
+            self.body.drive(*(motion if self._motors is None else self._motors.step(motion)))
             self.body.advance(CONTROL_PERIOD)
             self._next_step = at + CONTROL_PERIOD
         self.autopilot.release(now=now)
@@ -138,6 +142,7 @@ def make_vehicle(
     ``unix_offset`` is Unix time minus ``now``; 0 where there is no wall clock (SYSTEM_TIME then
     says unknown). With a ``key`` it signs, and hears only what is signed with it.
     """
+    kind = persona.realism if realism is None else realism
     autopilot = Autopilot(
         system_id=system_id,
         persona=persona,
@@ -145,8 +150,13 @@ def make_vehicle(
         unix_offset=unix_offset,
         truth=body.state,
         now=now,
-        realism=persona.realism if realism is None else realism,
+        realism=kind,
         seed=seed,
     )
     signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
-    return Vehicle(body=body, autopilot=autopilot, now=now, signatures=signatures, peers=peers)
+    motors = None
+    if kind.drive is Drive.REAL:
+        motors = Motors(wanted=LAGS[persona.frame], body=body.lag)
+    return Vehicle(
+        body=body, autopilot=autopilot, now=now, signatures=signatures, peers=peers, motors=motors
+    )

@@ -14,6 +14,11 @@ class WeakBrakes:
         self._yaw_rate = 0.0
 
     @property
+    def lag(self) -> float:
+        """How late the wheels do what ``drive`` demands, s."""
+        return self._body.lag
+
+    @property
     def state(self) -> BodyState:
         """The state after the last ``advance``."""
         return self._body.state

@@ -302,3 +302,35 @@ def test_bad_options_are_refused_by_name(
         read_options(options)
     assert ended.value.code == 2
     assert named in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("frame", ["skid", "differential", "ackermann"])
+def test_the_frame_is_the_makes_or_the_one_that_is_asked_for(frame: str) -> None:
+    assert read_options(["--frame", frame]).persona.frame.value == frame
+    assert read_options([]).persona.frame.value == "skid"
+    assert read_options(["--persona", "px4"]).persona.frame.value == "differential"
+
+
+def test_faults_are_planned_on_the_command_line() -> None:
+    options = read_options(["--fault", "at 1 s: reboot", "--fault", "at 2 s: lose-gps for 3 s"])
+    assert [(fault.at, fault.lasts) for fault in options.faults] == [(1.0, None), (2.0, 3.0)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--fault", "at 1 s: bang"], "--fault: 'bang' in 'at 1 s: bang' is none of block-wheel"),
+        (["--fault", "rover 2 at 1 s: reboot"], "there is no rover 2"),
+        (
+            ["--frame", "ackermann", "--fault", "at 1 s: freeze-output left"],
+            "throttle and steering, not 'left'",
+        ),
+    ],
+)
+def test_a_fault_that_is_not_understood_ends_it_at_once(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        read_options(arguments)
+    assert ended.value.code == 2
+    assert says in capsys.readouterr().err

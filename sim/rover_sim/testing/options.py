@@ -5,11 +5,15 @@ from dataclasses import dataclass, fields
 from typing import Any
 from zlib import crc32
 
-from rover_sim.personas import PERSONAS
+from rover_sim.frames import Frame
+from rover_sim.personas import PERSONAS, Persona
 
 BODIES = ("kinematic", "bullet")
 NOISES = ("on", "off")
 MOST_ROVERS = 250  # system ids
+
+
+FRAMES = ("", *(frame.value for frame in Frame))
 
 
 class MarkerError(Exception):
@@ -24,15 +28,23 @@ class RoverOptions:
     count: int = 1  # of rovers, with system ids in a row
     seed: int | None = None  # None: from the command line, or from the test's name
     body: str = "kinematic"  # or "bullet": real physics, three times as slow
+    frame: str = ""  # "skid", "differential" or "ackermann"; "": as its persona
     noise: str = "on"  # as unkind as its make; "off": exact, for tests of exact arithmetic
     limit: float = 3600.0  # virtual s, for one thing that is waited for
     real_limit: float = 60.0  # s, the same
+
+    @property
+    def make(self) -> Persona:
+        """The make of autopilot, on its frame."""
+        persona = PERSONAS[self.persona]
+        return persona.on(Frame(self.frame)) if self.frame else persona
 
     def __post_init__(self) -> None:
         """Refuse what there is not."""
         _one_of("persona", self.persona, tuple(PERSONAS))
         _one_of("body", self.body, BODIES)
         _one_of("noise", self.noise, NOISES)
+        _one_of("frame", self.frame, FRAMES)
         if type(self.count) is not int or not 1 <= self.count <= MOST_ROVERS:
             raise MarkerError(f"count must be 1 to {MOST_ROVERS}, not {self.count!r}")
         if self.seed is not None and type(self.seed) is not int:

@@ -57,7 +57,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Make the marker known."""
     config.addinivalue_line(
         "markers",
-        f'{MARKER}(persona="ardupilot", count=1, seed=None, body="kinematic", noise="on",'
+        f'{MARKER}(persona="ardupilot", count=1, seed=None, body="kinematic", frame="", noise="on",'
         " limit=3600, real_limit=60): what the fixture rover_world simulates; persona also px4 or"
         ' generic, body also bullet, noise "off" for exact arithmetic, limits in seconds of'
         " virtual and of real time",

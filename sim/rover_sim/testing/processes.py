@@ -85,7 +85,7 @@ class RealTime:
         """Give the URL at which the rovers listen."""
         options = self._options
         what = ["--body", options.body, "--persona", options.persona]
-        what += ["--noise", options.noise]
+        what += ["--noise", options.noise, "--frame", options.make.frame.value]
         how = ["--count", str(options.count), "--seed", str(self._seed)]
         rovers = self._start("rover_sim", "--port", "0", *what, *how)
         port = rovers.wait_for(r"on udp 127\.0\.0\.1:(\d+)")[1]

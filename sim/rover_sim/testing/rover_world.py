@@ -18,11 +18,10 @@ from mav_tasks.links.memory import MemoryLink
 from mav_tasks.settings import Settings
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
+from rover_sim.by_hand import BodyByHand
 from rover_sim.errors import NotInVirtualTime, Stalled
-from rover_sim.kinematic import KinematicBody
-from rover_sim.personas import PERSONAS
+from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.realism import EXACT
-from rover_sim.testing.by_hand import BodyByHand
 from rover_sim.testing.lossy import LossyLink, LossyNet, Text
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.simulated_rover import SimulatedRover
@@ -156,9 +155,9 @@ class RoverWorld:
         self._runner.run(_ended(task))
 
     def _add_rover(self, number: int) -> SimulatedRover:
-        body = BodyByHand(self._make_body(number))
+        persona = self.options.make
+        body = BodyByHand(self._make_body(number), frame=persona.frame)
         self._bodies.append(body)
-        persona = PERSONAS[self.options.persona]
         vehicle = make_vehicle(
             body,
             system_id=number,
@@ -175,10 +174,10 @@ class RoverWorld:
 
     def _make_body(self, number: int) -> Body:
         start = Pose(east=SPACING * (number - 1))
-        seed = self.seed + number
+        seed, frame = self.seed + number, self.options.make.frame
         if self.options.body == "kinematic":
-            return KinematicBody(start=start, slip=SLIP, seed=seed)
-        return BulletBody(start=start, variation=VARIATION, seed=seed)
+            return kinematic_body(frame, start=start, slip=SLIP, seed=seed)
+        return BulletBody(start=start, frame=frame, variation=VARIATION, seed=seed)
 
 
 def _name_of(number: int) -> str:

@@ -1,13 +1,16 @@
 """A simulated rover in a test's hands: where it truly is, and what can happen to it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import degrees
+from typing import Any
 
+from rover_sim.actuators import output_of, wheels_of
 from rover_sim.body import Pose
+from rover_sim.by_hand import BodyByHand, turned
 from rover_sim.faults import Faults
 from rover_sim.modes import Mode
 from rover_sim.personas import Persona
-from rover_sim.testing.by_hand import BodyByHand, turned
 from rover_sim.vehicle import Vehicle
 
 STANDS = 0.01  # m/s and rad/s
@@ -107,13 +110,37 @@ class SimulatedRover:
         north, east = turned(forward, right, now.yaw)
         self._body.place(Pose(now.north + north, now.east + east, now.yaw + turn))
 
-    def block_wheels(self) -> None:
-        """Hold its wheels: whatever is asked of them, they stand."""
-        self._body.are_wheels_blocked = True
+    def block_wheels(self, side: str = "all") -> None:
+        """Hold its wheels, or those of one ``side``, "left" or "right": whatever is asked of them,
+        they stand. ValueError for anything else.
+        """
+        self._body.blocked |= wheels_of(side)
 
     def free_wheels(self) -> None:
         """Let go of its wheels."""
-        self._body.are_wheels_blocked = False
+        self._body.blocked = frozenset()
+
+    def freeze_output(self, name: str) -> None:
+        """Let an output stay as it is, as long as the rover is armed, whatever mode it is in.
+
+        "left" or "right"; an Ackermann rover has "throttle" and "steering". ValueError for others.
+        """
+        frozen = self._vehicle.autopilot.faults.outputs_frozen | {
+            output_of(name, self._persona.frame)
+        }
+        self._change_faults(outputs_frozen=frozen)
+
+    def free_outputs(self) -> None:
+        """Let every output follow again."""
+        self._change_faults(outputs_frozen=frozenset())
+
+    def lose_gps(self) -> None:
+        """Take its satellites away: it drives on for some seconds, then its position is gone."""
+        self._change_faults(gps_lost=True)
+
+    def regain_gps(self) -> None:
+        """Give its satellites back."""
+        self._change_faults(gps_lost=False)
 
     def arm(self) -> None:
         """Arm it at the rover, past everybody."""
@@ -144,3 +171,6 @@ class SimulatedRover:
     def set_faults(self, faults: Faults) -> None:
         """Break what ``faults`` names and mend all else; ``Faults()`` mends everything."""
         self._vehicle.autopilot.set_faults(faults)
+
+    def _change_faults(self, **changes: Any) -> None:
+        self.set_faults(replace(self._vehicle.autopilot.faults, **changes))

@@ -6,9 +6,10 @@ import pytest
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
+from rover_sim.actuators import SIDES
 from rover_sim.body import Pose
+from rover_sim.by_hand import BodyByHand
 from rover_sim.personas import ARDUPILOT, PX4, Persona
-from rover_sim.testing.by_hand import BodyByHand
 from tests.unit.rover_sim.real_rig import RealRig
 from tests.unit.rover_sim.rig import HOLD
 
@@ -51,6 +52,7 @@ def test_home_follows_a_disarmed_rover_within_a_second(persona: Persona) -> None
 def test_home_stays_while_armed_and_moves_when_disarmed(persona: Persona) -> None:
     rig = Carried(persona)
     rig.arm_in_hold()
+    rig.hands.blocked = SIDES  # PX4 would drive back to where HOLD began
     rig.carry(5.0)
     rig.run(3.0)
     assert rig.home() == pytest.approx(0.0, abs=0.1)

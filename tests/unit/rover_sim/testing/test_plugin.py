@@ -15,7 +15,7 @@ assert rover_sim.testing.rover_world
 
 pytest_plugins = ["pytester"]
 
-TAKES = "takes persona=, count=, seed=, body=, noise=, limit=, real_limit=, by name only"
+TAKES = "takes persona=, count=, seed=, body=, frame=, noise=, limit=, real_limit=, by name only"
 PLUGIN = ("-p", "rover_sim.testing.plugin")
 
 
@@ -41,6 +41,7 @@ def test_the_example_passes_in_a_process_of_its_own(pytester: pytest.Pytester) -
 
 def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
     broken = EXAMPLE.replace("(2.0, abs", "(3.0, abs").replace("rover.block_wheels()", "pass")
+    broken += '\npytestmark = pytest.mark.simulated_rover(noise="off")\n'  # exact: never stuck
     result = run(pytester, broken)
     result.assert_outcomes(failed=2)
     result.stdout.fnmatch_lines(

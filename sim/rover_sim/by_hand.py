@@ -3,7 +3,9 @@
 from dataclasses import replace
 from math import cos, sin
 
+from rover_sim.actuators import Actuator, with_blocked
 from rover_sim.body import Body, BodyState, Pose, wrap_angle
+from rover_sim.frames import Frame
 
 
 class BodyByHand:
@@ -12,13 +14,19 @@ class BodyByHand:
     The ground is the same everywhere: to carry a rover is to move the ground's frame under it.
     """
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: Body, *, frame: Frame = Frame.SKID) -> None:
         self._body = body
         self._offset: Pose | None = None  # of the body's own frame; None: not moved yet
-        self.are_wheels_blocked = False
+        self._frame = frame
+        self.blocked: frozenset[Actuator] = frozenset()  # sides whose wheels stand
 
     def __repr__(self) -> str:
         return f"BodyByHand({self._body!r})"
+
+    @property
+    def lag(self) -> float:
+        """How late the wheels do what ``drive`` demands, s."""
+        return self._body.lag
 
     @property
     def state(self) -> BodyState:
@@ -43,9 +51,7 @@ class BodyByHand:
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
         """Demand a motion, kept until the next call; blocked wheels stand."""
-        if self.are_wheels_blocked:
-            forward_speed = yaw_rate = 0.0
-        self._body.drive(forward_speed, yaw_rate)
+        self._body.drive(*with_blocked((forward_speed, yaw_rate), self.blocked, self._frame))
 
     def advance(self, duration: float) -> None:
         """Step the physics by ``duration`` seconds."""

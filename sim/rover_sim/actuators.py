@@ -1,0 +1,92 @@
+"""The single outputs and wheels of a rover, for faults that take one of them."""
+
+from collections.abc import Collection, Mapping
+from enum import Enum
+
+from rover_sim.frames import Frame
+
+HALF_TRACK = 0.23  # m, middle to wheel, as in the URDFs
+DRAG = 0.5  # of its speed is left to a rover that drags one wheel and drives with the other
+
+PULL = 0.2  # 1/m, how much such a rover bends towards the wheel that stands
+
+
+class Actuator(Enum):
+    """What can stick."""
+
+    LEFT = "left"
+    RIGHT = "right"
+    THROTTLE = "throttle"
+    STEERING = "steering"
+
+
+SIDES = frozenset({Actuator.LEFT, Actuator.RIGHT})
+
+#: the motor outputs of a frame
+OUTPUTS: Mapping[Frame, tuple[Actuator, ...]] = {
+    Frame.SKID: (Actuator.LEFT, Actuator.RIGHT),
+    Frame.DIFFERENTIAL: (Actuator.LEFT, Actuator.RIGHT),
+    Frame.ACKERMANN: (Actuator.THROTTLE, Actuator.STEERING),
+}
+
+Motion = tuple[float, float]  # m/s, rad/s clockwise, as ``Body.drive`` takes them
+
+
+def sides_of(motion: Motion) -> tuple[float, float]:
+    """Return the speeds of the left and the right wheels, m/s."""
+    speed, rate = motion
+    return speed + rate * HALF_TRACK, speed - rate * HALF_TRACK  # clockwise: left runs ahead
+
+
+def motion_of(left: float, right: float) -> Motion:
+    """Return the motion that two sides make."""
+    return (left + right) / 2.0, (left - right) / (2.0 * HALF_TRACK)
+
+
+def with_frozen(motion: Motion, last: Motion, frozen: Collection[Actuator]) -> Motion:
+    """Return the motion with some outputs as they were at ``last``."""
+    if not frozen:
+        return motion
+    if SIDES & set(frozen):
+        left, right = sides_of(motion)
+        last_left, last_right = sides_of(last)
+        return motion_of(
+            last_left if Actuator.LEFT in frozen else left,
+            last_right if Actuator.RIGHT in frozen else right,
+        )
+    speed = last[0] if Actuator.THROTTLE in frozen else motion[0]
+    curvature_of = last if Actuator.STEERING in frozen else motion
+    return speed, speed * curvature_of[1] / curvature_of[0] if curvature_of[0] else 0.0
+
+
+def with_blocked(motion: Motion, blocked: Collection[Actuator], frame: Frame) -> Motion:
+    """Return the motion of a rover of which the wheels of a side stand, or of both."""
+    if set(blocked) >= SIDES:
+        return 0.0, 0.0
+    if not blocked:
+        return motion
+    if frame is Frame.ACKERMANN:
+        speed = motion[0] * DRAG
+        pull = -PULL if Actuator.LEFT in blocked else PULL
+        return speed, motion[1] * DRAG + pull * speed
+    left, right = sides_of(motion)
+    return motion_of(
+        0.0 if Actuator.LEFT in blocked else left, 0.0 if Actuator.RIGHT in blocked else right
+    )
+
+
+def wheels_of(side: str) -> frozenset[Actuator]:
+    """Return the sides whose wheels ``side`` names: left, right or all. ValueError otherwise."""
+    sides = {"left": {Actuator.LEFT}, "right": {Actuator.RIGHT}, "all": SIDES}
+    if side not in sides:
+        raise ValueError(f"wheels are left, right or all, not {side!r}")
+    return frozenset(sides[side])
+
+
+def output_of(name: str, frame: Frame) -> Actuator:
+    """Return the output of that name. ValueError where this frame has none."""
+    for each in OUTPUTS[frame]:
+        if each.value == name:
+            return each
+    known = " and ".join(each.value for each in OUTPUTS[frame])
+    raise ValueError(f"the outputs of this frame ({frame.value}) are {known}, not {name!r}")

@@ -1,0 +1,176 @@
+"""Faults by the clock, as the command line says them: reading only, no rover is touched here.
+
+    [rover 2] at 10 s: block-wheel left for 5 s
+
+``ACTIONS`` lists what can happen. What lasts does so for the time given, or for good.
+"""
+
+import re
+from collections.abc import Callable, Container, Iterable, Mapping
+from dataclasses import dataclass
+from math import radians
+
+from rover_sim.actuators import Actuator, output_of, wheels_of
+from rover_sim.faults import Faults
+from rover_sim.frames import Frame
+
+FORM = re.compile(
+    r"(?:rover\s+(?P<rover>\d+)\s+)?at\s+(?P<at>[\d.]+)\s*s?\s*:\s*(?P<name>[a-z-]+)"
+    r"(?P<rest>.*?)(?:\s+for\s+(?P<lasts>\S+?)\s*s?)?\s*",
+    re.IGNORECASE,
+)
+EXAMPLE = "at 10 s: block-wheel left for 5 s"
+
+
+class PlanError(Exception):
+    """What cannot be understood; the message is one line for the user."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lasting:
+    """Something that is broken, until it is mended."""
+
+    faults: Faults = Faults()  # noqa: RUF009  # frozen
+    blocked: frozenset[Actuator] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """A shove, as the rover sees it."""
+
+    forward: float = 0.0  # m
+    right: float = 0.0  # m
+    turn: float = 0.0  # rad, clockwise
+
+
+@dataclass(frozen=True, slots=True)
+class Reboot:
+    """The autopilot is switched off and on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disarm:
+    """Somebody disarms it at the rover."""
+
+
+Event = Lasting | Push | Reboot | Disarm
+Words = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFault:
+    """One thing that happens at a time."""
+
+    text: str  # as it was given
+    rover: int | None  # system id; None: every rover
+    at: float  # s since the simulator started
+    event: Event
+    lasts: float | None  # s; None: for good, or it is over at once
+
+
+def _block_wheel(words: Words, _frame: Frame) -> Event:
+    return Lasting(blocked=wheels_of(_only(words, "left, right or all")))
+
+
+def _freeze_output(words: Words, frame: Frame) -> Event:
+    output = output_of(_only(words, "the name of an output"), frame)
+    return Lasting(Faults(outputs_frozen=frozenset({output})))
+
+
+def _push(words: Words, _frame: Frame) -> Event:
+    metres, direction = _amount(words, unit="m", default="forward")
+    known = {
+        "forward": Push(forward=metres),
+        "back": Push(forward=-metres),
+        "right": Push(right=metres),
+        "left": Push(right=-metres),
+    }
+    if direction not in known:
+        raise ValueError(f"it goes {', '.join(known)}, not {direction!r}")
+    return known[direction]
+
+
+def _turn(words: Words, _frame: Frame) -> Event:
+    degrees, direction = _amount(words, unit="deg", default="right")
+    if direction not in ("right", "left"):
+        raise ValueError(f"it goes right or left, not {direction!r}")
+    return Push(turn=radians(degrees if direction == "right" else -degrees))
+
+
+def _plain(event: Event) -> Callable[[Words, Frame], Event]:
+    def read(words: Words, _frame: Frame) -> Event:
+        if words:
+            raise ValueError(f"nothing follows it, but here {' '.join(words)!r} does")
+        return event
+
+    return read
+
+
+#: what can happen: how it is written, and how that is read
+ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
+    "block-wheel": ("block-wheel left|right|all", _block_wheel),
+    "freeze-output": ("freeze-output left|right (ackermann: throttle|steering)", _freeze_output),
+    "lose-gps": ("lose-gps", _plain(Lasting(Faults(gps_lost=True)))),
+    "freeze-position": ("freeze-position", _plain(Lasting(Faults(position_frozen=True)))),
+    "cut-link": ("cut-link", _plain(Lasting(Faults(silent=True, deaf=True)))),
+    "push": ("push 0.5 m forward|back|left|right", _push),
+    "turn": ("turn 30 deg right|left", _turn),
+    "reboot": ("reboot", _plain(Reboot())),
+    "disarm": ("disarm", _plain(Disarm())),
+}
+HELP = (
+    f"break something at a time, for example '{EXAMPLE}'; may be given often."
+    f" What there is: {'; '.join(form for form, _ in ACTIONS.values())}."
+    " Begin with 'rover 2' for one of many; without 'for' it lasts"
+)
+
+
+def read_fault(text: str, frame: Frame) -> PlannedFault:
+    """Read one fault. Raise PlanError."""
+    form = FORM.fullmatch(text.strip())
+    if form is None:
+        raise PlanError(f"not understood: {text!r}; for example: {EXAMPLE}")
+    name = form["name"].lower()
+    if name not in ACTIONS:
+        raise PlanError(f"{name!r} in {text!r} is none of {', '.join(ACTIONS)}")
+    written, read = ACTIONS[name]
+    try:
+        event = read(tuple(form["rest"].lower().split()), frame)
+    except ValueError as error:
+        raise PlanError(f"{text!r}: {error}; write: {written}") from error
+    lasts = None if form["lasts"] is None else _seconds(form["lasts"], text)
+    if lasts is not None and not isinstance(event, Lasting):
+        raise PlanError(f"{text!r}: {name} is over at once, leave out 'for'")
+    rover = None if form["rover"] is None else int(form["rover"])
+    return PlannedFault(text.strip(), rover, _seconds(form["at"], text), event, lasts)
+
+
+def _seconds(number: str, text: str) -> float:
+    try:
+        return float(number)
+    except ValueError:
+        raise PlanError(f"{text!r}: {number!r} is no number of seconds") from None
+
+
+def _only(words: Words, what: str) -> str:
+    if len(words) != 1:
+        raise ValueError(f"it takes {what}")
+    return words[0]
+
+
+def _amount(words: Words, *, unit: str, default: str) -> tuple[float, str]:
+    """Return the number and the direction of "0.5 m left", "0.5m left", "left 0.5 m"."""
+    joined = re.fullmatch(
+        rf"(?:(?P<before>[a-z]+) )?(?P<number>[\d.]+) ?(?:{unit})?(?: (?P<after>[a-z]+))?",
+        " ".join(words),
+    )
+    if joined is None or (joined["before"] and joined["after"]):
+        raise ValueError("it takes an amount and a direction")
+    return float(joined["number"]), joined["before"] or joined["after"] or default
+
+
+def check_rovers(plan: Iterable[PlannedFault], numbers: Container[int]) -> None:
+    """Raise PlanError where a fault names a rover that there is not."""
+    for fault in plan:
+        if fault.rover is not None and fault.rover not in numbers:
+            raise PlanError(f"{fault.text!r}: there is no rover {fault.rover}")
