@@ -48,6 +48,7 @@ PROCESSES = frozenset(
 
 #: (file, what it may do all the same) -> why
 ALLOWED = {
+    ("sim/rover_sim/ackermann.py", "random"): "a linkage that is off centre, by a seed",
     ("mav_tasks/links/memory.py", "random"): "the virtual net loses packets by a seed",
     ("tools/bench/client_flood.py", "random"): "noise of a flood, the same in every run",
     ("sim/rover_sim/bullet.py", "random"): "sensor noise of a simulated rover, by a seed",

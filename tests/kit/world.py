@@ -24,7 +24,7 @@ from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.kinematic import KinematicBody
-from rover_sim.personas import ARDUPILOT, Mode, Persona
+from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
@@ -126,6 +126,8 @@ class World(VirtualWorld):
                 # by default a PX4 rover drives home when setpoints stop, and is not driven at all;
                 # tests that are about that set it back
                 vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
+            if persona.speed_parameter == PX4.speed_parameter:
+                vehicle.autopilot.parameters[PX4.speed_parameter] = 5.0  # m/s, and for this
             link = self.net.link(f"rover{number}")
             ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
             observer = self.watched.observers[link.name] = Observer(

@@ -49,7 +49,7 @@ def test_it_is_found_who_it_is_and_what_it_grants(persona: Persona) -> None:
     assert (found.system_id, found.autopilot, found.is_rover) == (1, persona.name, True)
     assert found.uid == "1"
     assert found.firmware.startswith(
-        {"ardupilot": "4.6.3", "px4": "1.15.4"}.get(persona.name, "1.")
+        {"ardupilot": "4.6.3", "px4": "1.17.0"}.get(persona.name, "1.")
     )
     assert found.heartbeat_rate == pytest.approx(1.0, abs=0.05)
     granted = {rate.name: rate.granted for rate in found.rates}
