@@ -1,5 +1,6 @@
 """A body that steers as a car, and a rover that has it and does what tasks demand."""
 
+from collections import deque
 from dataclasses import replace
 from math import cos, exp, sin
 
@@ -101,6 +102,9 @@ class CarRover:
         self.known_radius = radius
         self._turning = Turning.STEERED
         self._honours_yaw_rate = honours_yaw_rate
+        self.overspeed = 1.0  # of the speed asked for
+        #: the last that it measured of itself, the oldest first, which is what the server sees
+        self.measured: deque[Motion] = deque(maxlen=1)
 
     @property
     def pose(self) -> TaskPose:
@@ -116,10 +120,10 @@ class CarRover:
         """What the server sees of it."""
         made = ours if self.is_ours else idle_vehicle
         state = self.body.state
-        motion = Motion(self.pose, state.forward_speed, 0.0, state.yaw_rate, now)
+        self.measured.append(Motion(self.pose, state.forward_speed, 0.0, state.yaw_rate, now))
         return replace(
             made(at=now),
-            motion=motion,
+            motion=self.measured[0],
             still=abs(state.forward_speed) < self.STANDS,
             frame=self.frame,
             honours_yaw_rate=self._honours_yaw_rate,
@@ -134,7 +138,7 @@ class CarRover:
         elif demand.kind in (DemandKind.HAND_BACK, DemandKind.STOP, DemandKind.HALT):
             self.is_ours = False
         velocity = demand.velocity if self.is_ours else ZERO
-        self.body.drive(velocity.forward, self._rate_of(velocity))
+        self.body.drive(self.overspeed * velocity.forward, self._rate_of(velocity))
         self.body.advance(seconds)
 
     def _rate_of(self, velocity: Velocity) -> float:

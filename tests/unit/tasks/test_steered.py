@@ -1,5 +1,6 @@
 """Tasks of rovers that steer as a car, whole: go-to, move, plans, interruptions, fences."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from math import cos, hypot, pi, radians, sin
 
@@ -101,7 +102,19 @@ class TestGoTo:
         assert (rig.state(1), rig.task(1).reason) == (S.COMPLETED, R.NONE)
         assert off(rover, place) <= 0.10
 
-    @settings(max_examples=100)
+    @settings(max_examples=40)
+    @given(st.builds(LocalPlace, st.floats(-4.0, 4.0), st.floats(-4.0, 4.0)), headings)
+    def test_a_fast_one_with_slow_steering_comes_as_near(
+        self, place: LocalPlace, yaw: float
+    ) -> None:
+        rover = car(yaw, share=0.5)
+        rover.overspeed = 1.3  # as ArduPilot's simulated one at first
+        rover.measured = deque(maxlen=4)  # 0.15 s late
+        rig = driven(GoTo(place, speed=1.0), rover)
+        assert (rig.state(1), rig.task(1).reason) == (S.COMPLETED, R.NONE)
+        assert off(rover, place) <= 0.10
+
+    @settings(max_examples=60)
     @given(places, headings)
     def test_every_place_is_reached_by_one_that_is_steered_by_course(
         self, place: LocalPlace, yaw: float
@@ -111,7 +124,7 @@ class TestGoTo:
         assert (rig.state(1), rig.task(1).reason) == (S.COMPLETED, R.NONE)
         assert off(rover, place) <= 0.15
 
-    @settings(max_examples=50)
+    @settings(max_examples=30)
     @given(places, headings)
     def test_a_fence_with_room_for_its_turning_circles_is_kept(
         self, place: LocalPlace, yaw: float
@@ -182,7 +195,7 @@ class TestGoTo:
             if rig.state(1) in TERMINAL:
                 break
         assert rig.state(1) is S.COMPLETED
-        assert fastest_in_bend < 1.35
+        assert fastest_in_bend < 1.0
         assert fastest > 1.9
 
 
