@@ -1,0 +1,31 @@
+"""What several figures ask of true poses: when it stands, how far it drove until then."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rover_sim.compare.trace import TruePose, path_length
+
+STANDS = 0.03  # m/s, true speed
+STANDS_FOR = 0.4  # s that it must last, or up to the end of what is looked at
+
+
+class Rest(NamedTuple):
+    """When it stood, and how far it had come by then."""
+
+    after: float  # s
+    way: float  # m
+
+
+def rest_of(poses: Sequence[TruePose], start: float) -> Rest | None:
+    """Return when it first stood for good, counted from ``start``; None: not at all."""
+    since = None  # index of the first pose of the present standing
+    for i, pose in enumerate(poses):
+        if abs(pose.speed) >= STANDS:
+            since = None
+        elif since is None:
+            since = i
+        if since is not None and pose.time - poses[since].time >= STANDS_FOR:
+            break
+    if since is None:
+        return None
+    return Rest(poses[since].time - start, path_length(list(poses[: since + 1])))
