@@ -108,7 +108,7 @@ def test_a_standing_rover_tells_its_offset_and_how_slowly_it_wanders() -> None:
     assert value_of(figures, "reported velocity, its mean") == pytest.approx(0.05, abs=0.001)
     # a sine of 10 s is 0.81 alike after 1 s, and upside down after 3 s
     assert value_of(figures, "its north part alike after 1 s") == pytest.approx(0.81, abs=0.06)
-    assert value_of(figures, "its north part alike after 3 s") == pytest.approx(-0.31, abs=0.06)
+    assert value_of(figures, "its north part alike after 3 s") == pytest.approx(-0.31, abs=0.1)
     assert value_of(figures, "reported yaw rate, p50") == pytest.approx(0.2)
 
 

@@ -1,0 +1,73 @@
+"""Print what the simulated rovers do beside what real ones did, in the same manoeuvres.
+
+Virtual time, no server, no sockets. Exit status 0: each figure is within a factor of 1.5 of the
+real one or explained; 1: some differ; 2: usage.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from rover_sim.compare.figure import Figure
+from rover_sim.compare.figures import figures_of
+from rover_sim.compare.manoeuvres import drive_all
+from rover_sim.compare.pairs import PAIRS, Pair, make_rover
+from rover_sim.compare.report import lines
+from rover_sim.compare.verdict import Verdict, compare, missing
+from rover_sim.compare.virtual_driver import VirtualDriver
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the comparison; return the exit status."""
+    parser = make_parser()
+    options = parser.parse_args(arguments)
+    pairs = [
+        pair
+        for pair in PAIRS
+        if options.autopilot in (None, pair.autopilot) and options.frame in (None, pair.frame)
+    ]
+    if not pairs:
+        parser.error(f"there is no {options.frame} rover with {options.autopilot}")
+    differing = 0
+    for pair in pairs:
+        differing += _show(pair, options)
+    return 1 if differing else 0
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the command line."""
+    parser = argparse.ArgumentParser(
+        prog="compare_rovers", description=(__doc__ or "").partition("\n")[0]
+    )
+    add = parser.add_argument
+    add("--autopilot", choices=sorted({pair.autopilot for pair in PAIRS}), help="default: both")
+    add("--frame", choices=sorted({pair.frame for pair in PAIRS}), help="default: all")
+    add("--only", metavar="WORD", default="", help="only groups of figures with that word")
+    add("--brief", action="store_true", help="only what differs and is not explained")
+    add("--seed", type=int, default=0, help="of the simulated rover's chance; default: %(default)s")
+    return parser
+
+
+def measure(pair: Pair, *, seed: int) -> list[Figure]:
+    """Drive that simulated rover through all manoeuvres; return its figures."""
+    vehicle = make_rover(pair, seed=seed)
+    driver = VirtualDriver(vehicle)
+    drive_all(driver)
+    vehicle.body.close()
+    return figures_of(driver.trace)
+
+
+def _show(pair: Pair, options: argparse.Namespace) -> int:
+    """Print one rover's table; return how many figures differ."""
+    figures = measure(pair, seed=options.seed)
+    comparisons = [
+        each for each in compare(pair, figures) if options.only.lower() in each.figure.group.lower()
+    ]
+    hidden = frozenset({Verdict.OK, Verdict.EXPLAINED} if options.brief else ())
+    for line in lines(pair, comparisons, hidden=hidden):
+        sys.stdout.write(f"{line}\n")
+    absent = missing(pair, figures)
+    for group, name in absent:
+        sys.stdout.write(f"{pair.name}: not measured: {group}: {name}\n")
+    sys.stdout.write("\n")
+    return sum(each.verdict is Verdict.DIFFERS for each in comparisons) + len(absent)

@@ -1,0 +1,46 @@
+"""The four rovers that are compared: an autopilot and a frame each."""
+
+import math
+from dataclasses import dataclass
+
+from rover_sim.body import Pose
+from rover_sim.kinematic import KinematicBody
+from rover_sim.personas import PERSONAS
+from rover_sim.vehicle import Vehicle, make_vehicle
+
+SYSTEM_ID = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """An autopilot with a frame, and the real one whose figures it is held against."""
+
+    autopilot: str
+    frame: str
+    real: str  # autopilot, version, vehicle: the source of the reference figures
+    heading: float = 0.0  # rad, where the real one looked at the start
+
+    @property
+    def name(self) -> str:
+        """What it is called on the command line and in the tables."""
+        return f"{self.autopilot}-{self.frame}"
+
+
+ARDUPILOT_SKID = Pair("ardupilot", "skid", "ArduPilot Rover 4.6.3 SITL, rover-skid")
+ARDUPILOT_ACKERMANN = Pair("ardupilot", "ackermann", "ArduPilot Rover 4.6.3 SITL, rover")
+PX4_DIFFERENTIAL = Pair(
+    "px4",
+    "differential",
+    "PX4 1.17.0 SITL in lock-step with a kinematic differential rover",
+    heading=math.pi / 2,
+)
+PX4_ACKERMANN = Pair("px4", "ackermann", "PX4 1.17.0, the Ackermann rover of its SIH")
+
+#: in the order of the columns of the reference table
+PAIRS = (ARDUPILOT_SKID, ARDUPILOT_ACKERMANN, PX4_DIFFERENTIAL, PX4_ACKERMANN)
+
+
+def make_rover(pair: Pair, *, seed: int) -> Vehicle:
+    """Return that simulated rover, just switched on."""
+    body = KinematicBody(start=Pose(yaw=pair.heading), slip=0.3, seed=seed)
+    return make_vehicle(body, system_id=SYSTEM_ID, now=0.0, persona=PERSONAS[pair.autopilot])

@@ -1,0 +1,25 @@
+"""What the real rovers gave: the figures that the simulated ones are held against.
+
+ArduPilot Rover 4.6.3 SITL, vehicles ``rover-skid`` and ``rover``, true pose from SIM_STATE; PX4
+1.17.0 SITL, a kinematic differential rover in lock-step and the Ackermann rover of its SIH. All
+settings at their defaults (the differential rover: RO_SPEED_LIM 1.8, RO_MAX_THR_SPEED 2,
+RO_ACCEL_LIM 4, RO_DECEL_LIM 6, RO_JERK_LIM 10, RO_YAW_RATE_LIM 250, RO_YAW_P 5), no radio, one
+ground station. Recorded in November 2026, real time, through the same manoeuvres.
+"""
+
+from rover_sim.compare.figure import Value
+from rover_sim.compare.pairs import PAIRS, Pair
+from rover_sim.compare.reference_table import NOT_DRIVEN, TABLE
+
+Key = tuple[str, str]  # group and name of a figure
+
+
+def reference_of(pair: Pair) -> dict[Key, Value]:
+    """Return the real one's figures, by group and name; what it did not drive is left out."""
+    column = PAIRS.index(pair)
+    return {
+        (group, name): values[column]
+        for group, rows in TABLE.items()
+        for name, values in rows.items()
+        if values[column] != NOT_DRIVEN
+    }
