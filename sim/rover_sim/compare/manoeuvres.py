@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 STANDING_TIME = 40.0  # s disarmed, half of it armed
+#: s from a real one's first message to its first HEARTBEAT, by which a driver knows it. The
+#: simulated ones begin with a HEARTBEAT
+FIRST_HEARTBEAT = 1.0
 RETRY = 3.0  # s between two attempts to arm
 STICK = 1750  # µs, channel 3: half forward
 STILL = 0.15  # m/s reported; below it counts as standing while nothing is sent
@@ -137,6 +140,7 @@ def drive_all(driver: Driver, *, standing: float = STANDING_TIME) -> None:
 def _start(driver: Driver) -> None:
     driver.mark("start")
     driver.wait_for_rover()
+    driver.wait(FIRST_HEARTBEAT)
     in_control = driver.is_px4  # PX4 wants a stream before OFFBOARD
     while not driver.is_armed:
         in_control = in_control or driver.take_control()
