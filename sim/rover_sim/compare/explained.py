@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from rover_sim.compare.figure import Figure, Value
+from rover_sim.compare.manoeuvres import DISARM, HOLD
 from rover_sim.compare.pairs import Pair
 
 
@@ -39,7 +40,136 @@ class Explanation:
         return value == self.between
 
 
-EXPLANATIONS: tuple[Explanation, ...] = ()
+STANDING, PLACES = "Standing *", "Origin and home"
+POWER = "Preflight Fail: system power unavailable"
+DENIED = "Arming denied: Resolve system health failures firs"
+SHORT_SAMPLE = (
+    "Of something that wanders over seconds, 20 s are too short a sample: four recordings gave"
+    " 0.36 to 0.88 after 1 s, 0.16 to 0.63 after 3 s."
+)
+ONCE_A_SECOND = (
+    "HEARTBEAT comes once a second and not with a change: when in that second is chance."
+)
+ROLLS_ON = (
+    "SIH's rover rolls on for ever when disarmed, which is its model of the vehicle; the simulated"
+    " one rolls out, as vehicles do."
+)
+HEADING_ERROR = "It follows the error of the heading, which wanders by chance."
+
+PX4_DIFFERENTIAL_ONLY = (
+    Explanation(
+        "px4-differential",
+        "Standing armed",
+        "reported yaw rate, *",
+        (0.0, 1.5),
+        "The time begins while the turn by the first zeros ends.",
+    ),
+    Explanation(
+        "px4-differential",
+        "Estimate and truth",
+        "reported yaw off the true one, max",
+        (0.2, 2.0),
+        "At 195 deg/s 1 deg is 5 ms between truth and message in the recording.",
+    ),
+    Explanation(
+        "px4-differential",
+        "Estimate and truth",
+        "reported velocity off the true one, max",
+        (0.01, 0.06),
+        "At 6 m/s² of braking 0.03 m/s are 5 ms between truth and message in the recording.",
+    ),
+    Explanation(
+        "px4-differential",
+        "Step 2 m/s",
+        "reaches 90 %*",
+        None,
+        "RO_SPEED_LIM is 90 % of what is asked: a millimetre a second decides.",
+    ),
+    Explanation(
+        "px4-differential",
+        "Step 0.*",
+        "peak over *",
+        (-5.0, 5.0),
+        "The recorded one drove 4 to 6 mm/s too fast; the simulated wheels follow exactly.",
+    ),
+    Explanation(
+        "px4-differential",
+        HOLD,
+        "slower by a tenth after",
+        (0.05, 0.12),
+        "The simulated autopilot changes its outputs 40 times a second, at once.",
+    ),
+)
+PX4_ACKERMANN_ONLY = (
+    Explanation(
+        "px4-ackermann",
+        "Start",
+        "reasons given",
+        f"{POWER}; {DENIED}",
+        "The text about power came in the differential rover's start only.",
+    ),
+    Explanation("px4-ackermann", STANDING, "*velocity, its mean", (0.005, 0.04), SHORT_SAMPLE),
+    Explanation("px4-ackermann", "Step *", "yaw changed*", (0.0, 15.0), HEADING_ERROR),
+    Explanation("px4-ackermann", DISARM, "slower by a tenth after", (0.1, 1.0), ROLLS_ON),
+    Explanation("px4-ackermann", DISARM, "stands after", (5.0, 15.0), ROLLS_ON),
+    Explanation("px4-ackermann", DISARM, "stands within", (2.0, 20.0), ROLLS_ON),
+    Explanation("px4-ackermann", DISARM, "yaw changed", (0.0, 3.0), ROLLS_ON),
+    Explanation("px4-ackermann", PLACES, "HOME_POSITION, different places", (8, 43), ROLLS_ON),
+    Explanation("px4-ackermann", PLACES, "HOME_POSITION, farthest *", (15.0, 50.0), ROLLS_ON),
+    Explanation("px4-ackermann", PLACES, "home's moves when disarmed *", (2, 14), ROLLS_ON),
+    Explanation(
+        "px4-ackermann",
+        PLACES,
+        "HOME_POSITION, * altitude*",
+        (0.0, 0.0),
+        "The simulated estimate has no error of height.",
+    ),
+)
+
+EXPLANATIONS: tuple[Explanation, ...] = (
+    Explanation("*", STANDING, "* alike after 1 s", (0.3, 0.95), SHORT_SAMPLE),
+    Explanation("*", STANDING, "* alike after 3 s", (-0.6, 0.9), SHORT_SAMPLE),
+    Explanation(
+        "ardupilot-*",
+        "Standing disarmed",
+        "reported position from its mean, *",
+        (0.0, 0.04),
+        "The recorded position wandered by 2 mm in these 20 s, and by 21 mm in the next.",
+    ),
+    Explanation("ardupilot-*", DISARM, "last change of mode *", (0.02, 1.05), ONCE_A_SECOND),
+    Explanation("px4-*", HOLD, "last change of mode *", (0.0, 1.05), ONCE_A_SECOND),
+    Explanation("px4-*", DISARM, "last change of mode *", (0.0, 1.05), ONCE_A_SECOND),
+    Explanation(
+        "ardupilot-skid",
+        "Step -0.5 m/s",
+        "peak over *",
+        (4.0, 12.0),
+        "Backwards it swings over as far as forwards; the recorded one by 4 % instead of 10 %.",
+    ),
+    Explanation(
+        "ardupilot-ackermann",
+        "Throttle stick, asked 0.5 m/s",
+        "speed, stick released",
+        (0.0, 0.2),
+        "It swings from 3.7 m/s to below what is asked; which moment is looked at decides.",
+    ),
+    *PX4_DIFFERENTIAL_ONLY,
+    *PX4_ACKERMANN_ONLY,
+    Explanation(
+        "px4-*",
+        "Timing",
+        "between two LOCAL_POSITION_NED, max",
+        (0.02, 0.07),
+        "One or two of 11,000 messages were late in the recordings; simulated, none is.",
+    ),
+    Explanation(
+        "px4-*",
+        "Timing",
+        "acknowledgement *, max",
+        (0.02, 0.07),
+        "The longest of some 30 answers, most of which take 4 ms, is chance.",
+    ),
+)
 
 
 def explanation_of(pair: Pair, figure: Figure) -> Explanation | None:
