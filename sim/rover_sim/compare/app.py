@@ -8,13 +8,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from rover_sim.compare.figure import Figure
-from rover_sim.compare.figures import figures_of
-from rover_sim.compare.manoeuvres import drive_all
-from rover_sim.compare.pairs import PAIRS, Pair, make_rover
+from rover_sim.compare.measuring import RUNS, measure
+from rover_sim.compare.pairs import PAIRS, Pair
 from rover_sim.compare.report import lines
 from rover_sim.compare.verdict import Verdict, compare, missing
-from rover_sim.compare.virtual_driver import VirtualDriver
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,6 +23,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for pair in PAIRS
         if options.autopilot in (None, pair.autopilot) and options.frame in (None, pair.frame)
     ]
+    if options.runs < 1:
+        parser.error("--runs must be at least 1")
     if not pairs:
         parser.error(f"there is no {options.frame} rover with {options.autopilot}")
     differing = 0
@@ -44,22 +43,14 @@ def make_parser() -> argparse.ArgumentParser:
     add("--frame", choices=sorted({pair.frame for pair in PAIRS}), help="default: all")
     add("--only", metavar="WORD", default="", help="only groups of figures with that word")
     add("--brief", action="store_true", help="only what differs and is not explained")
-    add("--seed", type=int, default=0, help="of the simulated rover's chance; default: %(default)s")
+    add("--seed", type=int, default=0, help="of the first run's chance (default %(default)s)")
+    add("--runs", type=int, default=RUNS, help="each with a seed of its own (default %(default)s)")
     return parser
-
-
-def measure(pair: Pair, *, seed: int) -> list[Figure]:
-    """Drive that simulated rover through all manoeuvres; return its figures."""
-    vehicle = make_rover(pair, seed=seed)
-    driver = VirtualDriver(vehicle)
-    drive_all(driver)
-    vehicle.body.close()
-    return figures_of(driver.trace)
 
 
 def _show(pair: Pair, options: argparse.Namespace) -> int:
     """Print one rover's table; return how many figures differ."""
-    figures = measure(pair, seed=options.seed)
+    figures = measure(pair, seed=options.seed, runs=options.runs)
     comparisons = [
         each for each in compare(pair, figures) if options.only.lower() in each.figure.group.lower()
     ]

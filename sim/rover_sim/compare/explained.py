@@ -136,6 +136,13 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         (0.0, 0.04),
         "The recorded position wandered by 2 mm in these 20 s, and by 21 mm in the next.",
     ),
+    Explanation(
+        "ardupilot-*",
+        "Start",
+        "yaw of the first ATTITUDE *",
+        (0.5, 1.5),
+        "The recorded one had no compass in its first second, and looked north.",
+    ),
     Explanation("ardupilot-*", DISARM, "last change of mode *", (0.02, 1.05), ONCE_A_SECOND),
     Explanation("px4-*", HOLD, "last change of mode *", (0.0, 1.05), ONCE_A_SECOND),
     Explanation("px4-*", DISARM, "last change of mode *", (0.0, 1.05), ONCE_A_SECOND),

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from rover_sim.compare.figure import Value
 from rover_sim.compare.figures import driving, endings, estimate, places, standing, start, turning
 from rover_sim.compare.figures.motion import rest_of
 from rover_sim.compare.manoeuvres import (
@@ -15,6 +16,7 @@ from rover_sim.compare.manoeuvres import (
     STANDING_ARMED,
     STANDING_DISARMED,
 )
+from rover_sim.compare.measuring import middle
 from rover_sim.compare.trace import Trace
 from tests.unit.rover_sim.compare.traces import PERIOD, PX4, hear, send, trace_of, value_of
 
@@ -123,6 +125,19 @@ def test_the_estimate_is_held_against_the_truth() -> None:
         0.0105, abs=0.0005
     )
     assert value_of(figures, "between two LOCAL_POSITION_NED, p50") == pytest.approx(0.025)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([3.0, 1.0, 2.0], 2.0),
+        (["yes", "no", "yes"], "yes"),
+        ([None, 1.0, None], None),
+        ([7], 7),
+    ],
+)
+def test_of_several_runs_the_middle_counts(values: list[Value], expected: Value) -> None:
+    assert middle(values) == expected
 
 
 def test_silence_is_counted_from_the_last_setpoint() -> None:
