@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from rover_sim.compare.figure import Figure, Value
-from rover_sim.compare.manoeuvres import DISARM, HOLD
+from rover_sim.compare.manoeuvres import DISARM, HOLD, SILENCE
 from rover_sim.compare.pairs import Pair
 
 
@@ -110,6 +110,7 @@ PX4_ACKERMANN_ONLY = (
     ),
     Explanation("px4-ackermann", STANDING, "*velocity, its mean", (0.005, 0.04), SHORT_SAMPLE),
     Explanation("px4-ackermann", "Step *", "yaw changed*", (0.0, 15.0), HEADING_ERROR),
+    Explanation("px4-ackermann", SILENCE, "yaw changed", (60.0, 260.0), HEADING_ERROR),
     Explanation("px4-ackermann", DISARM, "slower by a tenth after", (0.1, 1.0), ROLLS_ON),
     Explanation("px4-ackermann", DISARM, "stands after", (5.0, 15.0), ROLLS_ON),
     Explanation("px4-ackermann", DISARM, "stands within", (2.0, 20.0), ROLLS_ON),
