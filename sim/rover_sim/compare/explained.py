@@ -155,6 +155,13 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         "Backwards it swings over as far as forwards; the recorded one by 4 % instead of 10 %.",
     ),
     Explanation(
+        "ardupilot-skid",
+        "Step 2 m/s",
+        "scatter *",
+        (0.008, 0.03),
+        "It comes down from its overshoot within seconds, the simulated one a little sooner.",
+    ),
+    Explanation(
         "ardupilot-ackermann",
         "Throttle stick, asked 0.5 m/s",
         "speed, stick released",
