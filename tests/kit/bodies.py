@@ -57,6 +57,11 @@ class Sticky:
         self._yaw_rate = 0.0
 
     @property
+    def lag(self) -> float:
+        """How late the wheels do what ``drive`` demands, s."""
+        return 0.1
+
+    @property
     def state(self) -> BodyState:
         """The state after the last ``advance``."""
         return self._body.state

@@ -33,6 +33,11 @@ class Car:
         self._time, self._pose = 0.0, start
 
     @property
+    def lag(self) -> float:
+        """How late the wheels do what ``drive`` demands, s."""
+        return 0.1
+
+    @property
     def state(self) -> BodyState:
         """The state after the last ``advance``."""
         pose, speed = self._pose, self._speed
