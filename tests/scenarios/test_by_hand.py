@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -187,7 +187,8 @@ def test_who_asked_for_control_before_a_task_asks_again_after_it(world: World, k
     assert world.stands()
 
 
-def test_only_what_we_armed_is_disarmed(world: World) -> None:
+def test_only_what_we_armed_is_disarmed(make_world: MakeWorld) -> None:
+    world = make_world(settings=Settings(watch=Watch(ready_timeout=0.0)))
     world.fault(Faults(refuse_arm=True))
     world.client.move(1)
     world.until_state(1, S.FAILED)
