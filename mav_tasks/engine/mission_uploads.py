@@ -138,7 +138,7 @@ class MissionUploads:
         sender = upload.sender
         is_staged = sender.addressed.component_id == AUTOPILOT
         wanted = desk.check.plan_of(upload.items, now=now)
-        terms = replace(wanted.terms, is_staged=is_staged)
+        terms = replace(wanted.terms, is_staged=is_staged, is_cruising=is_staged)
         nonce = 0 if is_staged else wanted.nonce
         draft = self._draft(vehicle, wanted.plan, terms, sender, nonce=nonce)
         # a long plan may take longer to come again than it is remembered

@@ -22,11 +22,12 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Marks, Submitter
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
 
 R = TaskReason
 
 SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
+CRUISING = Terms(is_cruising=True)
 STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
 
 
@@ -227,4 +228,4 @@ class ModeRequests:
 def _return_home(vehicle: Vehicle, submitter: Submitter, marks: Marks) -> Draft:
     """What the mode RTL asks for."""
     command = MavCmd.NAV_RETURN_TO_LAUNCH
-    return Draft(vehicle.system_id, command, GoTo(None), submitter, marks=marks)
+    return Draft(vehicle.system_id, command, GoTo(None), submitter, CRUISING, marks=marks)

@@ -238,8 +238,8 @@ class Plans:
         manner = Manner.of(vehicle.persona, is_staged=True, driving=self._settings.driving)
         wanted = plan_of(stored.items, steps_of(stored.items, manner=manner), now=now)
         plan = replace(wanted.plan, first=first)
-        command = MavCmd.MISSION_START
-        return Draft(vehicle.system_id, command, plan, submitter, terms=wanted.terms)
+        command, terms = MavCmd.MISSION_START, replace(wanted.terms, is_cruising=True)
+        return Draft(vehicle.system_id, command, plan, submitter, terms=terms)
 
     def go_on_with(self, vehicle: Vehicle, seq: int, *, now: float) -> Task | None:
         """Let the mission go on with another item; None: it will begin with that when started.

@@ -1,5 +1,6 @@
 """Submissions of tasks: recognised if they come again, queued, and acknowledged once durable."""
 
+from dataclasses import replace
 from functools import partial
 
 from mav_tasks.engine.ability import Ability, as_driven, left_out
@@ -11,6 +12,7 @@ from mav_tasks.engine.goals import OURS, wish_of
 from mav_tasks.engine.rights import OPERATOR
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -91,7 +93,9 @@ class Submissions:
         ability = Ability.of(vehicle.persona, rover=rover)
         goal = as_driven(wish.goal, ability)
         self._check_reach(vehicle, goal)
-        draft = Draft(vehicle.system_id, command.command, goal, submitter, wish.terms, wish.marks)
+        is_at_autopilot = command.target.component_id in (0, AUTOPILOT)
+        terms = replace(wish.terms, is_cruising=is_at_autopilot and not is_ours)
+        draft = Draft(vehicle.system_id, command.command, goal, submitter, terms, wish.marks)
         known = self._recollection.known(
             draft, confirmation=command.confirmation, origin=vehicle.where.origin, now=now
         )

@@ -275,6 +275,8 @@ class Vehicle:
 
     def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
         self.requests.loss_failsafe.receive(message)
+        self.requests.cruise.receive(message)
+        self.tasks.cruises(self.requests.cruise.speed)
         self._note_failsafe(now=now)
         turning = self.requests.turning
         before = turning.turning
@@ -417,6 +419,7 @@ class Vehicle:
         self.requests.intervals.ask_all_again()
         self.requests.loss_failsafe.forget()
         self.requests.turning.forget()
+        self.requests.cruise.forget()
         self.forget_start()
         before = self._authority.take_disarmed(since=booted_at)
         if self.tasks.is_stopped:

@@ -14,6 +14,7 @@ from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.cruise_speed import CruiseSpeed
 from mav_tasks.services.interval_requester import IntervalRequester
 from mav_tasks.services.loss_failsafe import LossFailsafe
 from mav_tasks.services.mission_item import Item
@@ -57,6 +58,7 @@ class VehicleRequests:
         self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
+        self.cruise = CruiseSpeed(target, persona.cruise_parameters)
         self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
         self.turning = TurningKind(target, persona)
         self._shows = ASK_TO_SHOW  # times more that it is asked for a heartbeat
@@ -171,8 +173,9 @@ class VehicleRequests:
             self.flush(now=now)
 
     def ask_for_parameters(self) -> None:
-        """Ask how the vehicle stops by itself and how it turns, until it has said so."""
-        for request in (*self.loss_failsafe.requests(), *self.turning.requests()):
+        """Ask how it stops by itself, how it turns and how fast it drives, until it has said so."""
+        failsafe, turning = self.loss_failsafe.requests(), self.turning.requests()
+        for request in (*failsafe, *turning, *self.cruise.requests()):
             self._outlet.send(request, self._source)
 
     def has_not_said_which(self, *, now: float) -> bool:

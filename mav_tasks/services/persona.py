@@ -50,6 +50,7 @@ class Persona:
     #: its set-points are speed and yaw rate, and it reverses; else they are speed and course, and
     #: it does not
     honours_yaw_rate: bool
+    cruise_parameters: tuple[str, ...]  # m/s, of what names no speed
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
     turning: Turning = Turning.ON_SPOT  # whichever way its set-points are read
@@ -126,6 +127,7 @@ ARDUPILOT = Persona(
     starts_when_armed=False,
     has_loss_failsafe=False,  # it stops after 3 s (observed on 4.6.3)
     honours_yaw_rate=True,
+    cruise_parameters=("WP_SPEED", "CRUISE_SPEED"),
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
     setpoint_frame=MavFrame.BODY_NED,
 )
@@ -170,6 +172,7 @@ PX4 = Persona(
     starts_when_armed=True,
     has_loss_failsafe=True,
     honours_yaw_rate=False,
+    cruise_parameters=("RO_SPEED_LIM",),
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
     setpoint_frame=MavFrame.LOCAL_NED,
 )

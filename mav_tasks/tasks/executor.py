@@ -7,7 +7,7 @@ non-zero velocity waits until EXECUTING is durable; zeros never wait.
 from dataclasses import replace
 from math import copysign
 
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.arrival import Arrival
 from mav_tasks.tasks.astray import AstrayWatch
@@ -54,6 +54,8 @@ class Executor:
         self._bounds = bounds
         self._settings = settings
         self._task_id: TaskId | None = None
+        #: m/s, of tasks that are driven as the vehicle itself would; None: as the settings say
+        self.cruise: float | None = None
         self._course: Course | None = None  # while EXECUTING
         self._way_back: Course | None = None  # driven before it
         self._since = 0.0  # when the present state was entered
@@ -370,8 +372,8 @@ class Executor:
             self._set_aside_as_astray(task, now=now)
             return view.HOLD
         speed = None if course is self._way_back else course.progress.speed
-        slowest = self._arrival.slowest
-        wish = course.steer(motion, driving=self._settings.driving, speed=speed, slowest=slowest)
+        driving, slowest = self._driving_of(task), self._arrival.slowest
+        wish = course.steer(motion, driving=driving, speed=speed, slowest=slowest)
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
@@ -380,6 +382,13 @@ class Executor:
             self._change(S.HELD, R.FENCE, actor=SERVER, now=now)
             return view.HOLD
         return Demand(DemandKind.DRIVE, velocity)
+
+    def _driving_of(self, task: Task) -> Driving:
+        """Return the settings for a task: of a stock client's the speed is the vehicle's own."""
+        driving = self._settings.driving
+        if self.cruise is None or not task.terms.is_cruising:
+            return driving
+        return replace(driving, speed=min(self.cruise, driving.max_speed))
 
     def _begin_leg(self, *, now: float) -> None:
         self._stuck.begin(now=now)

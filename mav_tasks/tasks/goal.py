@@ -217,7 +217,8 @@ def _describe_plan(plan: Plan) -> str:
         driven = [step for step in plan.steps if not isinstance(step, Nothing | SetSpeed)]
         if len(driven) == 1 and isinstance(driven[0], SingleGoal):
             return describe(driven[0])  # beside its speed, and options
-    return f"plan of {len(plan.steps) - has_home} items"
+    count = len(plan.steps) - has_home
+    return f"plan of {count} item{'s' if count != 1 else ''}"
 
 
 def _describe_way(place: Place | None) -> str:

@@ -132,7 +132,8 @@ class Terms:
     ``start_at`` and ``deadline`` are monotonic seconds: not begun before, begun by then;
     ``start_utc`` is in seconds since 1970. ``after`` is the id of the task that must complete
     first, 0 for none. ``is_staged``: waits until somebody starts it. ``top_speed`` in m/s: it is
-    driven no faster, whatever speed is set; None: as fast as the settings allow.
+    driven no faster, whatever speed is set; None: as fast as the settings allow. ``is_cruising``:
+    where it names no speed it is driven as fast as the vehicle itself would.
     """
 
     priority: int = DEFAULT_PRIORITY
@@ -144,6 +145,7 @@ class Terms:
     is_preemptive: bool = False
     is_staged: bool = False
     top_speed: float | None = None
+    is_cruising: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,6 +82,7 @@ class VehicleTasks:
         self._led_away = LedAway()
         self._uid = ""  # of the vehicle, as far as it was heard
         self._speed: float | None = None  # of what names none; None: the settings' one
+        self._cruise: float | None = None  # m/s, at which the vehicle itself would drive
         self._stop: tuple[float, float] | None = None  # m/s and m of one that was measured
         self._paused = R.NONE
         self._urgent: TaskId | None = None  # runs although the queue is paused
@@ -223,6 +224,7 @@ class VehicleTasks:
 
     def _apply_driving(self) -> None:
         self._executor.apply(replace(self._settings, driving=self.driving))
+        self._executor.cruise = self._cruise if self._speed is None else None
 
     @property
     def driving(self) -> Driving:
@@ -231,6 +233,12 @@ class VehicleTasks:
         if self._stop is not None:
             driving = replace(driving, acceleration=safe_braking(driving, *self._stop))
         return driving if self._speed is None else replace(driving, speed=self._speed)
+
+    def cruises(self, speed: float | None) -> None:
+        """Note at what speed the vehicle itself drives, m/s, where none is named; None: unknown."""
+        if speed != self._cruise:
+            self._cruise = speed
+            self._apply_driving()
 
     def brakes(self, stop: tuple[float, float] | None) -> None:
         """Note how it was seen to stop, m/s and the metres that it took; None: that is unknown."""

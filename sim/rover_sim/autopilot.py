@@ -41,6 +41,7 @@ MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # what it is dr
 UNASKED_STICKS = 1.0  # s, RC_CHANNELS where nobody has asked for another interval
 RUNTIME_INTERVAL = 30.0  # s, AP_Stats' flush_interval_ms
 POSITIONS = (messages.LocalPositionNed.id, messages.GlobalPositionInt.id)
+FASTEST = 5.0  # m/s, of what no parameter limits
 REBOOT_TIME = 1.0  # s in which a restarting autopilot neither hears nor says anything
 
 
@@ -224,7 +225,7 @@ class Autopilot:
                 parameters=self._parameters,
                 missions=missions,
                 outbox=outbox,
-                speed_limit=lambda: self._parameters[persona.speed_parameter],
+                speed_limit=self._speed_limit,
                 honours_yaw_rate=persona.honours_yaw_rate,
                 started=up_at,
                 frame=persona.frame,
@@ -268,6 +269,11 @@ class Autopilot:
         )
         self._commands = CommandReceiver(persona.commands(commands), outbox, self._departures)
         self._handlers = self._make_handlers()
+
+    def _speed_limit(self) -> float:
+        """Return the speed in m/s that it is limited to; 0 or less is PX4's "no limit"."""
+        limit = self._parameters[self._persona.speed_parameter]
+        return limit if limit > 0.0 else FASTEST
 
     def _make_handlers(self) -> Mapping[int, Handler]:
         return {

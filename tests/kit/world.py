@@ -47,6 +47,9 @@ MODE_COMMAND, SETPOINT = 76, 84  # COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED
 PROMPT = replace(ARDUPILOT, announces_changes=True)
 
 
+SETTINGS_SPEED = 0.5  # m/s, also of tasks that name none: Driving.speed
+
+
 def kinematic_body(start: Pose) -> Body:
     """Give the body that scenarios drive: it slips a little, as a skid-steered one does."""
     return KinematicBody(start=start, slip=0.1, seed=None)
@@ -127,7 +130,9 @@ class World(VirtualWorld):
                 # tests that are about that set it back
                 vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
             if persona.speed_parameter == PX4.speed_parameter:
-                vehicle.autopilot.parameters[PX4.speed_parameter] = 5.0  # m/s, and for this
+                vehicle.autopilot.parameters[PX4.speed_parameter] = -1.0  # no limit of its own
+            if persona.name == ARDUPILOT.name:  # scenarios name the speeds that matter to them
+                vehicle.autopilot.parameters["CRUISE_SPEED"] = SETTINGS_SPEED
             link = self.net.link(f"rover{number}")
             ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
             observer = self.watched.observers[link.name] = Observer(

@@ -28,9 +28,9 @@ PLACE = GoTo(LocalPlace(1.0, -2.0))
         (Plan((PLACE, Nothing())), "go to 1.00 m N, -2.00 m E"),
         (Plan((SetSpeed(0.4), PLACE, SetSpeed(None), Nothing())), "go to 1.00 m N, -2.00 m E"),
         (Plan((PLACE, Wait(1.0), Nothing())), "plan of 3 items"),
-        (Plan((Nothing(),) * 4 + (PLACE,)), "plan of 5 items"),
-        (Plan((Nothing(),)), "plan of 1 items"),
-        (Plan((Nothing(), PLACE)), "plan of 2 items"),
+        (Plan((Nothing(),) * 4 + (PLACE,)), "plan of 4 items"),
+        (Plan((Nothing(),)), "plan of 0 items"),
+        (Plan((Nothing(), PLACE)), "plan of 1 item"),
         (Plan((Wait(1.0), Jump(0, 3))), "plan of 2 items"),
     ],
 )
