@@ -82,6 +82,7 @@ class LossFailsafe:
     def __init__(self, target: Address, *, is_by_parameters: bool) -> None:
         self._target = target
         self._values: dict[str, float] = {}
+        self._old: set[str] = set()  # of before a restart
         self._asked = 0 if is_by_parameters else NEVER
         self._has_changed = False  # what ``take_news`` says
 
@@ -134,7 +135,7 @@ class LossFailsafe:
 
     def requests(self) -> list[ParamRequestRead]:
         """Return what is to be asked now; called about once a second."""
-        missing = self._missing
+        missing = [*self._missing, *sorted(self._old)]
         if not missing or self._asked >= ASKS:
             return []
         self._asked += 1
@@ -154,6 +155,7 @@ class LossFailsafe:
         if isnan(value):
             return
         before = self.why_off
+        self._old.discard(name)
         self._values[name] = float(value)
         self._has_changed = self._has_changed or self.why_off != before
 
@@ -167,10 +169,10 @@ class LossFailsafe:
         return self.what_it_does or "stops when setpoints stop"
 
     def forget(self) -> None:
-        """The vehicle has restarted: its parameters may be others."""
+        """The vehicle has restarted: asked again, and until it answers they are as they were."""
         if self._asked != NEVER:
             self._asked = 0
-            self._values.clear()
+            self._old = set(self._values)
 
     @property
     def _missing(self) -> list[str]:

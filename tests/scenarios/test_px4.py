@@ -23,7 +23,6 @@ from tests.scenarios.conftest import MakeWorld
 MOVE, ROTATE, DRIVE = 54000, 54001, 54002
 WAYPOINT, YAW, YAW_SPEED, START = 16, 115, 213, 300
 NO_PLACE = 0x7FFFFFFF
-PARAM_VALUE = 22
 
 ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
 
@@ -304,12 +303,8 @@ class TestOneThatWouldDriveByItselfWithoutUs:
     def test_one_that_never_says_what_it_does_is_driven_after_it_was_asked_for_a_while(
         self, make_world: MakeWorld
     ) -> None:
-        world = make_world(persona=PROMPT_PX4)
-        world.rover.autopilot.reboot(now=world.now)
-        world.watched.loses = lambda source, target, data: (
-            source == "rover1" and data[7] == PARAM_VALUE
-        )
-        world.run(5)
+        said = tuple(each for each in PX4.parameters if each.name != "COM_OBL_RC_ACT")
+        world = make_world(persona=replace(PROMPT_PX4, parameters=said))
         world.client.move(1)
         world.run(1)
         assert why(world) == R.LOSS_FAILSAFE

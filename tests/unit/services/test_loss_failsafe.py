@@ -141,13 +141,16 @@ def test_other_parameters_mean_nothing() -> None:
     assert failsafe(value("NAV_ACC_RAD", 60.0)).why_off == ""
 
 
-def test_after_a_restart_all_is_asked_for_again() -> None:
-    made = failsafe(value(AFTER, 1.0), value(ACTION, 5), value(STATION, 0))
+def test_after_a_restart_all_is_asked_for_again_and_believed_until_then() -> None:
+    made = failsafe(value(AFTER, 1.0), value(ACTION, 5), value(STICKS, 2), value(STATION, 0))
     for _ in range(ASKS + 1):
         made.requests()
     made.forget()
-    assert made.awaits_answer
-    assert asked(made) == [AFTER, ACTION, STICKS, STATION]
+    assert not made.awaits_answer
+    assert sorted(asked(made)) == sorted([AFTER, ACTION, STATION, STICKS])
+    made.receive(value(ACTION, 3))
+    assert made.why_off.startswith("COM_OBL_RC_ACT is 3: Return")
+    assert sorted(asked(made)) == sorted([AFTER, STATION, STICKS])
 
 
 def test_of_one_that_stops_anyhow_nothing_is_asked_or_believed() -> None:
