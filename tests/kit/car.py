@@ -34,8 +34,8 @@ class Car:
 
     @property
     def lag(self) -> float:
-        """How late the wheels do what ``drive`` demands, s."""
-        return 0.1
+        """How late its engine does what is demanded, s."""
+        return self.ENGINE_LAG
 
     @property
     def state(self) -> BodyState:
