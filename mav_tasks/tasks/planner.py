@@ -39,6 +39,7 @@ BACKWARDS = 1.0  # of the way driven backwards, as much more it counts
 #: of the radius, lengths of the piece before the turn
 PIECES = (0.3, 0.6, 1.0, 1.5, 2.2, 3.0)
 THREE_POINT = (0.5, 0.9, 1.4)  # of the radius, the same for both pieces of a three-point turn
+THERE = 0.1  # m from a place: ArduPilot's simulated car (4.6.3) is not more exact
 HERE = 1e-3  # m and rad from a place or heading: there is no way to it
 
 
@@ -87,8 +88,11 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
 def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Steering) -> Progress:
     """Return the progress with which the first run of the way to a place begins.
 
-    Where no way stays within the fence it is the one that would be driven without.
+    Where no way stays within the fence it is the one that would be driven without. A place that is
+    reached as exactly as a car does is not left so as to come nearer.
     """
+    if hypot(place.north - pose.north, place.east - pose.east) <= THERE:
+        return replace(progress, leg=WAY, anchor=pose, path=(Bend(0.0, HERE),), done=0.0)
     way = way_to(pose, place, steering) or boldest_way_to(pose, place, steering)
     first, *others = runs_of(way)
     return replace(progress, leg=FACE if others else WAY, anchor=pose, path=first, done=0.0)
