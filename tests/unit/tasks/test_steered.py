@@ -30,6 +30,8 @@ from mav_tasks.tasks.task import Frame, Pose, Terms
 from tests.kit.car import CarRover
 from tests.unit.tasks.rig import BY, TICK, Rig
 
+pytestmark = pytest.mark.timeout(180)  # a hundred drives take 5 s, on a busy machine ten times that
+
 S, R = TaskState, TaskReason
 RADIUS = 1.5
 EARTH = GlobalPlace(473977420, 85455940)
