@@ -13,13 +13,15 @@ from typing import Protocol
 from rover_sim.body import BodyState
 from rover_sim.estimate import Estimate
 from rover_sim.frames import TURN_RADIUS
-from rover_sim.motion import CONTROL_PERIOD, YawControl
-from rover_sim.steering import Demand, Output
+from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits
+from rover_sim.steering import MAX_YAW_RATE, Demand, Output
 
 ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX, and for braking, too
 STOPPED = 0.1  # m/s, ATC_STOP_SPEED: at zero asked, slower than this, the throttle is cut
 PWM_STEPS = 500  # us from neutral to full
 SPEED_FILTER = 0.15  # s, of the speed that the loop sees
+HOLD_LATE = 4  # control periods until HOLD cuts the throttle; disarming cuts it at once
+YAW_LIMITS = YawLimits(MAX_YAW_RATE, acceleration=2.1, deceleration=3.5)  # ATC_STR_ACC_MAX
 ROLLED_OUT = 1e-3  # m/s; slower than this the vehicle stands
 
 
@@ -58,6 +60,8 @@ class ArduPilotDrive:
         self._seen = 0.0  # m/s, the estimate, filtered
         self._integral = 0.0  # throttle
         self._speed = 0.0  # m/s, of the wheels
+        self._last = 0.0  # throttle
+        self._neutral_for = 0  # control periods
 
     def __repr__(self) -> str:
         return f"ArduPilotDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
@@ -65,7 +69,11 @@ class ArduPilotDrive:
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
         self._seen += (estimate.forward_speed - self._seen) * _part(SPEED_FILTER)
-        throttle = self._throttle(demand, estimate.forward_speed)
+        neutral = demand.output is Output.NEUTRAL
+        self._neutral_for = self._neutral_for + 1 if neutral else 0
+        if not 0 < self._neutral_for <= HOLD_LATE:
+            self._last = self._throttle(demand, estimate.forward_speed)
+        throttle = self._last
         self._speed += (self._gains.top * throttle - self._speed) * _part(self._gains.lag)
         if throttle == 0.0 and abs(self._speed) < ROLLED_OUT:
             self._speed = 0.0
@@ -93,7 +101,7 @@ class SkidSteering:
     """The rate loop turns the wheels against each other; implements ``Steering``."""
 
     def __init__(self) -> None:
-        self._yaw = YawControl()
+        self._yaw = YawControl(YAW_LIMITS)
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
         """Return the turn rate for the wheels; free wheels still resist a turn."""
@@ -109,7 +117,7 @@ class WheelSteering:
     estimate says that it rolls backwards the angle is the other way round, as it should be.
     """
 
-    FEED_FORWARD = 0.72  # of the lock for each rad/s asked
+    FEED_FORWARD = 0.78  # of the lock for each rad/s asked
     P = 0.25  # of the lock for each rad/s of error
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:

@@ -31,6 +31,7 @@ from rover_sim.realism import (
     ARDUPILOT_BOOT,
     ARDUPILOT_ESTIMATOR,
     ARDUPILOT_REALISM,
+    PUSHING,
     PX4_BOOT,
     PX4_ESTIMATOR,
     PX4_REALISM,
@@ -38,6 +39,7 @@ from rover_sim.realism import (
     EstimatorError,
     Gps,
     Realism,
+    Wander,
 )
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
@@ -74,6 +76,7 @@ class Persona:
     honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
     realism: Realism  # how unkind it is, unless another is asked for
     estimators: Mapping[Gps, EstimatorError]
+    pushing: Wander | None  # the estimate's further error on an Ackermann rover that pushed, stood
     boot: BootTimes  # as long as it really takes
     boot_script: BootScript
     home: HomeRule
@@ -87,7 +90,15 @@ class Persona:
 
     def on(self, frame: Frame) -> "Persona":
         """Return the same make on another frame; its parameters tell which."""
-        return replace(self, frame=frame, parameters=self.parameters_of(frame))
+        pushing = self.pushing if frame is Frame.ACKERMANN else None
+        own = self.realism.estimator
+        return replace(
+            self,
+            frame=frame,
+            parameters=self.parameters_of(frame),
+            estimators={gps: replace(e, pushing=pushing) for gps, e in self.estimators.items()},
+            realism=replace(self.realism, estimator=own and replace(own, pushing=pushing)),
+        )
 
 
 ARDUPILOT = Persona(
@@ -140,6 +151,7 @@ ARDUPILOT = Persona(
     honours_yaw_rate=True,
     realism=ARDUPILOT_REALISM,
     estimators=ARDUPILOT_ESTIMATOR,
+    pushing=None,
     boot=ARDUPILOT_BOOT,
     boot_script=ARDUPILOT_SCRIPT,
     home=ARDUPILOT_HOME,
@@ -208,6 +220,7 @@ PX4 = Persona(
     honours_yaw_rate=False,
     realism=PX4_REALISM,
     estimators=PX4_ESTIMATOR,
+    pushing=PUSHING,
     boot=PX4_BOOT,
     boot_script=PX4_SCRIPT,
     home=PX4_HOME,
