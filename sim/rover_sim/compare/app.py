@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     pairs = [
         pair
         for pair in PAIRS
-        if options.autopilot in (None, pair.autopilot) and options.frame in (None, pair.frame)
+        if options.autopilot in (None, pair.autopilot) and options.frame in (None, pair.frame.value)
     ]
     if options.runs < 1:
         parser.error("--runs must be at least 1")
@@ -40,7 +40,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--autopilot", choices=sorted({pair.autopilot for pair in PAIRS}), help="default: both")
-    add("--frame", choices=sorted({pair.frame for pair in PAIRS}), help="default: all")
+    add("--frame", choices=sorted({pair.frame.value for pair in PAIRS}), help="default: all")
     add("--only", metavar="WORD", default="", help="only groups of figures with that word")
     add("--brief", action="store_true", help="only what differs and is not explained")
     add("--seed", type=int, default=0, help="of the first run's chance (default %(default)s)")
