@@ -128,7 +128,7 @@ PX4_ACKERMANN_ONLY = (
 )
 
 EXPLANATIONS: tuple[Explanation, ...] = (
-    Explanation("*", STANDING, "* alike after 1 s", (0.3, 0.95), SHORT_SAMPLE),
+    Explanation("px4-*", STANDING, "* alike after 1 s", (0.3, 0.95), SHORT_SAMPLE),
     Explanation("*", STANDING, "* alike after 3 s", (-0.6, 0.9), SHORT_SAMPLE),
     Explanation(
         "ardupilot-*",
