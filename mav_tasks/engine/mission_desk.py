@@ -150,6 +150,7 @@ class MissionDesks:
                         kind,
                         seq,
                         lambda: self._downloadable(vehicle, component, kind).items,
+                        form=type(message),
                         now=now,
                     )
                 )

@@ -5,7 +5,7 @@ place in the plan.
 """
 
 from collections.abc import Iterable
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 from struct import Struct
 from typing import NamedTuple
 
@@ -80,6 +80,28 @@ def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.Mis
         item.param4,
         item.x,
         item.y,
+        item.z,
+        mission_type,
+    )
+
+
+def float_message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItem:
+    """Return the message that carries an item to a client that asks with MISSION_REQUEST."""
+    scale = _scale(item.frame)
+    return m.MissionItem(
+        to.system_id,
+        to.component_id,
+        seq,
+        item.frame,
+        item.command,
+        item.current,
+        item.autocontinue,
+        item.param1,
+        item.param2,
+        item.param3,
+        item.param4,
+        nan if item.x == NOT_GIVEN else item.x / scale,
+        nan if item.y == NOT_GIVEN else item.y / scale,
         item.z,
         mission_type,
     )

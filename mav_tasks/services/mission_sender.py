@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.mission_item import Item, message_of
-from mav_tasks.services.mission_receiver import Sender, ToClient
+from mav_tasks.services.mission_item import Item, float_message_of, message_of
+from mav_tasks.services.mission_receiver import RequestForm, Sender, ToClient
 
 KEPT = 30.0  # s after its last request, in which a download may go on
 MOST = 64  # downloads at once
@@ -52,16 +52,21 @@ class MissionSender:
         seq: int,
         present: Callable[[], tuple[Item, ...]],
         *,
+        form: RequestForm = m.MissionRequestInt,
         now: float,
     ) -> ToClient:
-        """A client asks for an item: of its download, or of the ``present`` plan without one."""
+        """A client asks for an item: of its download, or of the ``present`` plan without one.
+
+        It is answered in the ``form`` in which it asks: DroneKit reads nothing but MISSION_ITEM.
+        """
         download = self._downloads.get((sender, mission_type))
         if download is None:
             self._forget(now=now)
             download = self._downloads[sender, mission_type] = _Download(present(), now)
         download.at = now
         if seq < len(download.items):
-            item = message_of(download.items[seq], seq, mission_type, to=sender.address)
+            make = message_of if form is m.MissionRequestInt else float_message_of
+            item = make(download.items[seq], seq, mission_type, to=sender.address)
             return ToClient(sender, item)
         result = MavMissionResult.INVALID_SEQUENCE
         return ToClient(sender, m.MissionAck(*sender.address, result, mission_type))
