@@ -52,6 +52,8 @@ def errors(client: FakeClient) -> list[tuple[str, int]]:
 def test_a_list_is_of_who_is_asked(
     world: World, component: int, ours: bool, the_rovers: bool
 ) -> None:
+    world.run(2)  # the server has asked the rover for its speed
+    world.client.received.clear()
     world.client.send(ask_all(component))
     world.run(0.5)
     assert bool(told(world.client)) is ours
@@ -267,6 +269,8 @@ def test_it_comes_before_what_is_configured(make_world: MakeWorld) -> None:
 
 
 def test_the_rovers_own_parameters_are_the_rovers(world: World) -> None:
+    world.run(2)  # the server has asked the rover for its speed
+    world.client.received.clear()
     world.client.send(put("WP_SPEED", 3.0, component=1))
     world.client.send(ask(1, "SYSID_THISMAV"))
     world.client.send(ask(1, "TSK_SPEED"))
