@@ -16,11 +16,18 @@ class Ability(NamedTuple):
     honours_yaw_rate: bool = True
     turning: Turning = Turning.ON_SPOT
     rover: str = "this rover"
+    turns_by_course: bool = False  # on the spot, to the course of a set-point
 
     @classmethod
     def of(cls, persona: Persona, *, rover: str = "this rover") -> "Ability":
         """Return that of a vehicle."""
-        return cls(persona.honours_yaw_rate, persona.turning, rover)
+        return cls(persona.honours_yaw_rate, persona.turning, rover, persona.turns_by_course)
+
+    @property
+    def turns_on_spot(self) -> bool:
+        """Return whether it turns while it stands."""
+        by_rate = self.honours_yaw_rate and self.turning is Turning.ON_SPOT
+        return by_rate or self.turns_by_course
 
     @property
     def why_no_turn(self) -> str:
@@ -49,8 +56,7 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     meaning it.
     """
     if isinstance(goal, GoTo):
-        turns = ability.honours_yaw_rate and ability.turning is Turning.ON_SPOT
-        return goal if turns or goal.yaw is None else replace(goal, yaw=None)
+        return goal if ability.turns_on_spot or goal.yaw is None else replace(goal, yaw=None)
     if ability.turning is Turning.STEERED:
         _check_rolls(goal, ability)
     if not ability.honours_yaw_rate:
@@ -79,7 +85,7 @@ def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
 def _check_course(goal: SingleGoal, ability: Ability) -> None:
     """What is steered by speed and course has neither a turn rate nor a way back."""
     match goal:
-        case Rotate() | Face():
+        case Rotate() | Face() if not ability.turns_on_spot:
             raise _cannot(ability.why_no_turn)
         case Move(distance=distance) if distance < 0:
             raise _cannot(f"param1 distance {distance:g}: {ability.why_no_reverse}", param=1)
@@ -89,7 +95,7 @@ def _check_course(goal: SingleGoal, ability: Ability) -> None:
             raise _cannot(f"param2 yaw rate: {ability.why_no_rate}", param=2)
         case Head(forward=forward) if forward < 0:
             raise _cannot(f"param2 speed {forward:g}: {ability.why_no_reverse}", param=2)
-        case Head(forward=0.0):
+        case Head(forward=0.0) if not ability.turns_on_spot:
             raise _cannot(f"param2 speed 0: {ability.why_no_turn}", param=2)
 
 

@@ -669,6 +669,7 @@ class Vehicle:
         return killed
 
     def _begin_stop(self, *, now: float) -> None:
+        self._face(now=now)
         brakes = self.persona.brakes_by_setpoints and self._is_motion_fresh(now=now)
         self.control.begin_stop(now=now, brake_first=brakes)
         self.ladder.begin(now=now)
@@ -848,6 +849,7 @@ class Vehicle:
 
     def step(self, *, now: float) -> None:
         """Let the tasks say what they demand, and do it."""
+        self._face(now=now)
         seen = self.view(now=now)
         begun_before = self.tasks.begun
         demand = STOP if self._is_closing else self.tasks.step(seen, now=now)
@@ -863,6 +865,12 @@ class Vehicle:
         if self.requests.flush(now=now):
             self.tasks.setpoint_left(now=now)
         self._plan_tick(now=now)
+
+    def _face(self, *, now: float) -> None:
+        """Tell its control where it points: what asks it to stand may have to say so."""
+        motion = self.where.motion.latest()
+        is_known = motion is not None and now - motion.at <= self._settings.watch.position_lost
+        self.control.face(motion.pose.yaw if motion is not None and is_known else None)
 
     def _watch_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         """See that it stands when it is told to, and drives no faster than it is told to."""
@@ -986,6 +994,7 @@ class Vehicle:
             is_fence_unknown=self.where.is_fence_unknown,
             honours_yaw_rate=self.persona.honours_yaw_rate,
             turning=self.persona.turning,
+            turns_by_course=self.persona.turns_by_course,
             turning_radius=self.persona.turning_radius or self._settings.driving.turning_radius,
             is_unknown=self.tasks.has_uid and not self.requests.is_identified,
             drives_on=self.may_drive_on,

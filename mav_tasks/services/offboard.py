@@ -97,6 +97,7 @@ class OffboardControl:
         #: HOLD was shown when it was asked for: only the answer tells it from that of a failsafe
         self._awaits_answer = False
         self._last_was_awaited = False  # the latest heartbeat was the first to show it
+        self._heading: float | None = None  # rad, where it points
         self._outgoing: list[Message] = []
         self._ask_until = -inf  # our mode or arming is asked for until then
         self._ask_again_at: float | None = None  # a refused request is repeated then
@@ -162,6 +163,10 @@ class OffboardControl:
     @property
     def _in_hold(self) -> bool:
         return self._is_settled and self._mode == self._persona.hold_mode
+
+    def face(self, yaw: float | None) -> None:
+        """Note where the vehicle points, rad from north; None: nothing fresh is known of that."""
+        self._heading = yaw
 
     def apply(self, watch: Watch) -> None:
         """Take new settings."""
@@ -456,7 +461,7 @@ class OffboardControl:
 
     def zero_setpoint(self) -> SetPositionTargetLocalNed:
         """Give the setpoint that asks the vehicle to stand."""
-        return self._orders.velocity(STANDING)
+        return self._orders.velocity(self._standing)
 
     def hold_request(self) -> CommandLong:
         """Give the command that asks for HOLD."""
@@ -574,7 +579,15 @@ class OffboardControl:
     def _withdraw(self, command: MavCmd) -> None:
         self._sender.withdraw(self._target.component_id, command)
 
+    @property
+    def _standing(self) -> Speeds:
+        """What asks it to stand as it is; plain zeros to one that is not armed."""
+        if self._persona.stands_by_course and self._armed and self._heading is not None:
+            return Speeds(0.0, course=self._heading)
+        return STANDING
+
     def _send_setpoint(self, wanted: Speeds) -> None:
+        wanted = self._standing if wanted == STANDING else wanted
         self._outgoing.append(self._orders.velocity(wanted))
 
 

@@ -17,7 +17,8 @@ class Speeds(NamedTuple):
     """What is asked for: m/s ``forward``, rad/s clockwise.
 
     ``course`` is the direction in which to drive, rad from north, for a vehicle that is steered by
-    it; that one drives forwards only, and the yaw rate does not count.
+    it; that one drives forwards only, and the yaw rate does not count. With a course and no speed
+    it stands, and turns there if it can.
     """
 
     forward: float
@@ -31,6 +32,10 @@ class Speeds(NamedTuple):
 
 
 STANDING = Speeds(0.0)
+#: m/s along a course, on which a vehicle that is steered by course stands, or turns on the spot:
+#: 1e-6 to 1e-3 were seen to (PX4 1.17). Zero has no course, and is taken for north.
+STANDING_SPEED = 1e-3
+LEAST = 2 * STANDING_SPEED  # m/s or rad/s; what is slower does not set a vehicle in motion
 
 
 class Orders:
@@ -47,7 +52,7 @@ class Orders:
         """Give a setpoint; zeros for what such a vehicle cannot do."""
         vx, vy, yaw_rate = wanted.forward, 0.0, wanted.yaw_rate
         if not self._persona.honours_yaw_rate:
-            speed = 0.0 if wanted.course is None else max(wanted.forward, 0.0)
+            speed = 0.0 if wanted.course is None else max(wanted.forward, STANDING_SPEED)
             course = wanted.course or 0.0
             vx, vy, yaw_rate = speed * cos(course), speed * sin(course), 0.0
         return SetPositionTargetLocalNed(
@@ -111,7 +116,8 @@ class Orders:
 def moves(message: Message) -> bool:
     """Whether it sets a vehicle in motion, or makes it ready for that: nothing to come late."""
     if isinstance(message, SetPositionTargetLocalNed):
-        return any((message.vx, message.vy, message.vz, message.yaw_rate))
+        speeds = (message.vx, message.vy, message.vz, message.yaw_rate)
+        return any(not abs(speed) < LEAST for speed in speeds)
     if isinstance(message, CommandLong) and message.command == MavCmd.COMPONENT_ARM_DISARM:
         return message.param1 != 0.0
     return False

@@ -55,6 +55,8 @@ class Persona:
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
     turning: Turning = Turning.ON_SPOT  # whichever way its set-points are read
     turning_radius: float | None = None  # m, at the least, of one that is STEERED; None: not known
+    #: it is known to turn on the spot to the course of a set-point that hardly moves it
+    turns_by_course: bool = False
 
     def __repr__(self) -> str:
         return f"Persona({self.name})"
@@ -67,6 +69,15 @@ class Persona:
         began (PX4): STOP asks for HOLD when it stands, or when set-points have no effect.
         """
         return self.turning is Turning.STEERED
+
+    @property
+    def stands_by_course(self) -> bool:
+        """Whether it takes zero velocity for "to the north", and turns there.
+
+        PX4 1.17 does: a differential rover turns on the spot, one that steers as a car bends while
+        it brakes. It stands, as it is, on a velocity of 1 mm/s along its heading.
+        """
+        return not self.honours_yaw_rate
 
     def mode_name(self, mode: int) -> str:
         """Give a custom_mode in words, as ground stations show it."""
@@ -214,6 +225,10 @@ def with_turning(persona: Persona, turning: Turning, *, radius: float | None = N
 
     ``radius`` is the least turning radius in m, of one that is STEERED; None: not known.
     """
+    is_car = turning is Turning.STEERED
     return replace(
-        persona, turning=turning, turning_radius=radius if turning is Turning.STEERED else None
+        persona,
+        turning=turning,
+        turning_radius=radius if is_car else None,
+        turns_by_course=not (is_car or persona.honours_yaw_rate),
     )

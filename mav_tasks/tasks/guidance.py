@@ -5,7 +5,7 @@ pre-emption leaves no error behind. ``limits`` has the last word on what comes o
 """
 
 from dataclasses import dataclass
-from math import atan, atan2, copysign, cos, hypot, pi, sin, sqrt, tan
+from math import atan, atan2, copysign, cos, hypot, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving
@@ -25,6 +25,8 @@ HEADING_GAIN = 1.5  # 1/s, heading error -> turn rate while moving
 CROSS_TRACK_GAIN = 1.2  # 1/m, sideways error -> approach angle
 MAX_APPROACH_ANGLE = pi / 6  # rad, towards the line
 MAX_STEER_RATE = 0.5  # rad/s, of corrections while moving
+AHEAD = 0.5  # s that the course is ahead of the heading, where a vehicle turns to it by itself
+LEAST_AHEAD = radians(10)  # rad, at the least
 PIVOT_ERROR = pi / 4  # rad, pointing further off than this it turns on the spot before it moves
 #: m/s, at the most, while a vehicle that is steered by course points further off than that: it may
 #: turn on the spot by itself, or in a bow
@@ -68,8 +70,8 @@ class Velocity:
 
     @property
     def is_zero(self) -> bool:
-        """Whether this asks to stand still."""
-        return self.forward == 0.0 and self.yaw_rate == 0.0
+        """Whether this asks to stand still; with a course it asks to turn there."""
+        return self.forward == 0.0 and self.yaw_rate == 0.0 and self.course is None
 
 
 ZERO = Velocity(0.0, 0.0)
@@ -185,7 +187,12 @@ def steer(
                 gain=slowest.turn_gain,
                 creep=slowest.rate,
             )
-            return Velocity(0.0, copysign(towards_end, angle * remaining))
+            turn = copysign(towards_end, angle * remaining)
+            if by_course:  # it turns there by itself, as fast as it can: so not far ahead
+                ahead = max(LEAST_AHEAD, AHEAD * abs(turn))
+                lead = copysign(min(abs(remaining), ahead), turn)
+                return Velocity(0.0, 0.0, wrap(pose.yaw + lead))
+            return Velocity(0.0, turn)
         case Drive(forward=forward, yaw_rate=yaw_rate):
             return Velocity(forward, yaw_rate, anchor.yaw if by_course else None)
         case Head(yaw=yaw, forward=forward):

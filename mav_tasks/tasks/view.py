@@ -41,6 +41,7 @@ class VehicleView:
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
     honours_yaw_rate: bool = True  # and reverses; else it is steered by course
     turning: Turning = Turning.ON_SPOT
+    turns_by_course: bool = False  # it turns on the spot to the course that it is told
     turning_radius: float = DEFAULT_TURNING_RADIUS  # m, of one that is STEERED
     is_unknown: bool = False  # it has yet to say whether it is the one whose tasks these are
     is_not_ready: bool = False  # the refusal is of arming, and may be another one later

@@ -515,8 +515,9 @@ class Observer:
 
 
 def _moves(message: Any) -> bool:
-    """Whether a setpoint asks for motion."""
-    return any((message.vx, message.vy, message.vz, message.yaw_rate))
+    """Whether a setpoint asks for motion; 1 mm/s along a course asks a PX4 rover to stand."""
+    speeds = (message.vx, message.vy, message.vz, message.yaw_rate)
+    return any(not abs(speed) < 0.002 for speed in speeds)
 
 
 def _off_centre(message: Any) -> bool:

@@ -159,4 +159,4 @@ class ProbeWorld(VirtualWorld):
 
 def is_moving(message: m.SetPositionTargetLocalNed) -> bool:
     """Whether a setpoint asks for any motion."""
-    return any((message.vx, message.vy, message.vz, message.yaw_rate))
+    return any(abs(v) >= 0.002 for v in (message.vx, message.vy, message.vz, message.yaw_rate))

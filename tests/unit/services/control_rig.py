@@ -107,7 +107,7 @@ class Rig:
             if self.persona.honours_yaw_rate:
                 moves = message.vx or message.yaw_rate
                 return f"velocity {message.vx:g} {message.yaw_rate:g}" if moves else "zero"
-            moves = message.vx or message.vy
+            moves = abs(message.vx) >= 0.002 or abs(message.vy) >= 0.002
             return f"north {message.vx:.2f} east {message.vy:.2f}" if moves else "zero"
         if isinstance(message, CommandInt):
             assert (message.command, message.x, message.y) == (192, 0x7FFFFFFF, 0x7FFFFFFF)
