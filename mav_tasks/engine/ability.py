@@ -56,7 +56,8 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     meaning it.
     """
     if isinstance(goal, GoTo):
-        return goal if ability.turns_on_spot or goal.yaw is None else replace(goal, yaw=None)
+        turns = ability.honours_yaw_rate and ability.turning is Turning.ON_SPOT
+        return goal if turns or goal.yaw is None else replace(goal, yaw=None)
     if ability.turning is Turning.STEERED:
         _check_rolls(goal, ability)
     if not ability.honours_yaw_rate:

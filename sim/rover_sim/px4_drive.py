@@ -103,9 +103,18 @@ def pushed(speed: float, throttle: float) -> float:
     return after if after * speed > 0.0 else 0.0
 
 
+NO_LIMIT = 5.0  # m/s, about what the motors can do, where RO_SPEED_LIM is -1: none
+
+
+def speed_limit_of(parameters: Parameters) -> float:
+    """Return the speed in m/s that a PX4 rover does not exceed."""
+    limit = parameters["RO_SPEED_LIM"]
+    return limit if limit > 0.0 else NO_LIMIT
+
+
 def ramped(speed: float, asked: float, parameters: Parameters) -> float:
     """Return the speed that is asked for one control period later, within RO_*_LIM."""
-    limit = parameters["RO_SPEED_LIM"]
+    limit = speed_limit_of(parameters)
     asked = max(-limit, min(limit, asked))
     name = "RO_DECEL_LIM" if abs(asked) < abs(speed) else "RO_ACCEL_LIM"
     return toward(speed, asked, _limit(parameters[name]) * CONTROL_PERIOD)

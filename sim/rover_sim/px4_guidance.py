@@ -10,6 +10,7 @@ from rover_sim.body import wrap_angle
 from rover_sim.estimate import Estimate
 from rover_sim.frames import TURN_RADIUS, Frame
 from rover_sim.parameters import Parameters
+from rover_sim.px4_drive import speed_limit_of
 from rover_sim.steering import Demand
 
 
@@ -26,7 +27,7 @@ class Px4Guidance:
 
     def to_course(self, estimate: Estimate, yaw: float, speed: float) -> Demand:
         """Drive at ``speed`` and turn to ``yaw`` meanwhile; no speed does not mean no turn."""
-        limit = self._parameters["RO_SPEED_LIM"]
+        limit = speed_limit_of(self._parameters)
         rate = self._yaw_rate(estimate, wrap_angle(yaw - estimate.yaw))
         return Demand(max(-limit, min(limit, speed)), rate)
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from math import degrees, hypot, remainder
+from math import degrees, hypot, radians, remainder
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,7 +25,7 @@ from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
-from rover_sim.realism import EXACT
+from rover_sim.realism import EXACT, Realism
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.client import ACK, REQUEST, FakeClient
@@ -99,10 +99,13 @@ class World(VirtualWorld):
         keys: tuple[Key, ...] | None = None,
         wall_offset: float | None = None,
         rover_key: Key | None = None,
+        realism: Realism = EXACT,
+        heading: float = 0.0,
     ) -> None:
         """``records``: a folder, for a record of each server that there is.
 
-        With ``rover_key`` rovers sign, and hear only what is signed. The rest is InMemoryServer's.
+        Rovers begin at a ``heading`` in degrees. With ``rover_key`` they sign, and hear only what
+        is signed. The rest is InMemoryServer's.
         """
         self._policies, self._keys, self._wall_offset = policies, keys, wall_offset
         self.seed = seed
@@ -115,7 +118,7 @@ class World(VirtualWorld):
         self.rover_parties: list[RoverParty] = []
         self.observers: list[Observer] = []
         for number in range(1, rovers + 1):
-            start = Pose(east=3.0 * (number - 1))
+            start = Pose(east=3.0 * (number - 1), yaw=radians(heading))
             vehicle = make_vehicle(
                 body(start),
                 system_id=number,
@@ -123,7 +126,7 @@ class World(VirtualWorld):
                 persona=persona,
                 unix_offset=wall_offset or 0.0,
                 key=rover_key,
-                realism=EXACT,  # the scenarios were written for exact arithmetic
+                realism=realism,  # EXACT: most scenarios were written for exact arithmetic
             )
             if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
                 # by default a PX4 rover drives home when setpoints stop, and is not driven at all;

@@ -58,6 +58,13 @@ def rotate(world: World, angle: float = 90.0) -> tuple[int, int] | None:
     return sent.answer
 
 
+def reverse(world: World) -> tuple[int, int] | None:
+    """Ask for what only one does that honours a yaw rate."""
+    sent = world.client.move(-0.5)
+    world.run(0.3)
+    return sent.answer
+
+
 def test_a_px4_that_was_measured_to_turn_is_turned(make_world: MakeWorld) -> None:
     world = make_world(persona=TURNING, settings=known(PX4_PROFILE))
     assert rotate(world) == (ACCEPTED, 1)
@@ -84,20 +91,20 @@ def test_a_profile_of_something_else_is_told_and_not_used(
 ) -> None:
     profile = replace(PX4_PROFILE, **change_of)  # type: ignore[arg-type]
     world = make_world(persona=TURNING, settings=known(profile))
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     assert noted(world) == [words]
 
 
 def test_the_profile_of_another_system_is_no_matter(make_world: MakeWorld) -> None:
     world = make_world(persona=TURNING, settings=known(replace(PX4_PROFILE, system_id=2)))
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     assert noted(world) == []
 
 
 def test_of_two_of_one_rover_the_later_counts(make_world: MakeWorld) -> None:
     later = replace(PX4_PROFILE, yaw_rate="ignored", probed="2026-11-21T10:00:00Z")
     world = make_world(persona=TURNING, settings=known(later, PX4_PROFILE))
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     assert noted(world) == ["profile of 2026-11-21 is used"]
 
 
@@ -113,7 +120,7 @@ def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
 ) -> None:
     profile = replace(ARDUPILOT_PROFILE, yaw_rate="ignored")
     world = make_world(settings=known(profile))
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     world.client.move(1.0)
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
@@ -141,7 +148,7 @@ def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
     change(world, known(PX4_PROFILE))
     world.run(1.1)
     assert noted(world) == ["profile of 2026-11-20 is used"]
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     world.until_idle(tasks=1)
     world.run(1.1)
     assert rotate(world) == (ACCEPTED, 2)
@@ -150,13 +157,13 @@ def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
     change(world, known())
     world.run(1.1)
     assert noted(world)[-1] == "no profile is used any more"
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
 
 
 def test_another_rover_in_its_place_does_not_inherit_it(make_world: MakeWorld) -> None:
     world = make_world(settings=known(replace(ARDUPILOT_PROFILE, yaw_rate="ignored")))
     world.run(10)
-    assert rotate(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     world.replace_rover(switched_on=world.now - 5.0)  # its clock begins anew: it is asked again
     world.until(lambda: "profile not used: of another rover" in noted(world), within=15)
     assert rotate(world) == (ACCEPTED, 1)

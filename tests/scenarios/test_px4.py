@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import nan, remainder, tau
+from math import degrees, nan, remainder, tau
 from struct import pack, unpack
 
 import pytest
@@ -13,7 +13,10 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim import offboard, steering
 from rover_sim.estimate import Estimate
+from rover_sim.frames import Frame
+from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
+from rover_sim.realism import EXACT, Drive
 from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
@@ -132,17 +135,60 @@ class TestDriving:
         world.until(lambda: world.state(1)[0] in (S.COMPLETED, S.FAILED), within=300)
 
 
+class TestTurning:
+    """A differential rover turns on the spot to the course of a set-point of 1 mm/s."""
+
+    @pytest.mark.parametrize("angle", [90.0, -45.0, 170.0, -270.0, 400.0])
+    def test_by_an_angle(self, world: World, angle: float) -> None:
+        world.run(2.0)  # until it has said that it can
+        world.client.rotate(angle)
+        world.until_idle(tasks=1)
+        assert world.state(1)[0] is S.COMPLETED
+        assert near_pose(world.pose(), (0.0, 0.0, angle), metres=0.02, angle=1)
+
+    @pytest.mark.parametrize(("heading", "yaw"), [(90.0, 90.0), (-161.0, 30.0)])
+    def test_to_a_heading(self, make_world: MakeWorld, heading: float, yaw: float) -> None:
+        world = make_world(persona=PX4)
+        world.run(2.0)
+        world.client.rotate(heading)
+        world.until_idle(tasks=1)
+        world.client.command(YAW, yaw)
+        world.until_idle(tasks=2)
+        assert world.state(2)[0] is S.COMPLETED
+        assert near_pose(world.pose(), (0.0, 0.0, yaw), metres=0.02, angle=1)
+
+
+class TestStanding:
+    """A real PX4 takes zero velocity for "to the north or south" (1.17, SITL)."""
+
+    @pytest.mark.parametrize("frame", [Frame.DIFFERENTIAL, Frame.ACKERMANN])
+    def test_a_move_begins_and_ends_with_the_heading_that_it_had(
+        self, make_world: MakeWorld, frame: Frame
+    ) -> None:
+        world = make_world(
+            persona=PX4.on(frame),
+            body=lambda start: kinematic_body(frame, start=start, slip=0.0, seed=None),
+            realism=replace(EXACT, drive=Drive.REAL),
+            heading=-161.0,
+        )
+        world.rover.autopilot.parameters["RO_SPEED_P"] = 0.4
+        world.rover.autopilot.parameters["RO_SPEED_I"] = 0.5
+        world.run(2.0)
+        turned: list[float] = []
+        world.watch(lambda now: turned.append(abs(degrees(world.truth.yaw) + 161.0)))
+        world.client.move(2.0, speed=0.8)
+        world.until_idle(tasks=1)
+        assert world.state(1)[0] is S.COMPLETED
+        assert max(turned) < 5.0, "it is not turned to the north"
+
+
 class TestWhatItCannotDo:
     @pytest.mark.parametrize(
         ("command", "params", "words"),
         [
             (MOVE, (-1.0,), "reverse"),
-            (ROTATE, (90.0,), "turn on the spot"),
             (DRIVE, (-0.5, 0.0, 2.0), "reverse"),
             (DRIVE, (0.5, 10.0, 2.0), "yaw rate"),
-            (YAW, (90.0,), "turn on the spot"),
-            (YAW, (90.0, 0.0, 1.0, 1.0), "turn on the spot"),
-            (YAW_SPEED, (90.0, 0.0), "speed 0"),
             (YAW_SPEED, (90.0, -0.5), "reverse"),
         ],
     )
@@ -159,8 +205,6 @@ class TestWhatItCannotDo:
         ("item", "result"),
         [
             (Item(MOVE, param1=-1.0, frame=2, param4=0.0), 6),  # INVALID_PARAM1
-            (Item(ROTATE, param1=90.0, frame=2, param4=0.0), 3),  # UNSUPPORTED
-            (Item(YAW, param1=90.0, frame=2, param4=0.0), 3),
         ],
     )
     def test_is_refused_in_a_plan_at_its_item(self, world: World, item: Item, result: int) -> None:
@@ -169,6 +213,25 @@ class TestWhatItCannotDo:
         )
         world.until(lambda: upload.result is not None, within=5)
         assert (upload.result, upload.requests) == (result, [0, 1])
+
+    @pytest.mark.parametrize(
+        ("command", "params", "words"),
+        [
+            (ROTATE, (90.0,), "turn on the spot"),
+            (YAW, (90.0,), "turn on the spot"),
+            (YAW, (90.0, 0.0, 1.0, 1.0), "turn on the spot"),
+            (YAW_SPEED, (90.0, 0.0), "speed 0"),
+        ],
+    )
+    def test_a_car_is_not_turned_on_the_spot(
+        self, make_world: MakeWorld, command: int, params: tuple[float, ...], words: str
+    ) -> None:
+        world = make_world(persona=PX4.on(Frame.ACKERMANN))
+        world.run(2.0)  # until it has said that it is one
+        sent = world.client.command(command, *params)
+        world.run(0.2)
+        assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
+        assert any(words in text for text in world.client.texts())
 
     def test_of_a_waypoint_only_the_heading_is_left_out(self, world: World) -> None:
         upload = Upload(world.client, [Item(WAYPOINT, **at(1, 0), param4=90.0)])

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from math import nan
 
 import pytest
@@ -57,7 +58,10 @@ def test_how_a_rover_turns_and_how_its_setpoints_are_read_are_two_facts(persona:
     assert car.honours_yaw_rate is persona.honours_yaw_rate
     for is_honoured in (False, True):
         assert with_yaw_rate(car, is_honoured=is_honoured).turning is Turning.STEERED
-    assert with_turning(car, Turning.ON_SPOT) == persona
+    known = with_turning(car, Turning.ON_SPOT)
+    assert replace(known, turns_by_course=False) == persona
+    assert known.turns_by_course is not persona.honours_yaw_rate
+    assert not car.turns_by_course
 
 
 @pytest.mark.parametrize(
