@@ -70,6 +70,16 @@ def test_who_goes_where_it_points_or_reverses_is_not(asked: Velocity, north: flo
     assert Rig(Move(10.0), asked).drives(9.0, north=-north) is not None
 
 
+def test_a_reported_speed_that_its_position_contradicts_is_no_motion() -> None:
+    """A PX4 with metre-class GPS reports up to 0.6 m/s sideways while it crawls ahead."""
+    rig = Rig(Move(10.0))
+    for step in range(1200):
+        rig.now += TICK
+        pose = Pose(0.02 * TICK * step, 0.1 * sin(step / 40), 0.0)
+        motion = Motion(pose, 0.05, 0.3, 0.0, rig.now)
+        assert not rig.watch.is_astray(rig.course, motion), step
+
+
 def test_a_little_right_in_between_begins_anew() -> None:
     rig = Rig(Drive(0.5, 0.0, 60.0))
     for _ in range(5):
