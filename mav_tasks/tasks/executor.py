@@ -30,7 +30,7 @@ from mav_tasks.tasks.stage import (
     set_out,
     steering_of,
 )
-from mav_tasks.tasks.stuck import StuckWatch
+from mav_tasks.tasks.stuck import Follows, StuckWatch
 from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.timing import Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
@@ -64,6 +64,7 @@ class Executor:
         self._last_tick = 0.0
         self._moved_at = 0.0  # when a velocity other than zero was last asked for
         self._stuck = StuckWatch()
+        self._follows = Follows()
         self._astray = AstrayWatch()
         self._arrival = Arrival()
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
@@ -368,6 +369,10 @@ class Executor:
         if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
             self._finish(S.FAILED, R.STUCK, actor=SERVER, now=now)
             return view.HOLD
+        period = self._settings.watch.setpoint_period
+        news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
+        if news:
+            self._book.record(VehicleNoted(task.vehicle, news, now))
         if self._astray.is_astray(course, motion):
             self._set_aside_as_astray(task, now=now)
             return view.HOLD
@@ -393,6 +398,7 @@ class Executor:
     def _begin_leg(self, *, now: float) -> None:
         self._stuck.begin(now=now)
         self._astray.begin_leg()
+        self._follows.begin()
         self._arrival.begin_leg()
 
     def _set_aside_as_astray(self, task: Task, *, now: float) -> None:

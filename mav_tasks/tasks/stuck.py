@@ -4,17 +4,58 @@ Two ways to see it: no progress towards the end of the leg, or, where a leg has 
 nearer to, standing still while a velocity is asked for.
 """
 
-from math import inf, pi
+from math import hypot, inf, pi, radians
 
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.goal import Move, Rotate
-from mav_tasks.tasks.guidance import Velocity, is_far_off, wrap
+from mav_tasks.tasks.guidance import Motion, Velocity, is_far_off, wrap
 from mav_tasks.tasks.path import Follow
+from mav_tasks.tasks.task import Pose
 from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
 FULL_TURNS = 2 * pi  # rad that it turns by itself towards its course, at the most; more is a circle
+TURNED = radians(5)  # rad, more is a turn on the spot, or in a bow, and it does follow
 BLIND = 1.0  # m or rad commanded without progress, or without motion: the same, but sooner
+
+
+SAID_AFTER = 1.5  # s of being asked to move without moving; the slowest rover began after 0.6
+LEAST_ASKED = 0.1  # m/s, slower is the approach of an end
+LEAST_PART = 0.1  # of the way that was asked for, or it stands
+
+
+class Follows:
+    """Whether a vehicle follows at all: said long before it is stuck, so that somebody can look."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+        self._from = Pose(0.0, 0.0, 0.0)
+        self._way = 0.0  # m asked for since then
+        self._is_said = False
+
+    def begin(self) -> None:
+        """Begin anew with another leg."""
+        self._since, self._is_said = None, False
+
+    def look(self, velocity: Velocity, motion: Motion, *, seconds: float, now: float) -> str:
+        """Return in words that it does not move, once each leg; "" otherwise."""
+        speed = abs(velocity.forward)
+        if speed < LEAST_ASKED:
+            self._since = None
+            return ""
+        if self._since is None:
+            self._since, self._from, self._way = now, motion.pose, 0.0
+        self._way += speed * seconds
+        here, there = motion.pose, self._from
+        went = hypot(here.north - there.north, here.east - there.east)
+        has_turned = abs(wrap(here.yaw - there.yaw)) > TURNED
+        if went > LEAST_PART * self._way or has_turned:
+            self._since = now if now - self._since > SAID_AFTER else self._since
+            return ""
+        if self._is_said or now - self._since < SAID_AFTER:
+            return ""
+        self._is_said = True
+        return f"asked for {speed:.1f} m/s, stands: look at its brake, speed gains, least speed"
 
 
 class StuckWatch:

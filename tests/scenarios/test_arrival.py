@@ -27,3 +27,22 @@ def test_moves_end_as_near_as_the_rover_can_and_none_is_stuck(
         wanted = world.truth.north  # the next one begins where this one ended
     assert max(errors) <= 0.1, errors
     assert sorted(errors)[2] <= 0.05, errors
+
+
+def test_one_that_does_not_follow_is_told_of_within_3_s(make_world: MakeWorld) -> None:
+    world = make_world(body=partial(Sticky, least=9.0, rolling=0.9))
+    world.client.move(5.0)
+    world.until_state(1, S.EXECUTING)
+    begun = world.now
+    words = "asked for 0.5 m/s, stands"
+    world.until(lambda: any(words in text for text in world.client.texts()), within=3.0)
+    assert world.state(1)[0] is S.EXECUTING, "before it is stuck"
+    assert world.now - begun < 3.0
+    world.until_state(1, S.FAILED)
+
+
+def test_one_that_follows_is_not_told_of(make_world: MakeWorld) -> None:
+    world = make_world(body=partial(Sticky, least=0.1, rolling=0.2))
+    world.client.move(3.0)
+    world.until_state(1, S.COMPLETED)
+    assert not any("stands: look" in text for text in world.client.texts())
