@@ -34,6 +34,9 @@ RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show H
 #: s after a request was last sent in which what it asks for may still come true: a copy of it may
 #: be late on the net. Longer, and a person who does the same would be taken for it.
 LATE = 0.3
+#: s after an accepted request in which a heartbeat may still show what was before: PX4 answers, and
+#: composes the heartbeat that it is asked for, before its mode has changed (1.17, SITL)
+SHOWN_LATE = 0.3
 UNANSWERED = 0.3  # s after which a request without an answer was heard, or lost
 AWAITED = 1.5  # s, the longest until a 1 Hz heartbeat shows what a disarming has done
 LEAD_GAP = 0.2  # s between zeros, after which the stream counts anew
@@ -93,6 +96,7 @@ class OffboardControl:
         self._mode = -1
         #: whether a heartbeat shows what became of the last mode or disarm request of ours
         self._is_settled = True
+        self._asked_mode: int | None = persona.hold_mode  # by the last request; None: disarming
         self._settles_at = -inf  # a heartbeat from then on was sent after the request was heard
         #: HOLD was shown when it was asked for: only the answer tells it from that of a failsafe
         self._awaits_answer = False
@@ -204,7 +208,8 @@ class OffboardControl:
         """
         self._last_was_awaited = not self._is_settled
         is_old_news = self._awaits_answer and mode == self._persona.hold_mode
-        if now >= self._settles_at and not is_old_news:
+        shows_it = not armed if self._asked_mode is None else mode == self._asked_mode
+        if now >= self._settles_at + (0.0 if shows_it else SHOWN_LATE) and not is_old_news:
             self._is_settled = True
         self._was_heard_leading_in = True
         if self._armed and not armed:
@@ -511,7 +516,7 @@ class OffboardControl:
 
     def _ask_mode(self, *, now: float) -> None:
         self._control_at = now
-        self._unsettle(now)
+        self._unsettle(now, mode=self._persona.control_mode)
         self._request(self._orders.our_mode(), until=self._ask_until, now=now)
 
     def _ask_hold(self, *, now: float) -> None:
@@ -555,8 +560,12 @@ class OffboardControl:
         is_news = self._is_settled or self._awaits_answer
         return self._persona.stop_disarms and is_news and not self._armed
 
-    def _unsettle(self, now: float, *, awaits_hold: bool = False) -> None:
-        """What the next heartbeats say may be from before the request that leaves now."""
+    def _unsettle(self, now: float, *, mode: int | None = None, awaits_hold: bool = False) -> None:
+        """What the next heartbeats say may be from before the request that leaves now.
+
+        ``mode`` is what is asked for; None: disarming.
+        """
+        self._asked_mode = self._persona.hold_mode if awaits_hold else mode
         is_shown = self._mode == self._persona.hold_mode
         self._awaits_answer = awaits_hold and is_shown and self._persona.has_loss_failsafe
         self._is_settled = False

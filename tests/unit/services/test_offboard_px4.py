@@ -1,11 +1,13 @@
 """Control of PX4 and generic rovers: the order of the steps, and what STOP is made of."""
 
-from math import pi
+from math import cos, pi, sin
 
 import pytest
 
 from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.messages import SetPositionTargetLocalNed
 from mav_tasks.services.offboard import AWAITED, LEAD_IN, UNSTOPPED, Phase, Refused
+from mav_tasks.services.orders import STANDING, Speeds, moves
 from mav_tasks.services.persona import GENERIC, PX4, Persona
 from mav_tasks.settings import Watch
 from tests.unit.services.control_rig import PERIOD, Rig
@@ -49,6 +51,38 @@ def in_control(persona: Persona = PX4) -> Rig:
     return rig
 
 
+class TestStanding:
+    """Zero velocity is a course to the north for it; 1 mm/s along its heading is to stand."""
+
+    @pytest.mark.parametrize("yaw", [0.0, 2.5, -pi])
+    def test_is_asked_for_along_the_heading(self, yaw: float) -> None:
+        rig = in_control()
+        rig.control.face(yaw)
+        rig.control.drive(STANDING)
+        [setpoint] = rig.control.take_messages()
+        assert isinstance(setpoint, SetPositionTargetLocalNed)
+        assert (setpoint.vx, setpoint.vy) == pytest.approx((1e-3 * cos(yaw), 1e-3 * sin(yaw)))
+
+    def test_is_plain_zero_for_one_that_is_not_armed_or_whose_heading_is_not_known(self) -> None:
+        for rig, yaw in ((Rig(PX4), 1.0), (in_control(), None)):
+            rig.control.face(yaw)
+            setpoint = rig.control.zero_setpoint()
+            assert (setpoint.vx, setpoint.vy, setpoint.yaw_rate) == (0.0, 0.0, 0.0)
+
+    def test_a_course_without_a_speed_is_a_turn_on_the_spot(self) -> None:
+        rig = in_control()
+        rig.control.face(0.0)
+        rig.control.drive(Speeds(0.0, course=pi / 2))
+        [setpoint] = rig.control.take_messages()
+        assert isinstance(setpoint, SetPositionTargetLocalNed)
+        assert (setpoint.vx, setpoint.vy) == pytest.approx((0.0, 1e-3))
+
+    def test_it_may_come_late_and_motion_may_not(self) -> None:
+        rig = in_control()
+        rig.control.face(1.0)
+        assert not moves(rig.control.zero_setpoint())
+
+
 class TestTakingControl:
     @both
     def test_is_hold_then_arm_then_a_second_of_zeros_then_offboard(self, persona: Persona) -> None:
@@ -88,6 +122,18 @@ class TestTakingControl:
         rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
         rig.take()
         assert rig.story() == ["zero", "arm"]
+
+    def test_a_heartbeat_just_after_the_answer_may_still_show_the_mode_before(self) -> None:
+        """PX4 answers HOLD, and the heartbeat that it is asked for still says OFFBOARD."""
+        rig = in_control()
+        rig.release()
+        rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
+        rig.control.heard(armed=True, mode=OFFBOARD, now=rig.now + 0.02)
+        rig.take()
+        assert not rig.control.in_control, "the next task does not begin on it"
+        rig.hear(mode=HOLD)
+        ticks(rig, LEAD_IN + 3 * PERIOD)
+        assert "our mode" in rig.story()
 
     def test_our_mode_is_not_asked_for_on_old_news(self) -> None:
         rig = armed_in_hold()
