@@ -425,15 +425,16 @@ class Vehicle:
         if self.tasks.is_stopped:
             self._note("restarted", now=now)
             return
-        if before is not None:
-            self._authority.restarted(was_allowed=before.may_arm)
-        elif self.control.is_engaged:
-            self._authority.restarted(was_allowed=self._authority.may_arm)
+        was_engaged = self.control.is_engaged
         self.control.lose()
         self.hold_before.forget()
         self.requests.end_performing()
         was_paused = self.tasks.paused if before is None else before.paused
-        self.tasks.restarted(was_paused=was_paused, now=now)
+        begins_again = self.tasks.restarted(was_paused=was_paused, now=now)
+        if before is not None:
+            self._authority.restarted(was_allowed=before.may_arm)
+        elif was_engaged and not begins_again:
+            self._authority.restarted(was_allowed=self._authority.may_arm)
         held = self.tasks.held
         words = "restarted"
         if held is not None:

@@ -46,6 +46,11 @@ KEEP_EACH = 1.0  # s between two writes of the progress of a task that is being 
 LOSSES = frozenset({R.LINK_LOST, R.POSITION_LOST})
 
 
+def has_moved(task: Task) -> bool:
+    """Return whether anything of a task may have been driven."""
+    return task.progress.anchor is not None or task.progress.execution_time > 0.0
+
+
 class Executor:
     """The begun task of one vehicle, if there is one."""
 
@@ -232,10 +237,31 @@ class Executor:
                 return view.HALT
         return view.HOLD
 
+    def begins_again(self, *, now: float) -> bool:
+        """The vehicle has restarted: whether the task begins again by itself, having moved nothing.
+
+        It waits until the vehicle is ready, as one does that is submitted a moment later.
+        """
+        task = self.task
+        if task is None or has_moved(task):
+            return False
+        is_lost = task.state is S.PAUSED and self._resumes_by_itself  # it was silent for a while
+        if is_lost:
+            self._change(S.STARTING, R.NONE, actor=SERVER, now=now)
+        elif task.state is not S.STARTING:
+            return False
+        self.waits_for = (R.NOT_READY, "it has restarted")
+        self._ask_again_at, self._taking_since = None, now
+        return True
+
     def _start(self, task: Task, seen: VehicleView, now: float) -> Demand:
+        is_waited_for = now - self._since < self._settings.watch.ready_timeout
+        is_not_ready = self.waits_for[0] is R.NOT_READY and is_waited_for and not has_moved(task)
+        if is_not_ready and self._is_lost(seen, now):
+            self._taking_since = now
+            return view.HOLD
         if self._pause_if_lost(seen, now):
             return view.HOLD
-        is_waited_for = now - self._since < self._settings.watch.ready_timeout
         if seen.refusal and seen.is_not_ready and is_waited_for:
             return self._wait_until_ready(task, seen, now)
         if seen.refusal:
@@ -498,13 +524,18 @@ class Executor:
 
     def _pause_if_lost(self, seen: VehicleView, now: float) -> bool:
         """Interrupt when heartbeats or position are missing; whether it did."""
+        lost = self._is_lost(seen, now)
+        if lost:
+            self.pause(lost, actor=SERVER, now=now)
+        return bool(lost)
+
+    def _is_lost(self, seen: VehicleView, now: float) -> TaskReason:
+        """Return which of heartbeats and position is missing, or NONE."""
         if not seen.heard:
-            self.pause(R.LINK_LOST, actor=SERVER, now=now)
-            return True
+            return R.LINK_LOST
         if seen.motion is None or now - seen.motion.at > self._settings.watch.position_lost:
-            self.pause(R.POSITION_LOST, actor=SERVER, now=now)
-            return True
-        return False
+            return R.POSITION_LOST
+        return R.NONE
 
     def _wait_for_return(self, seen: VehicleView, now: float) -> None:
         """A task PAUSED by a loss resumes by itself after a while of good data, or fails."""

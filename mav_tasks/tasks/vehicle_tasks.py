@@ -24,7 +24,7 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSpeedSet,
 )
-from mav_tasks.tasks.executor import Executor
+from mav_tasks.tasks.executor import Executor, has_moved
 from mav_tasks.tasks.goal import GlobalPlace, Plan, Rotate, SingleGoal
 from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, skipped_to
 from mav_tasks.tasks.jump import JumpWatch
@@ -592,9 +592,10 @@ class VehicleTasks:
                 if task.state is S.PAUSED and task.progress.anchor is not None:
                     self._book.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
 
-    def restarted(self, *, was_paused: TaskReason, now: float) -> None:
+    def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
         """The vehicle has restarted: hold what has begun, and let the queue stand until continued.
 
+        Return whether the begun task, of which nothing was driven, begins again by itself instead.
         ``was_paused`` is why the queue stood before the vehicle was seen disarmed: that was the
         restart, and no takeover.
         """
@@ -603,9 +604,12 @@ class VehicleTasks:
         if begun is not None and begun.state is S.CANCELLING:
             self._executor.let_go(actor=SERVER, now=now)
             self._ended(begun.id, now=now)
+        if not self._aside and self._executor.begins_again(now=now):
+            return True
         self.hold(R.FRAME_RESET, now=now)
         if self.is_driving and not was_paused:
             self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
+        return False
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """Kill the begun task and latch; with ``clear`` all others are cancelled too."""
@@ -738,8 +742,7 @@ class VehicleTasks:
         task = self._book[task_id]
         if task_id == self._urgent:
             self._urgent = None
-        moved = task.progress.anchor is not None or task.progress.execution_time > 0.0
-        if task.state is S.FAILED and moved and self._settings.on_failure == "pause":
+        if task.state is S.FAILED and has_moved(task) and self._settings.on_failure == "pause":
             self._pause_queue(task.reason, actor=SERVER, now=now)
         self._room.ended(task_id, now=now)
 

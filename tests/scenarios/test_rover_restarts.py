@@ -238,3 +238,18 @@ def test_nothing_to_continue_is_told_with_what_to_do(driving: World) -> None:
     world.run(4)
     assert proceed(world).answer == (DENIED, R.WRONG_STATE)
     assert any("release it first" in text for text in world.client.texts())
+
+
+@pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.2])
+def test_a_task_of_which_nothing_was_driven_begins_when_the_rover_is_back(
+    make_world: MakeWorld, persona: Persona, after: float
+) -> None:
+    """It was submitted before anybody could know that the rover had restarted."""
+    world = make_world(persona=persona)
+    world.run(2.0)
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(after)
+    world.client.move(1.0)
+    world.until_state(1, S.COMPLETED, within=60)
+    assert world.paused() is R.NONE
+    assert S.HELD not in [state for state, _ in world.history(1)]
