@@ -21,6 +21,7 @@ from mav_tasks.engine.overspeed import Overspeed
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.start_mark import StartMark
+from mav_tasks.engine.stick_watch import StickWatch
 from mav_tasks.engine.stop_ladder import Step, StopLadder
 from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.engine.whereabouts import Whereabouts
@@ -53,6 +54,8 @@ REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restar
 UNSEEN_STOP = 3.0
 #: a station's buttons for a held task
 BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
+BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
+NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
 SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
 REFUSALS = {
     None: TaskReason.NONE,
@@ -117,6 +120,7 @@ class Vehicle:
         #: how it is made to stand, while it is not known that it does
         self.ladder = StopLadder()
         self._overspeed = Overspeed()
+        self._sticks = StickWatch()
         #: what was measured of it beforehand
         self.known = KnownProfile(persona)
         self.known.apply(settings.profiles, system_id)
@@ -259,6 +263,9 @@ class Vehicle:
             self._arming_texts.receive(sender, message, now=now)
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
+        elif isinstance(message, m.RcChannels):
+            if self._sticks.look(message, is_driven=self.armed and self.control.is_engaged):
+                self._stick_moved(now=now)
         elif isinstance(message, m.AutopilotVersion):
             identity = identity_of(message)
             self.tasks.identified(identity.uid, now=now)
@@ -420,6 +427,7 @@ class Vehicle:
         self.requests.loss_failsafe.forget()
         self.requests.turning.forget()
         self.requests.cruise.forget()
+        self._sticks.forget()
         self.forget_start()
         before = self._authority.take_disarmed(since=booted_at)
         if self.tasks.is_stopped:
@@ -633,6 +641,22 @@ class Vehicle:
         self._zero_what_is_kept()
         self._take_over("driven by hand", now=now)
 
+    def _stick_moved(self, *, now: float) -> None:
+        """A person holds a stick of the vehicle's own transmitter, and it may drive by that.
+
+        In our mode nobody can steer by sticks, and zeros do not stop it: HOLD does.
+        """
+        phase = self.control.phase
+        if phase in (Phase.STOPPING, Phase.RELEASING) or self.tasks.is_stopped:
+            return
+        self._note("a stick is off its centre: HOLD. Centre it, then continue", now=now)
+        self._authority.note_other(now=now)
+        self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
+        self.control.begin_release(now=now)
+        self.ladder.begin(now=now)
+        self.requests.flush(now=now)
+        self._clock.restart(now=now)
+
     def second_controller(self, who: Address, *, now: float) -> None:
         """Setpoints or an address like ours, not from us: HOLD once, then let go."""
         if self._authority.since_other(now=now) > self._settings.watch.other_controller:
@@ -672,7 +696,8 @@ class Vehicle:
     def _begin_stop(self, *, now: float) -> None:
         self._face(now=now)
         brakes = self.persona.brakes_by_setpoints and self._is_motion_fresh(now=now)
-        self.control.begin_stop(now=now, brake_first=brakes)
+        longest = self._settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
+        self.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
         self.ladder.begin(now=now)
         self.requests.end_performing()
         self._clock.restart(now=now)
@@ -906,6 +931,9 @@ class Vehicle:
             disarm_after=self._settings.watch.disarm_moving or inf,
             now=now,
         )
+        is_nearly_over = speed is not None and speed < NEARLY_STANDS
+        if control.phase is Phase.STOPPING and is_nearly_over:
+            control.hold_now(now=now)
         if due is Step.HOLD:
             self._ask_for_hold(demand, now=now)
         elif due is Step.DISARM and self.armed:

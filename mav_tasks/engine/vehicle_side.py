@@ -50,6 +50,7 @@ USED = frozenset(
         m.MissionRequest.id,
         m.MissionRequestInt.id,
         m.ParamValue.id,
+        m.RcChannels.id,
         m.Statustext.id,
     }
     | SETPOINTS

@@ -20,6 +20,7 @@ WANTED: dict[int, float] = {
     m.SystemTime.id: 1.0,
     m.HomePosition.id: 2.0,
     m.MissionCurrent.id: 1.0,
+    m.RcChannels.id: 0.1,  # sticks that leave neutral
 }
 
 SHORTEST = 0.02  # s: what a vehicle's main loop can give; a shorter one is refused altogether

@@ -407,13 +407,13 @@ class OffboardControl:
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
-    def begin_stop(self, *, now: float, brake_first: bool = False) -> None:
+    def begin_stop(self, *, now: float, brake_for: float = 0.0) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
 
-        With ``brake_first`` zeros alone, until the vehicle stands or ``hold_now`` is called: for
-        one that HOLD lets roll, and that is in our mode.
+        With ``brake_for`` zeros alone, for so many seconds at the most, or until ``hold_now`` is
+        called: for one that HOLD lets roll, and that is in our mode.
         """
-        brakes = brake_first and self.in_control
+        brakes = brake_for > 0.0 and self.in_control
         for command in (MavCmd.DO_SET_MODE, MavCmd.COMPONENT_ARM_DISARM):
             self._sender.cancel(self._target.component_id, command, now=now)
         self.phase = Phase.STOPPING
@@ -422,7 +422,7 @@ class OffboardControl:
         self._is_braking = brakes
         if brakes:
             self._send_setpoint(STANDING)
-            self._next_hold_at = now + STAND_UNSEEN + ROLLS_OUT
+            self._next_hold_at = now + brake_for
             return
         self._unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)

@@ -1,0 +1,40 @@
+"""Whether the sticks of a vehicle's own transmitter leave neutral, by RC_CHANNELS.
+
+An ArduPilot in GUIDED takes the throttle stick for a speed of its own (1.9 m/s were measured where
+0 was asked for), and says so nowhere else. Where the sticks rest is what they show while we do not
+drive: a throttle may rest at its lowest. MAVLink guide: RC_CHANNELS.
+"""
+
+from mav_tasks.mavlink.messages import RcChannels
+
+LEAVES = 100  # µs from where it rests; trims and noise are a tenth of that
+TIMES = 2  # messages in a row
+ABSENT = (0, 65535)  # a channel without a value
+
+
+class StickWatch:
+    """The sticks of one vehicle: steering and throttle, as RCMAP_* has them by default."""
+
+    def __init__(self) -> None:
+        self._rest: tuple[int, int] | None = None
+        self._times = 0
+
+    def __repr__(self) -> str:
+        return f"StickWatch(rest={self._rest})"
+
+    def forget(self) -> None:
+        """The vehicle has restarted: its transmitter may be another one."""
+        self._rest, self._times = None, 0
+
+    def look(self, message: RcChannels, *, is_driven: bool) -> bool:
+        """Return whether a stick has left neutral; while not ``is_driven`` that is learnt."""
+        now = message.chan1_raw, message.chan3_raw
+        if not message.chancount or any(value in ABSENT for value in now):
+            self._times = 0
+            return False
+        if self._rest is None or not is_driven:
+            self._rest, self._times = now, 0
+            return False
+        moved = any(abs(value - rest) > LEAVES for value, rest in zip(now, self._rest, strict=True))
+        self._times = self._times + 1 if moved else 0
+        return self._times >= TIMES

@@ -1,0 +1,44 @@
+"""Sticks of the rover's own transmitter that leave neutral."""
+
+import pytest
+
+from mav_tasks.engine.stick_watch import StickWatch
+from mav_tasks.mavlink.messages import RcChannels
+
+
+def channels(steering: int = 1500, throttle: int = 1500, *, count: int = 16) -> RcChannels:
+    values = [65535] * 18
+    values[0], values[2] = steering, throttle
+    return RcChannels(0, count, *values, 255)
+
+
+@pytest.mark.parametrize("rest", [1500, 1000, 1520])
+def test_a_throttle_that_leaves_where_it_rests_is_seen_at_the_second_message(rest: int) -> None:
+    watch = StickWatch()
+    assert not watch.look(channels(throttle=rest), is_driven=False)
+    assert not watch.look(channels(throttle=rest + 90), is_driven=True)
+    assert not watch.look(channels(throttle=rest + 250), is_driven=True)
+    assert watch.look(channels(throttle=rest + 250), is_driven=True)
+
+
+def test_steering_counts_too() -> None:
+    watch = StickWatch()
+    watch.look(channels(), is_driven=False)
+    watch.look(channels(steering=1300), is_driven=True)
+    assert watch.look(channels(steering=1300), is_driven=True)
+
+
+def test_what_they_show_while_nothing_is_driven_is_rest() -> None:
+    watch = StickWatch()
+    watch.look(channels(), is_driven=False)
+    watch.look(channels(throttle=1900), is_driven=False)
+    assert not watch.look(channels(throttle=1900), is_driven=True)
+    assert not watch.look(channels(throttle=1900), is_driven=True)
+
+
+@pytest.mark.parametrize("absent", [channels(0, 0), channels(65535, 65535), channels(count=0)])
+def test_a_rover_without_a_transmitter_has_no_sticks(absent: RcChannels) -> None:
+    watch = StickWatch()
+    watch.look(channels(), is_driven=False)
+    for _ in range(5):
+        assert not watch.look(absent, is_driven=True)
