@@ -9,7 +9,7 @@ from mav_tasks.mavlink.messages import RcChannels
 def channels(steering: int = 1500, throttle: int = 1500, *, count: int = 16) -> RcChannels:
     values = [65535] * 18
     values[0], values[2] = steering, throttle
-    return RcChannels(0, count, *values, 255)
+    return RcChannels(0, count, *values, 255)  # type: ignore[call-arg]
 
 
 @pytest.mark.parametrize("rest", [1500, 1000, 1520])

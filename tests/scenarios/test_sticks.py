@@ -1,0 +1,91 @@
+"""The throttle stick of the rover's own transmitter, held forward while the server drives."""
+
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.frames import Frame
+from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.realism import EXACT, Drive, Wire
+from tests.kit.client import ACCEPTED
+from tests.kit.world import PROMPT, World
+from tests.scenarios.conftest import MakeWorld
+
+CANCEL = 54010
+FORWARD, CENTRE = 1750, 1500  # µs: 1.9 m/s by itself, on a rover of 4 m/s
+STANDS = 0.03  # m/s
+
+
+def with_transmitter(make_world: MakeWorld, frame: Frame) -> World:
+    """A world whose ArduPilot drives, and listens to sticks, as the recorded one does."""
+    persona = PROMPT.on(frame)
+    world = make_world(
+        persona=persona,
+        body=partial(body_of, frame),
+        realism=replace(
+            EXACT, drive=Drive.REAL, wire=Wire.REAL, stick_speed=persona.realism.stick_speed
+        ),
+    )
+    world.run(3.0)
+    return world
+
+
+def body_of(frame: Frame, start: object) -> object:
+    return kinematic_body(frame, start=start, slip=0.0, seed=None)  # type: ignore[arg-type]
+
+
+def stands_after(world: World) -> float:
+    """Give the seconds after which it stands for good."""
+    began, moved = world.now, world.now
+    while world.now < began + 12.0:
+        world.run(0.05)
+        if abs(world.truth.forward_speed) > STANDS:
+            moved = world.now
+    return moved - began
+
+
+@pytest.mark.parametrize(
+    ("frame", "when", "within"),
+    [
+        (Frame.SKID, "starting", 1.5),
+        (Frame.SKID, "driving", 1.5),
+        (Frame.SKID, "cancelled", 1.5),
+        (Frame.ACKERMANN, "starting", 2.5),
+        # it rolls on freely in HOLD, and nothing else takes the throttle from the stick
+        (Frame.ACKERMANN, "driving", 7.0),
+        (Frame.ACKERMANN, "cancelled", 7.0),
+    ],
+)
+def test_a_stick_held_forward_ends_in_hold(
+    make_world: MakeWorld, frame: Frame, when: str, within: float
+) -> None:
+    world = with_transmitter(make_world, frame)
+    world.client.move(10.0)
+    world.run(0.05 if when == "starting" else 4.0)
+    if when == "cancelled":
+        world.client.command(CANCEL, 1)
+    world.rover.autopilot.operator_pulses(FORWARD, CENTRE)
+    assert stands_after(world) <= within
+    assert world.paused() is R.TAKEOVER
+    assert world.state(1)[0] is (S.CANCELLED if when == "cancelled" else S.PAUSED)
+    assert any("a stick is off its centre" in text for text in world.client.texts())
+
+
+def test_the_task_goes_on_when_the_stick_is_centred_and_somebody_says_continue(
+    make_world: MakeWorld,
+) -> None:
+    world = with_transmitter(make_world, Frame.SKID)
+    world.client.move(4.0)
+    world.run(4.0)
+    world.rover.autopilot.operator_pulses(FORWARD, CENTRE)
+    world.run(4.0)
+    world.rover.autopilot.operator_pulses(CENTRE, CENTRE)
+    world.run(3.0)
+    sent = world.client.proceed()
+    world.until_state(1, S.COMPLETED, within=40)
+    assert sent.answer is not None
+    assert sent.answer[0] == ACCEPTED
+    assert abs(world.truth.north - 4.0) < 0.1
