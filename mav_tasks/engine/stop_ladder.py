@@ -73,17 +73,24 @@ class StopLadder:
         return self.step is Step.SETPOINTS and now - self._slowed_at <= NO_EFFECT
 
     def climb(
-        self, *, speed: float | None, is_held: bool, disarm_after: float, now: float
+        self,
+        *,
+        speed: float | None,
+        is_held: bool,
+        disarm_after: float,
+        now: float,
+        patience: float = NO_EFFECT,
     ) -> Step | None:
         """Return the step that is due now and was not before; None if there is none.
 
         ``speed`` is m/s by displacement, None where nothing fresh is known of it; ``is_held``
-        whether the vehicle shows HOLD. ``disarm_after`` is in s after HOLD was seen.
+        whether the vehicle shows HOLD. ``disarm_after`` is in s after HOLD was seen, ``patience``
+        in s without getting slower, after which set-points have no effect.
         """
         self._look(speed, now)
         if is_held and self._hold_seen_at is None:
             self._hold_seen_at = now
-        if self.step is Step.SETPOINTS and self._has_no_effect(speed, now):
+        if self.step is Step.SETPOINTS and self._has_no_effect(speed, patience, now):
             self.step = Step.HOLD
             return Step.HOLD
         if self.step is Step.SETPOINTS and is_held:
@@ -101,12 +108,12 @@ class StopLadder:
         self.step = Step.DISARM
         return Step.DISARM
 
-    def _has_no_effect(self, speed: float | None, now: float) -> bool:
-        if now - self._began < REACTION + NO_EFFECT:
+    def _has_no_effect(self, speed: float | None, patience: float, now: float) -> bool:
+        if now - self._began < REACTION + patience:
             return False
         if speed is None:
             return True
-        return speed > MOVES and now - self._slowed_at >= NO_EFFECT
+        return speed > MOVES and now - self._slowed_at >= patience
 
     def _look(self, speed: float | None, now: float) -> None:
         if speed is None:

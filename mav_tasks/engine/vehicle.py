@@ -15,14 +15,13 @@ from mav_tasks.engine.frame_monitor import Seen
 from mav_tasks.engine.hold_before import HoldBefore
 from mav_tasks.engine.home_command import home_meant
 from mav_tasks.engine.known_profile import KnownProfile
+from mav_tasks.engine.motion_guard import Found, Measure, MotionGuard, Told
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
-from mav_tasks.engine.overspeed import Overspeed
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.start_mark import StartMark
 from mav_tasks.engine.stick_watch import StickWatch
-from mav_tasks.engine.stop_ladder import Step, StopLadder
 from mav_tasks.engine.vehicle_requests import VehicleRequests
 from mav_tasks.engine.whereabouts import Whereabouts
 from mav_tasks.errors import Rejection
@@ -39,7 +38,7 @@ from mav_tasks.settings import SET_FAILSAFE, Settings, Turning
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace, ends_at_home
-from mav_tasks.tasks.guidance import ZERO, Velocity
+from mav_tasks.tasks.guidance import ZERO
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -55,8 +54,6 @@ UNSEEN_STOP = 3.0
 #: a station's buttons for a held task
 BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
 BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
-NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
-SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
 REFUSALS = {
     None: TaskReason.NONE,
     Refused.MODE: TaskReason.MODE_REFUSED,
@@ -117,9 +114,7 @@ class Vehicle:
         #: whether its mission begins when it is armed
         self.start_mark = StartMark()
         self._own_items = 0  # of a mission on board
-        #: how it is made to stand, while it is not known that it does
-        self.ladder = StopLadder()
-        self._overspeed = Overspeed()
+        self._guard = MotionGuard(self.where.motion, settings.watch)
         self._sticks = StickWatch()
         #: what was measured of it beforehand
         self.known = KnownProfile(persona)
@@ -368,7 +363,11 @@ class Vehicle:
             self._book.record(VehicleSeen(self.system_id, news, now))
         self.tasks.brakes(self.known.stop)
         persona = self.known.persona
-        if persona != self.persona and not self.control.is_engaged:
+        speaks_alike = (persona.setpoint_mask, persona.setpoint_frame) == (
+            self.persona.setpoint_mask,
+            self.persona.setpoint_frame,
+        )
+        if persona != self.persona and (speaks_alike or not self.control.is_engaged):
             self.persona = persona
             self.requests.adopt(persona)
 
@@ -653,7 +652,7 @@ class Vehicle:
         self._authority.note_other(now=now)
         self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
         self.control.begin_release(now=now)
-        self.ladder.begin(now=now)
+        self._guard.ladder.begin(now=now)
         self.requests.flush(now=now)
         self._clock.restart(now=now)
 
@@ -693,12 +692,12 @@ class Vehicle:
         self._begin_stop(now=now)
         return killed
 
-    def _begin_stop(self, *, now: float) -> None:
+    def _begin_stop(self, *, now: float, brakes: bool = True) -> None:
         self._face(now=now)
-        brakes = self.persona.brakes_by_setpoints and self._is_motion_fresh(now=now)
+        brakes = brakes and self.persona.brakes_by_setpoints and self._guard.is_fresh(now=now)
         longest = self._settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
         self.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
-        self.ladder.begin(now=now)
+        self._guard.ladder.begin(now=now)
         self.requests.end_performing()
         self._clock.restart(now=now)
         self.requests.flush(now=now)
@@ -887,7 +886,7 @@ class Vehicle:
                 self.where.motion.doubt(until=now + UNSEEN_STOP)
                 seen = replace(seen, still=False)
         self._follow(demand, seen, now=now)
-        self._watch_motion(demand, seen, now=now)
+        self._guard_motion(demand, seen, now=now)
         if self.requests.flush(now=now):
             self.tasks.setpoint_left(now=now)
         self._plan_tick(now=now)
@@ -898,81 +897,47 @@ class Vehicle:
         is_known = motion is not None and now - motion.at <= self._settings.watch.position_lost
         self.control.face(motion.pose.yaw if motion is not None and is_known else None)
 
-    def _watch_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
+    def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         """See that it stands when it is told to, and drives no faster than it is told to."""
-        wanted = demand.velocity if demand.kind is DemandKind.DRIVE else ZERO
-        if self.control.in_control and not self.tasks.is_stopped:
-            self._check_overspeed(wanted, now=now)
-        if not wanted.is_zero and self.control.in_control:
-            self.ladder.end()
-        elif self._is_told_to_stand(seen):
-            self.ladder.begin(now=now)
-        if self.ladder.is_on:
-            self._climb(demand, seen, now=now)
-
-    def _is_told_to_stand(self, seen: VehicleView) -> bool:
-        """Whether it is ours, may move, and was told to stand by us."""
-        is_ours = self.control.in_control or self.control.phase in (Phase.RELEASING, Phase.STOPPING)
-        return is_ours and self.armed and not seen.still
-
-    def _climb(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
-        ladder, control = self.ladder, self.control
-        mode = self._monitor.custom_mode
-        is_elses = not control.is_engaged and mode != self.persona.hold_mode
-        if seen.still or is_elses or not seen.heard:
-            ladder.end()
-            return
-        speed = self._speed(now=now)
-        if speed is None and control.phase is not Phase.STOPPING:
-            return  # zeros go on, and HOLD follows them: of a car that HOLD lets roll nobody knows
-        due = ladder.climb(
-            speed=speed,
-            is_held=mode == self.persona.hold_mode,
-            disarm_after=self._settings.watch.disarm_moving or inf,
-            now=now,
+        control, wanted = self.control, ZERO
+        if demand.kind is DemandKind.DRIVE:
+            wanted = demand.velocity
+        told = Told(
+            forward=wanted.forward,
+            moves=control.in_control and not wanted.is_zero,
+            is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
+            is_stopping=control.phase is Phase.STOPPING,
+            may_drive=control.in_control and not self.tasks.is_stopped,
+            is_released=not control.is_engaged,
+            is_held=self._monitor.custom_mode == self.persona.hold_mode,
+            armed=self.armed,
+            still=seen.still,
+            heard=seen.heard,
         )
-        is_nearly_over = speed is not None and speed < NEARLY_STANDS
-        if control.phase is Phase.STOPPING and is_nearly_over:
-            control.hold_now(now=now)
-        if due is Step.HOLD:
-            self._ask_for_hold(demand, now=now)
-        elif due is Step.DISARM and self.armed:
-            self._note(f"moves in HOLD, {speed or 0.0:.1f} m/s: disarmed", now=now)
-            control.disarm_now(now=now)
+        for found in self._guard.look(told, now=now):
+            self._take_measure(found, demand, now=now)
 
-    def _ask_for_hold(self, demand: Demand, *, now: float) -> None:
-        """Set-points do not stop it."""
-        if demand.kind in (DemandKind.TAKE, DemandKind.DRIVE):
-            self._note("moves though it is told to stand: HOLD", now=now)
-            self.tasks.hold(TaskReason.STOP_UNCONFIRMED, now=now)
-            self._begin_stop(now=now)
-        elif self.control.phase is Phase.STOPPING:
-            self.control.hold_now(now=now)
-        elif self.control.in_control:
-            self.control.begin_release(now=now)
-
-    def _check_overspeed(self, wanted: Velocity, *, now: float) -> None:
-        """Somebody else adds to its speed, or it runs away: it is stopped, and waits for help."""
-        speed, motion = self._speed(now=now), self.where.motion.latest()
-        reported = 0.0 if motion is None else motion.speed
-        fast = self._overspeed.look(wanted.forward, min(speed or 0.0, reported), now=now)
-        begun = self.tasks.begun
-        if not fast or begun is None or begun.state is not TaskState.EXECUTING:
-            return
-        words = f"drives {speed:.1f} m/s, asked for {fast:.1f}: stopped. Is a stick off its centre?"
-        self._note(words, now=now)
-        self.tasks.hold(TaskReason.OVERSPEED, now=now)
-        self._begin_stop(now=now)
-
-    def _speed(self, *, now: float) -> float | None:
-        """Return m/s by displacement, None while nothing fresh is known."""
-        if not self._is_motion_fresh(now=now):
-            return None
-        return self.where.motion.standstill.speed(SPEED_WINDOW, now=now)
-
-    def _is_motion_fresh(self, *, now: float) -> bool:
-        motion = self.where.motion.latest()
-        return motion is not None and now - motion.at <= self._settings.watch.motion_fresh
+    def _take_measure(self, found: Found, demand: Demand, *, now: float) -> None:
+        match found.measure:
+            case Measure.HOLD_NOW:
+                self.control.hold_now(now=now)
+            case Measure.DISARM:
+                self._note(found.words, now=now)
+                self.control.disarm_now(now=now)
+            case Measure.STOP_TASK:
+                begun = self.tasks.begun
+                if begun is not None and begun.state is TaskState.EXECUTING:
+                    self._note(found.words, now=now)
+                    self.tasks.hold(TaskReason.OVERSPEED, now=now)
+                    self._begin_stop(now=now, brakes=False)  # which a held stick would defeat
+            case Measure.HOLD if demand.kind in (DemandKind.TAKE, DemandKind.DRIVE):
+                self._note("moves though it is told to stand: HOLD", now=now)
+                self.tasks.hold(TaskReason.STOP_UNCONFIRMED, now=now)
+                self._begin_stop(now=now)
+            case Measure.HOLD if self.control.phase is Phase.STOPPING:
+                self.control.hold_now(now=now)
+            case Measure.HOLD if self.control.in_control:
+                self.control.begin_release(now=now)
 
     def _note_end(self, ended: Task) -> None:
         """A return has ended: as on an autopilot that has landed, whoever armed it is done."""
@@ -997,7 +962,7 @@ class Vehicle:
             self.tasks.hold(TaskReason.LATE, now=now)
 
     def _plan_tick(self, *, now: float) -> None:
-        if self.control.is_engaged or self.tasks.begun is not None or self.ladder.is_on:
+        if self.control.is_engaged or self.tasks.begun is not None or self._guard.ladder.is_on:
             self._clock.plan(now=now)
         else:
             self._clock.stop()
@@ -1034,6 +999,7 @@ class Vehicle:
         self._settings = settings
         self._monitor.lost_after = settings.watch.heartbeat_lost
         self.where.motion.apply(settings.watch)
+        self._guard.apply(settings.watch)
         self.requests.apply(settings.watch)
         self.known.apply(settings.profiles, self.system_id)  # used from the next heartbeat on
 
@@ -1048,10 +1014,10 @@ class Vehicle:
                 self.control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 still = seen.still and not self.hold_before.is_open(now=now)
-                slows, disarm = self.ladder.is_slowing(now=now), self._is_back_home
+                slows, disarm = self._guard.ladder.is_slowing(now=now), self._is_back_home
                 self.control.release(still=still, disarm=disarm, now=now, is_slowing=slows)
             case DemandKind.HAND_BACK:
-                slows = self.ladder.is_slowing(now=now)
+                slows = self._guard.ladder.is_slowing(now=now)
                 self.control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)
             case DemandKind.HALT if self.control.phase is not Phase.STOPPING:
                 self._begin_stop(now=now)
