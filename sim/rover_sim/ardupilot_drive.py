@@ -13,14 +13,14 @@ from typing import Protocol
 from rover_sim.body import BodyState
 from rover_sim.estimate import Estimate
 from rover_sim.frames import TURN_RADIUS
-from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits
+from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
 from rover_sim.steering import MAX_YAW_RATE, Demand, Output
 
 ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX, and for braking, too
-STOPPED = 0.1  # m/s, ATC_STOP_SPEED: at zero asked, slower than this, the throttle is cut
+STOPPED = 0.1  # m/s, ATC_STOP_SPEED: once zero is asked, slower than this, the throttle is cut
+SLEW = 1.0  # of full throttle in a second, MOT_SLEWRATE: HOLD cuts the throttle only so fast
 PWM_STEPS = 500  # us from neutral to full
-SPEED_FILTER = 0.15  # s, of the speed that the loop sees
-HOLD_LATE = 4  # control periods until HOLD cuts the throttle; disarming cuts it at once
+ERROR_FILTER = 0.016  # s, ATC_SPEED_FLTE: 10 Hz
 YAW_LIMITS = YawLimits(MAX_YAW_RATE, acceleration=2.1, deceleration=3.5)  # ATC_STR_ACC_MAX
 ROLLED_OUT = 1e-3  # m/s; slower than this the vehicle stands
 
@@ -29,17 +29,19 @@ ROLLED_OUT = 1e-3  # m/s; slower than this the vehicle stands
 class SpeedGains:
     """The loop's gains and the vehicle's answer to the throttle."""
 
-    base: float  # throttle for each m/s asked (CRUISE_THROTTLE by CRUISE_SPEED), 0..1
-    p: float  # throttle for each m/s of error
-    i: float  # the same, for each second that it lasts
+    base: float  # throttle for each m/s asked, 0..1: CRUISE_THROTTLE by CRUISE_SPEED
+    p: float  # throttle for each m/s of error: ATC_SPEED_P
+    i: float  # the same, for each second that it lasts: ATC_SPEED_I
     top: float  # m/s at full throttle
     lag: float  # s, of the vehicle's speed behind its throttle; that of free rolling, too
 
 
-# SITL's "rover": 20 m/s and 10 m/s² at full throttle, so it rolls on with a time constant of 2 s
-ACKERMANN_GAINS = SpeedGains(base=0.02, p=0.12, i=0.2, top=20.0, lag=1.95)
-# "rover-skid": 4 m/s and 14 m/s². The body's own lag of 0.08 s is the rest of the 0.29 s
-SKID_GAINS = SpeedGains(base=0.18, p=0.1, i=0.3, top=4.0, lag=0.25)
+# The parameters of SITL's frames, and their vehicles: speed and acceleration at full throttle.
+# "rover": 30 % for 5 m/s; 20 m/s and 10 m/s², so it rolls on with a time constant of 2 s
+ACKERMANN_GAINS = SpeedGains(base=0.06, p=0.1, i=0.2, top=20.0, lag=2.0)
+# "rover-skid": 75 % for 3 m/s; 4 m/s and 14 m/s², which is a lag of 0.29 s; recorded are 0.05 s
+# more. The body has 0.08 s of both
+SKID_GAINS = SpeedGains(base=0.25, p=0.2, i=0.2, top=4.0, lag=0.26)
 
 
 class Steering(Protocol):
@@ -57,44 +59,44 @@ class ArduPilotDrive:
         self._gains = gains
         self._steering = steering
         self._asked = 0.0  # m/s, what is asked, within the acceleration limit
-        self._seen = 0.0  # m/s, the estimate, filtered
+        self._error = 0.0  # m/s, filtered
         self._integral = 0.0  # throttle
+        self._throttle = 0.0  # of the motors: -1..1, slewed
         self._speed = 0.0  # m/s, of the wheels
-        self._last = 0.0  # throttle
-        self._neutral_for = 0  # control periods
 
     def __repr__(self) -> str:
         return f"ArduPilotDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
-        self._seen += (estimate.forward_speed - self._seen) * _part(SPEED_FILTER)
-        neutral = demand.output is Output.NEUTRAL
-        self._neutral_for = self._neutral_for + 1 if neutral else 0
-        if not 0 < self._neutral_for <= HOLD_LATE:
-            self._last = self._throttle(demand, estimate.forward_speed)
-        throttle = self._last
-        self._speed += (self._gains.top * throttle - self._speed) * _part(self._gains.lag)
-        if throttle == 0.0 and abs(self._speed) < ROLLED_OUT:
+        if demand.output is Output.CONTROLLED:
+            wanted = self._controlled(demand.speed, estimate.forward_speed)
+        else:
+            self._asked, self._error, self._integral = estimate.forward_speed, 0.0, 0.0
+            wanted = 0.0
+        if demand.output is Output.OFF:
+            self._throttle = 0.0
+        else:
+            self._throttle = toward(self._throttle, wanted, SLEW * CONTROL_PERIOD)
+        pulse = round(self._throttle * PWM_STEPS) / PWM_STEPS  # as a whole number of us makes it
+        self._speed += (self._gains.top * pulse - self._speed) * _part(self._gains.lag)
+        if pulse == 0.0 and abs(self._speed) < ROLLED_OUT:
             self._speed = 0.0
         return self._speed, self._steering.step(demand, truth, estimate, self._speed)
 
-    def _throttle(self, demand: Demand, speed: float) -> float:
-        """Return the throttle, -1..1, as a whole number of microseconds makes it."""
-        if demand.output is not Output.CONTROLLED:
-            self._asked, self._integral = self._seen, 0.0
+    def _controlled(self, asked: float, speed: float) -> float:
+        """Return the throttle that the loop wants, -1..1."""
+        self._asked = toward(self._asked, asked, ACCELERATION * CONTROL_PERIOD)
+        if self._asked == asked == 0.0 and abs(speed) <= STOPPED:
+            self._error = self._integral = 0.0
             return 0.0
-        most = ACCELERATION * CONTROL_PERIOD
-        self._asked += max(-most, min(most, demand.speed - self._asked))
-        if demand.speed == 0.0 and abs(speed) < STOPPED:
-            self._asked = self._integral = 0.0
-            return 0.0
-        gains, error = self._gains, self._asked - self._seen
-        self._integral += gains.i * error * CONTROL_PERIOD
-        wanted = gains.base * self._asked + gains.p * error + self._integral
+        gains = self._gains
+        self._error += (self._asked - speed - self._error) * _part(ERROR_FILTER)
+        self._integral += gains.i * self._error * CONTROL_PERIOD
+        wanted = gains.base * self._asked + gains.p * self._error + self._integral
         limited = max(-1.0, min(1.0, wanted))
         self._integral -= wanted - limited
-        return round(limited * PWM_STEPS) / PWM_STEPS
+        return limited
 
 
 class SkidSteering:

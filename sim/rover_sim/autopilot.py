@@ -30,7 +30,7 @@ from rover_sim.mission_storage import MissionStorage
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
-from rover_sim.realism import Home, Realism, Wire
+from rover_sim.realism import Change, Home, Realism, Wire
 from rover_sim.setpoints import Destination
 from rover_sim.sticks import Sticks
 from rover_sim.streams import Streams, with_sticks
@@ -320,10 +320,13 @@ class Autopilot:
         return flight.can_reposition and flight.reposition(place, now=now)
 
     def _announce(self, now: float) -> None:
-        """A heartbeat at once when mode or arming changed, if this autopilot does so."""
+        """Send a heartbeat at once if something changed that this autopilot shows so."""
         timing = self._realism.timing
-        at_once = self._persona.announces_changes if timing is None else timing.announces_changes
-        if self._flight.announce() and at_once:
+        if timing is not None:
+            shown = timing.announces
+        else:
+            shown = ~Change.NOTHING if self._persona.announces_changes else Change.NOTHING
+        if self._flight.take_changes() & shown:
             self._send(messages.Heartbeat.id, now)
 
     def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:

@@ -5,28 +5,36 @@ of its true speed. Where there is no error, there is no estimator: what is seen 
 """
 
 import math
-from dataclasses import replace
 from random import Random
+from typing import NamedTuple
 
 from rover_sim.body import BodyState, wrap_angle
-from rover_sim.motion import CONTROL_PERIOD
-from rover_sim.realism import EstimatorError, Wander
+from rover_sim.motion import CONTROL_PERIOD, toward
+from rover_sim.realism import EstimatorError, PushingError, Wander
 
 PUSHES = 0.1  # m/s; asked for more than this while it stands, it pushes
 STANDS = 0.02  # m/s
 PUSHED_AFTER = 1.0  # s of pushing
-UPSET_FOR = 120.0  # s; recorded of PX4: "for minutes"
+UPSET_FOR = 100.0  # s; recorded of PX4's SIH: from its last pushing until it reports to stand
+GROWS_FOR = 3.0  # s from right to upset, and back: recorded, the heading strays by 7 deg in 5 s
 
 
 class WanderingValue:
-    """One axis of an error: a first-order Gauss-Markov process about a fixed value."""
+    """One axis of an error: a Gauss-Markov process about a fixed value.
+
+    Of the second order, two equal lags one after the other: recorded errors wander smoothly, 0.85
+    alike after 1 s and 0.35 after 3 s, which no single lag gives.
+    """
 
     def __init__(self, wander: Wander, chance: Random) -> None:
         self._chance = chance
         self._fixed = chance.uniform(wander.least, wander.most)
         self._kept = math.exp(-CONTROL_PERIOD / wander.time)
-        self._fresh = wander.spread * math.sqrt(1.0 - self._kept * self._kept)
-        self._wandering = chance.gauss(0.0, wander.spread)
+        driving = wander.spread * math.sqrt(2.0)  # the second lag halves the variance
+        self._fresh = driving * math.sqrt(1.0 - self._kept * self._kept)
+        self._driving = chance.gauss(0.0, driving)
+        # as after a long time: half the driving value, and half the variance on its own
+        self._wandering = 0.5 * self._driving + chance.gauss(0.0, wander.spread * math.sqrt(0.5))
 
     def __repr__(self) -> str:
         return f"WanderingValue({self.value:.4g})"
@@ -38,7 +46,8 @@ class WanderingValue:
 
     def step(self) -> float:
         """Live through one control period; return the error then."""
-        self._wandering = self._wandering * self._kept + self._chance.gauss(0.0, self._fresh)
+        self._driving = self._driving * self._kept + self._chance.gauss(0.0, self._fresh)
+        self._wandering = self._driving + (self._wandering - self._driving) * self._kept
         return self._fixed + self._wandering
 
 
@@ -64,13 +73,11 @@ class Estimator:
         ``asked`` is the speed for which the wheels push, m/s. The velocity is measured in the
         ground's frame: an error of the heading does not turn it.
         """
-        error = self._yaw.step()
+        upset = RIGHT if self._upset is None else self._upset.step(truth, asked=asked)
+        error = self._yaw.step() + upset.yaw
         cos, sin = math.cos(error), math.sin(error)
-        forward = truth.forward_speed * cos + truth.lateral_speed * sin
-        lateral = truth.lateral_speed * cos - truth.forward_speed * sin
-        if self._upset is not None:
-            more_forward, more_right = self._upset.step(truth, asked=asked)
-            forward, lateral = forward + more_forward, lateral + more_right
+        forward = truth.forward_speed * cos + truth.lateral_speed * sin + upset.forward
+        lateral = truth.lateral_speed * cos - truth.forward_speed * sin + upset.right
         return BodyState(  # not replace(): this is called forty times a second
             time=truth.time,
             north=truth.north + self._north.step(),
@@ -85,22 +92,38 @@ class Estimator:
         )
 
 
+class MoreError(NamedTuple):
+    """What an upset estimate is off by, on top of the rest."""
+
+    forward: float  # m/s
+    right: float  # m/s
+    yaw: float  # rad
+
+
+RIGHT = MoreError(0.0, 0.0, 0.0)
+
+
 class Upset:
     """The error of an estimator that has felt its rover push without moving, for minutes."""
 
-    def __init__(self, wander: Wander, chance: Random) -> None:
-        self._forward = WanderingValue(wander, chance)
-        self._right = WanderingValue(replace(wander, least=0.0, most=0.0), chance)
+    def __init__(self, error: PushingError, chance: Random) -> None:
+        self._forward = WanderingValue(error.speed, chance)
+        self._right = WanderingValue(error.speed, chance)
+        self._yaw = WanderingValue(error.yaw, chance)
         self._pushed = 0.0  # s without a break
-        self._left = 0.0  # s until it has recovered
+        self._left = 0.0  # s until it recovers
+        self._share = 0.0  # 0 (right) to 1 (upset)
 
     def __repr__(self) -> str:
         return f"Upset({self._left:.1f} s)"
 
-    def step(self, truth: BodyState, *, asked: float) -> tuple[float, float]:
-        """Live through one control period; return the error forward and to the right, m/s."""
+    def step(self, truth: BodyState, *, asked: float) -> MoreError:
+        """Live through one control period; return the error then."""
         pushes = abs(asked) > PUSHES and abs(truth.forward_speed) < STANDS
         self._pushed = self._pushed + CONTROL_PERIOD if pushes else 0.0
         self._left = UPSET_FOR if self._pushed > PUSHED_AFTER else self._left - CONTROL_PERIOD
-        forward, right = self._forward.step(), self._right.step()
-        return (forward, right) if self._left > 0.0 else (0.0, 0.0)
+        goal = 1.0 if self._left > 0.0 else 0.0
+        share = self._share = toward(self._share, goal, CONTROL_PERIOD / GROWS_FOR)
+        return MoreError(
+            share * self._forward.step(), share * self._right.step(), share * self._yaw.step()
+        )

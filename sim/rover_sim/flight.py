@@ -13,6 +13,7 @@ from rover_sim.home import Follower
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode, ModeNumbers
 from rover_sim.outbox import Outbox
+from rover_sim.realism import Change
 from rover_sim.route import Route, Waypoint
 from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
 from rover_sim.steering import COAST, STOP, Demand
@@ -101,10 +102,12 @@ class FlightControl:
             return waypoint.seq
         return self._missions.current
 
-    def announce(self) -> bool:
-        """Whether mode or arming changed since the last call."""
-        seen, self._announced = self._announced, (self.mode, self.armed)
-        return seen != self._announced
+    def take_changes(self) -> Change:
+        """Return what has changed since the last call."""
+        mode, armed = self._announced
+        self._announced = (self.mode, self.armed)
+        changed = Change.NOTHING if mode is self.mode else Change.MODE
+        return changed if armed is self.armed else changed | Change.ARMING
 
     def request_mode(self, mode: Mode, *, now: float) -> bool:
         """Change the mode at a client's wish."""

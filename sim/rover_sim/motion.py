@@ -24,6 +24,7 @@ class YawLimits:
     rate: float  # rad/s
     acceleration: float  # rad/s²
     deceleration: float  # rad/s²
+    integral: float = YAW_I  # 1/s
 
 
 EXACT_LIMITS = YawLimits(MAX_YAW_RATE, 2.1, 2.1)  # ArduPilot's ATC_STR_ACC_MAX of 120 deg/s²
@@ -51,7 +52,7 @@ class YawControl:
             self._correction = 0.0
             return 0.0  # locked wheels are the exact stop
         error = rate - measured
-        integral = self._correction + YAW_I * error * CONTROL_PERIOD
+        integral = self._correction + limits.integral * error * CONTROL_PERIOD
         self._correction = max(-YAW_I_LIMIT, min(YAW_I_LIMIT, integral))
         return rate + YAW_P * error + self._correction
 

@@ -35,11 +35,12 @@ from rover_sim.realism import (
     PX4_BOOT,
     PX4_ESTIMATOR,
     PX4_REALISM,
+    STICK_SPEEDS,
     BootTimes,
     EstimatorError,
     Gps,
+    PushingError,
     Realism,
-    Wander,
 )
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
@@ -76,7 +77,7 @@ class Persona:
     honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
     realism: Realism  # how unkind it is, unless another is asked for
     estimators: Mapping[Gps, EstimatorError]
-    pushing: Wander | None  # the estimate's further error on an Ackermann rover that pushed, stood
+    pushing: PushingError | None  # the estimate's further error, on an Ackermann rover
     boot: BootTimes  # as long as it really takes
     boot_script: BootScript
     home: HomeRule
@@ -91,13 +92,18 @@ class Persona:
     def on(self, frame: Frame) -> "Persona":
         """Return the same make on another frame; its parameters tell which."""
         pushing = self.pushing if frame is Frame.ACKERMANN else None
-        own = self.realism.estimator
+        realism, own = self.realism, self.realism.estimator
+        adds_speed = realism.stick_speed is not None
         return replace(
             self,
             frame=frame,
             parameters=self.parameters_of(frame),
             estimators={gps: replace(e, pushing=pushing) for gps, e in self.estimators.items()},
-            realism=replace(self.realism, estimator=own and replace(own, pushing=pushing)),
+            realism=replace(
+                realism,
+                estimator=own and replace(own, pushing=pushing),
+                stick_speed=STICK_SPEEDS[frame] if adds_speed else None,
+            ),
         )
 
 

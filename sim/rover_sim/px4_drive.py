@@ -17,6 +17,7 @@ MANY = 1000.0  # m/s² or rad/s²: a limit parameter of 0 or less is none
 # SIH's vehicle, for each kg: 20 N at full throttle; what it takes to break away, and to roll on;
 # drag. The last two fitted: 1.37, 2.50 and 3.25 m/s for 1, 2 and 3 m/s asked.
 THRUST, BREAKAWAY, FRICTION, DRAG = 20.0, 4.9, 3.57, 1.43  # m/s², m/s², m/s², 1/m
+YAW_INTEGRAL = 1.0  # 1/s; recorded, it does not swing after a turn at 195 deg/s: with more it does
 DEAD_TIME = 8  # control periods, from setpoint to thrust
 ROLLED_OUT = 0.03  # m/s
 FREE_ROLLING = 2.0  # s, disarmed. SIH's rolls on for ever, which is its model's and no vehicle's
@@ -126,6 +127,7 @@ def yaw_limits(parameters: Parameters) -> YawLimits:
         rate=math.radians(parameters["RO_YAW_RATE_LIM"]),
         acceleration=math.radians(_limit(parameters["RO_YAW_ACCEL_LIM"])),
         deceleration=math.radians(_limit(parameters["RO_YAW_DECEL_LIM"])),
+        integral=YAW_INTEGRAL,
     )
 
 

@@ -6,8 +6,10 @@ is the opposite: a rover that knows where it is, is ready at once and does what 
 """
 
 from dataclasses import dataclass, fields
-from enum import Enum
+from enum import Enum, Flag, auto
 from math import radians
+
+from rover_sim.frames import Frame
 
 
 class Drive(Enum):
@@ -31,6 +33,14 @@ class Wire(Enum):
     REAL = "real"  # landed state undefined, pre-arm bit in health only, RC_CHANNELS, and the like
 
 
+class Change(Flag):
+    """What a HEARTBEAT can show before its second is over."""
+
+    NOTHING = 0
+    MODE = auto()
+    ARMING = auto()
+
+
 class Gps(Enum):
     """The class of the satellite receiver."""
 
@@ -40,15 +50,23 @@ class Gps(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Wander:
-    """An error that wanders over seconds about a fixed value: a first-order Gauss-Markov process.
+    """An error that wanders over seconds about a fixed value: a Gauss-Markov process.
 
     Not white noise: neighbouring samples are nearly equal, and a mean over a second is as wrong.
     """
 
     spread: float  # standard deviation of one axis, about the fixed value
-    time: float  # s, in which it forgets (autocorrelation 1/e)
+    time: float  # s, of each of two lags: 0.74 alike after so long, 0.2 after three times that
     least: float = 0.0  # the fixed value is drawn between these two
     most: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PushingError:
+    """By how much more it is off after the rover has pushed against what holds it."""
+
+    speed: Wander  # m/s, forward and to the right
+    yaw: Wander  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +78,7 @@ class EstimatorError:
     position: Wander  # m, north and east
     yaw: Wander  # rad
     yaw_rate: Wander  # rad/s
-    pushing: Wander | None = None  # m/s, added after it has pushed and stood; None: no more
+    pushing: PushingError | None = None  # None: pushing does not upset it
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +112,7 @@ class LinkTiming:
     first_answer: float  # s, from a command to its COMMAND_ACK, at least
     last_answer: float  # s, at most
     in_pairs: bool  # positions that are due come late, two at a time
-    announces_changes: bool  # a HEARTBEAT at once when mode or arming changed
+    announces: Change  # what is shown by a HEARTBEAT at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,9 +176,9 @@ PX4_BOOT = BootTimes(
 
 ARDUPILOT_ESTIMATOR = {
     Gps.FINE: EstimatorError(  # standing 0.029 / 0.035 m/s, 0.02 m; yaw +0.7 to +1.1 deg
-        forward_speed=Wander(0.004, 2.0, least=-0.021, most=-0.018),
-        lateral_speed=Wander(0.004, 2.0, least=0.018, most=0.021),
-        position=Wander(0.015, 15.0),
+        forward_speed=Wander(0.0045, 1.6, least=-0.020, most=-0.019),
+        lateral_speed=Wander(0.0045, 1.6, least=0.019, most=0.020),
+        position=Wander(0.018, 8.0),
         yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
         yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
     ),
@@ -174,29 +192,29 @@ ARDUPILOT_ESTIMATOR = {
 }
 PX4_ESTIMATOR = {
     Gps.FINE: EstimatorError(  # standing 0.003 / 0.006 m/s, 0.006 m; yaw -0.1 to +0.1 deg
-        forward_speed=Wander(0.0025, 2.0),
-        lateral_speed=Wander(0.0025, 2.0),
-        position=Wander(0.006, 15.0),
+        forward_speed=Wander(0.0035, 0.8),
+        lateral_speed=Wander(0.0035, 0.8),
+        position=Wander(0.018, 30.0),
         yaw=Wander(radians(0.06), 20.0),
         yaw_rate=Wander(radians(0.022), 0.5),
     ),
-    Gps.METRE: EstimatorError(  # standing 0.037 / 0.064 m/s, 0.08 m; yaw -4.8 to +9.2 deg
-        forward_speed=Wander(0.020, 2.0, least=0.018, most=0.026),
-        lateral_speed=Wander(0.020, 2.0, least=-0.022, most=-0.014),
-        position=Wander(0.11, 60.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
-        yaw=Wander(radians(0.15), 10.0, least=radians(-5.0), most=radians(9.0)),
-        yaw_rate=Wander(radians(0.33), 0.5),
+    Gps.METRE: EstimatorError(  # standing 0.037 / 0.064 m/s, 0.08 m; yaw -1.5 to +0.7 deg
+        forward_speed=Wander(0.020, 1.6, least=0.018, most=0.026),
+        lateral_speed=Wander(0.020, 1.6, least=-0.022, most=-0.014),
+        position=Wander(0.12, 20.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
+        yaw=Wander(radians(0.15), 3.0, least=radians(0.3), most=radians(0.6)),
+        yaw_rate=Wander(radians(0.38), 0.25),
     ),
 }
-PUSHING = Wander(0.2, 5.0, least=0.1, most=0.3)  # standing 0.284 / 0.472 m/s, for minutes
+# standing after it 0.284 / 0.472 m/s; yaw -4.8 to +9.2 deg once, -5.5 to +1.9 another time
+PUSHING = PushingError(speed=Wander(0.22, 1.2), yaw=Wander(radians(6.5), 15.0))
 
 # m/s at full throttle, CRUISE_SPEED / CRUISE_THROTTLE of SITL's frames: 3 / 0.75, 5 / 0.3.
 # Recorded at 1750: 1.9 m/s on skid steer; 2.6 to 3.1 m/s within 3 s on Ackermann, and still rising
-SKID_STICK_SPEED = 4.0
-ACKERMANN_STICK_SPEED = 16.7
+STICK_SPEEDS = {Frame.SKID: 4.0, Frame.DIFFERENTIAL: 4.0, Frame.ACKERMANN: 16.7}
 
-ARDUPILOT_TIMING = LinkTiming(0.010, 0.024, in_pairs=True, announces_changes=True)
-PX4_TIMING = LinkTiming(0.004, 0.062, in_pairs=False, announces_changes=False)
+ARDUPILOT_TIMING = LinkTiming(0.010, 0.024, in_pairs=True, announces=Change.MODE)
+PX4_TIMING = LinkTiming(0.004, 0.062, in_pairs=False, announces=Change.NOTHING)
 
 ARDUPILOT_REALISM = Realism(
     estimator=ARDUPILOT_ESTIMATOR[Gps.FINE],
@@ -205,7 +223,7 @@ ARDUPILOT_REALISM = Realism(
     drive=Drive.REAL,
     home=Home.FOLLOWS,
     wire=Wire.REAL,
-    stick_speed=SKID_STICK_SPEED,
+    stick_speed=STICK_SPEEDS[Frame.SKID],
 )
 PX4_REALISM = Realism(
     estimator=PX4_ESTIMATOR[Gps.FINE],

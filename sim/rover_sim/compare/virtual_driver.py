@@ -9,7 +9,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from mav_tasks.links.memory import MemoryNet
+from mav_tasks.links.memory import Conditions, MemoryNet
 from rover_sim.compare.manoeuvres import Step
 from rover_sim.compare.trace import Heard, Mark, Trace, TruePose
 from rover_sim.vehicle import Vehicle
@@ -36,6 +36,7 @@ SLOW = (
 )
 PLACES = (mav.MAVLINK_MSG_ID_HOME_POSITION, mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 NEVER = math.inf
+LOOPBACK = Conditions(delay=0.0001)  # s each way; the real ones were recorded on one machine
 
 
 class VirtualDriver:
@@ -44,7 +45,7 @@ class VirtualDriver:
     def __init__(self, vehicle: Vehicle) -> None:
         self.trace = Trace()
         self._vehicle = vehicle
-        net = MemoryNet()
+        net = MemoryNet(conditions=LOOPBACK)
         self._link = net.link("driver")
         self._world = VirtualWorld(net)
         self._world.join(RoverParty(vehicle, net.link(ROVER_LINK)), self)
