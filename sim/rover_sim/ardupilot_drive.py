@@ -39,9 +39,8 @@ class SpeedGains:
 # The parameters of SITL's frames, and their vehicles: speed and acceleration at full throttle.
 # "rover": 30 % for 5 m/s; 20 m/s and 10 m/s², so it rolls on with a time constant of 2 s
 ACKERMANN_GAINS = SpeedGains(base=0.06, p=0.1, i=0.2, top=20.0, lag=2.0)
-# "rover-skid": 75 % for 3 m/s; 4 m/s and 14 m/s², which is a lag of 0.29 s; recorded are 0.05 s
-# more. The body has 0.08 s of both
-SKID_GAINS = SpeedGains(base=0.25, p=0.2, i=0.2, top=4.0, lag=0.26)
+# "rover-skid": 75 % for 3 m/s; 4 m/s and 14 m/s², so 0.286 s
+SKID_GAINS = SpeedGains(base=0.25, p=0.2, i=0.2, top=4.0, lag=0.286)
 
 
 class Steering(Protocol):

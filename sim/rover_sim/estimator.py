@@ -62,6 +62,7 @@ class Estimator:
         self._east = WanderingValue(error.position, chance)
         self._yaw = WanderingValue(error.yaw, chance)
         self._yaw_rate = WanderingValue(error.yaw_rate, chance)
+        self._drift = None if error.drift is None else Drift(error.drift, chance)
         self._upset = None if error.pushing is None else Upset(error.pushing, chance)
 
     def __repr__(self) -> str:
@@ -75,13 +76,14 @@ class Estimator:
         """
         upset = RIGHT if self._upset is None else self._upset.step(truth, asked=asked)
         error = self._yaw.step() + upset.yaw
+        away_north, away_east = NOWHERE if self._drift is None else self._drift.step()
         cos, sin = math.cos(error), math.sin(error)
         forward = truth.forward_speed * cos + truth.lateral_speed * sin + upset.forward
         lateral = truth.lateral_speed * cos - truth.forward_speed * sin + upset.right
         return BodyState(  # not replace(): this is called forty times a second
             time=truth.time,
-            north=truth.north + self._north.step(),
-            east=truth.east + self._east.step(),
+            north=truth.north + self._north.step() + away_north,
+            east=truth.east + self._east.step() + away_east,
             down=truth.down,
             yaw=wrap_angle(truth.yaw + error),
             pitch=truth.pitch,
@@ -90,6 +92,24 @@ class Estimator:
             lateral_speed=lateral + self._right.step(),
             yaw_rate=truth.yaw_rate + self._yaw_rate.step(),
         )
+
+
+NOWHERE = (0.0, 0.0)
+
+
+class Drift:
+    """How far a position has strayed over minutes, north and east."""
+
+    def __init__(self, wander: Wander, chance: Random) -> None:
+        self._north = WanderingValue(wander, chance)
+        self._east = WanderingValue(wander, chance)
+
+    def __repr__(self) -> str:
+        return f"Drift({self._north.value:.2f} N, {self._east.value:.2f} E)"
+
+    def step(self) -> tuple[float, float]:
+        """Live through one control period; return the metres then."""
+        return self._north.step(), self._east.step()
 
 
 class MoreError(NamedTuple):

@@ -78,6 +78,7 @@ class EstimatorError:
     position: Wander  # m, north and east
     yaw: Wander  # rad
     yaw_rate: Wander  # rad/s
+    drift: Wander | None = None  # m, north and east, over minutes; None: position has all of it
     pushing: PushingError | None = None  # None: pushing does not upset it
 
 
@@ -185,29 +186,32 @@ ARDUPILOT_ESTIMATOR = {
     Gps.METRE: EstimatorError(  # as with noisy sensors, standing 0.037 / 0.059 m/s
         forward_speed=Wander(0.015, 2.0, least=-0.026, most=-0.018),
         lateral_speed=Wander(0.015, 2.0, least=0.018, most=0.026),
-        position=Wander(0.11, 60.0),  # of PX4's: the noise of that recording was of speed only
+        position=Wander(0.032, 1.0),  # PX4's: the noise of that recording was of speed only
         yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
         yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
+        drift=Wander(0.15, 35.0),
     ),
 }
 PX4_ESTIMATOR = {
     Gps.FINE: EstimatorError(  # standing 0.003 / 0.006 m/s, 0.006 m; yaw -0.1 to +0.1 deg
-        forward_speed=Wander(0.0035, 0.8),
-        lateral_speed=Wander(0.0035, 0.8),
-        position=Wander(0.018, 30.0),
+        forward_speed=Wander(0.0033, 0.6),
+        lateral_speed=Wander(0.0033, 0.6),
+        position=Wander(0.003, 1.0),
         yaw=Wander(radians(0.06), 20.0),
         yaw_rate=Wander(radians(0.022), 0.5),
+        drift=Wander(0.012, 40.0),  # 0.01 / 0.03 m over a drive, 0.03 and 0.06 m at most
     ),
     Gps.METRE: EstimatorError(  # standing 0.037 / 0.064 m/s, 0.08 m; yaw -1.5 to +0.7 deg
-        forward_speed=Wander(0.020, 1.6, least=0.018, most=0.026),
-        lateral_speed=Wander(0.020, 1.6, least=-0.022, most=-0.014),
-        position=Wander(0.12, 20.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
-        yaw=Wander(radians(0.15), 3.0, least=radians(0.3), most=radians(0.6)),
-        yaw_rate=Wander(radians(0.38), 0.25),
+        forward_speed=Wander(0.028, 1.3, least=0.0, most=0.016),
+        lateral_speed=Wander(0.028, 1.3, least=0.0, most=0.016),
+        position=Wander(0.032, 1.0),
+        yaw=Wander(radians(0.14), 2.0, least=radians(0.3), most=radians(0.6)),
+        yaw_rate=Wander(radians(0.36), 0.25),
+        drift=Wander(0.15, 35.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
     ),
 }
 # standing after it 0.284 / 0.472 m/s; yaw -4.8 to +9.2 deg once, -5.5 to +1.9 another time
-PUSHING = PushingError(speed=Wander(0.22, 1.2), yaw=Wander(radians(6.5), 15.0))
+PUSHING = PushingError(speed=Wander(0.22, 1.2), yaw=Wander(radians(7.3), 12.0))
 
 # m/s at full throttle, CRUISE_SPEED / CRUISE_THROTTLE of SITL's frames: 3 / 0.75, 5 / 0.3.
 # Recorded at 1750: 1.9 m/s on skid steer; 2.6 to 3.1 m/s within 3 s on Ackermann, and still rising

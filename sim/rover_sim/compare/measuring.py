@@ -10,7 +10,7 @@ from rover_sim.compare.manoeuvres import drive_all
 from rover_sim.compare.pairs import Pair, make_rover
 from rover_sim.compare.virtual_driver import VirtualDriver
 
-RUNS = 3  # one could be as far off by chance as a recording is
+RUNS = 5  # one could be as far off by chance as a recording is
 
 
 def measure(pair: Pair, *, seed: int, runs: int = RUNS) -> list[Figure]:

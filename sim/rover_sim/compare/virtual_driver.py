@@ -51,7 +51,6 @@ class VirtualDriver:
         self._world.join(RoverParty(vehicle, net.link(ROVER_LINK)), self)
         self._world.watch(self._note_pose)
         self._mav = mav.MAVLink(self, srcSystem=255, srcComponent=190)
-        self._mav.robust_parsing = True
         self._last: dict[str, Any] = {}
         self._throttle: int | None = None
         self._due: dict[Callable[[], None], float] = {
@@ -74,8 +73,7 @@ class VirtualDriver:
     def turn(self, *, now: float) -> None:
         """Read what has come and send what is due."""
         for _, data in self._link.receive(len(self._link.arrived)):
-            for message in self._mav.parse_buffer(data) or ():
-                self._take(message)
+            self._take(self._mav.decode(bytearray(data)))  # a datagram is one whole packet
         for send, at in self._due.items():
             if at <= now:
                 send()

@@ -20,6 +20,8 @@ from rover_sim.realism import (
     PX4_ESTIMATOR,
     EstimatorError,
     Gps,
+    PushingError,
+    Wander,
 )
 
 SEEDS = range(12)
@@ -38,6 +40,11 @@ STANDING = BodyState(
     lateral_speed=0.0,
     yaw_rate=0.0,
 )
+
+
+NONE = Wander(0.0, 1.0)
+EXACTLY = EstimatorError(NONE, NONE, NONE, NONE, NONE)
+STRAYS = Wander(0.0, 1.0, least=math.radians(7), most=math.radians(7))
 
 
 @cache
@@ -77,15 +84,26 @@ def test_a_standing_rover_reports_the_speed_that_real_ones_do(
     assert percentile(seen, 95) == near(p95)
 
 
+@pytest.mark.parametrize(
+    ("error", "after_1_s", "after_3_s"),
+    [
+        (ARDUPILOT_ESTIMATOR[Gps.FINE], 0.83, 0.34),  # in four samples of 20 s 0.83 to 0.87
+        (PX4_ESTIMATOR[Gps.METRE], 0.76, 0.32),  # the mean of eight samples, two axes each
+    ],
+)
+def test_the_speed_error_wanders_over_seconds(
+    error: EstimatorError, after_1_s: float, after_3_s: float
+) -> None:
+    values = [[each.forward_speed for each in standing(error, s, 8000)] for s in SEEDS]
+    assert fmean(correlation(each, CONTROL_RATE) for each in values) == near(after_1_s)
+    assert fmean(correlation(each, 3 * CONTROL_RATE) for each in values) == near(after_3_s)
+
+
 @pytest.mark.parametrize("gps", Gps)
-def test_the_speed_error_wanders_over_seconds(gps: Gps) -> None:
-    after_1_s, after_3_s = [], []
-    for seed in SEEDS:
-        values = [each.forward_speed for each in standing(ARDUPILOT_ESTIMATOR[gps], seed, 8000)]
-        after_1_s.append(correlation(values, CONTROL_RATE))
-        after_3_s.append(correlation(values, 3 * CONTROL_RATE))
-    assert 0.5 < fmean(after_1_s) < 0.85
-    assert 0.15 < fmean(after_3_s) < 0.5
+def test_the_speed_error_is_smooth(gps: Gps) -> None:
+    """Recorded, it changes little within 0.1 s; of a single lag of 2 s it would be 5 %."""
+    values = [each.forward_speed for each in standing(ARDUPILOT_ESTIMATOR[gps], 1, 8000)]
+    assert correlation(values, CONTROL_RATE // 10) > 0.99
 
 
 def correlation(values: list[float], lag: int) -> float:
@@ -152,10 +170,11 @@ def test_the_heading_is_off_by_about_a_degree_on_ardupilot() -> None:
     assert percentile(off, 95) == near(1.1)
 
 
-def test_the_heading_is_off_by_up_to_nine_degrees_with_a_metre_receiver() -> None:
+def test_the_heading_is_right_with_a_metre_receiver_until_it_pushes() -> None:
+    """Recorded of SIH: -1.5 to +0.7 deg while it had not yet driven."""
     off = yaw_errors(PX4_ESTIMATOR[Gps.METRE])
-    assert percentile(off, 5) == near(-4.8)
-    assert percentile(off, 95) == near(9.2)
+    assert min(off) > -1.5
+    assert max(off) < 1.5
 
 
 def test_the_heading_wanders_while_nothing_turns() -> None:
@@ -179,12 +198,13 @@ def test_the_turn_rate_is_as_noisy_as_real_ones(
 
 
 def test_a_wrong_heading_does_not_turn_the_measured_velocity() -> None:
-    estimator = Estimator(PX4_ESTIMATOR[Gps.METRE], seed=2)
+    error = replace(EXACTLY, yaw=Wander(0.0, 1.0, least=math.radians(5), most=math.radians(5)))
+    estimator = Estimator(error, seed=2)
     moving = replace(STANDING, forward_speed=2.0)
     seen = estimator.see(moving, asked=2.0)
     course = seen.yaw + math.atan2(seen.lateral_speed, seen.forward_speed)
     assert abs(math.degrees(seen.yaw - moving.yaw)) > 2.0
-    assert math.degrees(course) == pytest.approx(math.degrees(moving.yaw), abs=2.0)
+    assert math.degrees(course) == pytest.approx(math.degrees(moving.yaw), abs=1e-6)
 
 
 def test_the_same_seed_gives_the_same_errors_and_another_gives_others() -> None:
@@ -200,15 +220,40 @@ def test_errors_do_not_leap() -> None:
     assert max(steps) < 0.02
 
 
-def test_pushing_against_what_holds_it_upsets_the_estimate_for_minutes() -> None:
+def pushed(seed: int) -> list[BodyState]:
+    """Return what it sees in the minute after it has pushed for 5 s, as recorded."""
     upset = replace(PX4_ESTIMATOR[Gps.METRE], pushing=PUSHING)
-    off: list[float] = []
-    for seed in SEEDS:
-        estimator = Estimator(upset, seed=seed)
-        before = [estimator.see(STANDING, asked=0.0) for _ in range(200)]
-        assert max(speeds(before)) < 0.15
-        for _ in range(round(2.0 / CONTROL_PERIOD)):
-            estimator.see(STANDING, asked=0.5)
-        off += speeds([estimator.see(STANDING, asked=0.0) for _ in range(60 * CONTROL_RATE)])
+    estimator = Estimator(upset, seed=seed)
+    before = [estimator.see(STANDING, asked=0.0) for _ in range(200)]
+    assert max(speeds(before)) < 0.15
+    for _ in range(round(5.0 / CONTROL_PERIOD)):
+        estimator.see(STANDING, asked=0.5)
+    return [estimator.see(STANDING, asked=0.0) for _ in range(60 * CONTROL_RATE)]
+
+
+def test_pushing_against_what_holds_it_upsets_the_speed_for_minutes() -> None:
+    off = [speed for seed in SEEDS for speed in speeds(pushed(seed))]
     assert percentile(off, 50) == near(0.284)
     assert percentile(off, 95) == near(0.472)
+
+
+def test_pushing_against_what_holds_it_upsets_the_heading() -> None:
+    """Recorded of SIH: 4.1 deg in the middle and 9.2 in one time of twenty; 5.5 another time."""
+    off = [
+        abs(math.degrees(each.yaw - STANDING.yaw))
+        for seed in range(30)
+        for each in pushed(seed)[::CONTROL_RATE]
+    ]
+    assert percentile(off, 50) == near(4.1)
+    assert 5.5 / FACTOR < percentile(off, 95) < 9.2 * 1.7
+
+
+def test_an_estimate_is_upset_and_recovers_by_and_by() -> None:
+    """No leap: recorded, the heading strayed by 7 deg within 5 s."""
+    upset = replace(EXACTLY, pushing=PushingError(speed=NONE, yaw=STRAYS))
+    estimator = Estimator(upset, seed=0)
+    seen = [estimator.see(STANDING, asked=0.5).yaw for _ in range(5 * CONTROL_RATE)]
+    seen += [estimator.see(STANDING, asked=0.0).yaw for _ in range(120 * CONTROL_RATE)]
+    assert max(seen) - STANDING.yaw == pytest.approx(STRAYS.most)
+    assert seen[-1] == pytest.approx(STANDING.yaw)
+    assert max(abs(b - a) for a, b in pairwise(seen)) < math.radians(0.1)

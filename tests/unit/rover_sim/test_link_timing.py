@@ -68,6 +68,17 @@ def test_ardupilot_shows_a_new_mode_at_once() -> None:
     assert rig.times(m.Heartbeat)[0] - asked < 0.03
 
 
+def test_ardupilot_shows_arming_with_its_next_heartbeat() -> None:
+    """Recorded, disarming was to be seen 0.5 and 0.75 s later."""
+    rig = RealRig(ARDUPILOT, wait=3.3)
+    rig.arrivals.clear()
+    asked = rig.now
+    rig.send(m.CommandLong(1, 1, MavCmd.COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0))
+    rig.run(1.0)
+    assert rig.autopilot.armed
+    assert 0.3 < rig.times(m.Heartbeat)[0] - asked < 1.0
+
+
 def test_px4_shows_a_new_mode_with_its_next_heartbeat() -> None:
     rig = RealRig(PX4, wait=3.3)
     rig.arrivals.clear()

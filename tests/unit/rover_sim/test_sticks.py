@@ -6,6 +6,7 @@ import pytest
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
+from rover_sim.frames import Frame
 from rover_sim.personas import ARDUPILOT, PX4
 from rover_sim.realism import EXACT
 from tests.unit.rover_sim.real_rig import RealRig
@@ -36,6 +37,22 @@ def test_the_throttle_stick_drives_in_guided_whatever_is_asked(asked: float) -> 
     rig.send(throttle(0))
     rig.run(4.0, velocity(asked))
     assert rig.truth.forward_speed == pytest.approx(asked, abs=0.1)
+
+
+def test_an_ackermann_rover_drives_faster_by_the_stick_and_swings_back_beyond_zero() -> None:
+    """Recorded with 0 m/s asked: 2.6 m/s after 3 s, and -0.41 m/s after the release."""
+    rig = RealRig(ARDUPILOT.on(Frame.ACKERMANN))
+    rig.get_ready()
+    for _ in range(30):
+        rig.send(throttle(1750))
+        rig.run(0.1, velocity(0.0))
+    assert 2.6 / 1.5 < rig.truth.forward_speed < 2.6 * 1.5
+    rig.send(throttle(0))
+    speeds = []
+    for _ in range(40):
+        rig.run(0.1, velocity(0.0))
+        speeds.append(rig.truth.forward_speed)
+    assert 0.41 / 1.5 < -min(speeds) < 0.41 * 1.5
 
 
 def test_an_override_that_is_not_repeated_ends_after_three_seconds() -> None:
