@@ -4,8 +4,8 @@ They are those that the reference figures come from, so that the two can be comp
 """
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+
+from rover_sim.compare.driver import Driver, Step
 
 STANDING_TIME = 40.0  # s disarmed, half of it armed
 #: s from a real one's first message to its first HEARTBEAT, by which a driver knows it. The
@@ -21,18 +21,6 @@ HOLD, SILENCE, DISARM = "HOLD at 1 m/s", "set-points end at 1 m/s", "disarm at 1
 DISARMED, DRIVEN, DISARMED_AGAIN = "home: disarmed", "home: driven", "home: disarmed again"
 THEN_ZEROS = ", then zeros"
 FREE, PUSHED, RELEASED = "stick free, ", "stick forward, ", "stick released, "
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """A set-point that is streamed for some seconds, then zeros."""
-
-    name: str
-    speed: float  # m/s
-    yaw_rate: float = 0.0  # rad/s, clockwise; a PX4 rover gets a velocity that turns so fast
-    aside: float = 0.0  # rad from the heading: the way of the velocity, on PX4
-    seconds: float = 5.0
-    rest: float = 5.0  # s of zeros
 
 
 SPEED_STEPS = (
@@ -54,66 +42,6 @@ SIDEWAYS = (
 )
 BEND = Step("0.5 m/s with 20 deg/s", 0.5, math.radians(20))
 STICK_SPEEDS = (("0 m/s", 0.0), ("0.5 m/s", 0.5))
-
-
-class Driver(Protocol):
-    """Somebody who can drive a rover by MAVLink and who records what happens."""
-
-    @property
-    def is_px4(self) -> bool:
-        """Whether the rover is a PX4."""
-        ...
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether it is armed and takes set-points."""
-        ...
-
-    @property
-    def is_armed(self) -> bool:
-        """Whether its last HEARTBEAT says armed."""
-        ...
-
-    @property
-    def reported_speed(self) -> float:
-        """The speed that it last reported, m/s."""
-        ...
-
-    def mark(self, name: str) -> None:
-        """Note that a manoeuvre begins."""
-        ...
-
-    def wait(self, seconds: float) -> None:
-        """Let time pass without a set-point."""
-        ...
-
-    def wait_for_rover(self) -> None:
-        """Let time pass until the rover is heard."""
-        ...
-
-    def drive(self, seconds: float, step: Step) -> None:
-        """Stream the step's set-point."""
-        ...
-
-    def take_control(self) -> bool:
-        """Ask for the mode that takes set-points; return whether it was accepted."""
-        ...
-
-    def hold(self) -> bool:
-        """Ask for the mode HOLD; return whether it was accepted."""
-        ...
-
-    def arm(self) -> bool:
-        """Ask it to arm; return whether it was accepted."""
-        ...
-
-    def disarm(self) -> bool:
-        """Ask it to disarm; return whether it was accepted."""
-        ...
-
-    def push_stick(self, throttle: int | None) -> None:
-        """Hold the throttle stick so (µs), by RC_CHANNELS_OVERRIDE; None releases it."""
-        ...
 
 
 ZEROS = Step("zeros", 0.0)

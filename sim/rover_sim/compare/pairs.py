@@ -44,7 +44,7 @@ PX4_ACKERMANN = Pair(
     gps=Gps.METRE,
 )
 
-#: in the order of the columns of the reference table
+#: in the order of the columns of the reference tables
 PAIRS = (ARDUPILOT_SKID, ARDUPILOT_ACKERMANN, PX4_DIFFERENTIAL, PX4_ACKERMANN)
 
 

@@ -9,7 +9,9 @@ ground station. Recorded in November 2026, real time, through the same manoeuvre
 
 from rover_sim.compare.figure import Value
 from rover_sim.compare.pairs import PAIRS, Pair
-from rover_sim.compare.reference_table import NOT_DRIVEN, TABLE
+from rover_sim.compare.reference_driving import DRIVING
+from rover_sim.compare.reference_reports import REPORTS
+from rover_sim.compare.reference_row import NOT_DRIVEN
 
 Key = tuple[str, str]  # group and name of a figure
 
@@ -19,7 +21,7 @@ def reference_of(pair: Pair) -> dict[Key, Value]:
     column = PAIRS.index(pair)
     return {
         (group, name): values[column]
-        for group, rows in TABLE.items()
+        for group, rows in {**REPORTS, **DRIVING}.items()
         for name, values in rows.items()
         if values[column] != NOT_DRIVEN
     }

@@ -10,7 +10,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from mav_tasks.links.memory import Conditions, MemoryNet
-from rover_sim.compare.manoeuvres import Step
+from rover_sim.compare.driver import Step
 from rover_sim.compare.trace import Heard, Mark, Trace, TruePose
 from rover_sim.vehicle import Vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld

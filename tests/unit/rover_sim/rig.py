@@ -167,8 +167,9 @@ class Px4Rig(Rig):
         wait: float = READY,
         persona: Persona = PX4,
         realism: Realism = EXACT,
+        slip: float = 0.3,
     ) -> None:
-        super().__init__(start=start, wait=wait, persona=persona, realism=realism)
+        super().__init__(start=start, wait=wait, persona=persona, realism=realism, slip=slip)
 
     def set_mode(self, custom_mode: int) -> MavResult:
         return self.command(

@@ -5,6 +5,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rover_sim.compare.driver import Step
 from rover_sim.compare.figure import (
     ANGLE,
     DISTANCE,
@@ -17,7 +18,7 @@ from rover_sim.compare.figure import (
     turned_either_way,
 )
 from rover_sim.compare.figures.motion import rest_of
-from rover_sim.compare.manoeuvres import SPEED_STEPS, THEN_ZEROS, Step
+from rover_sim.compare.manoeuvres import SPEED_STEPS, THEN_ZEROS
 from rover_sim.compare.trace import Trace, TruePose, path_length
 
 STEADY_FROM = 0.6  # of the step's time: overshoot is over by then

@@ -4,6 +4,7 @@ import math
 import statistics
 from collections.abc import Sequence
 
+from rover_sim.compare.driver import Step
 from rover_sim.compare.figure import (
     ANGLE,
     DISTANCE,
@@ -14,7 +15,7 @@ from rover_sim.compare.figure import (
     turned,
     turned_either_way,
 )
-from rover_sim.compare.manoeuvres import BEND, SIDEWAYS, SPOT_TURNS, THEN_ZEROS, Step
+from rover_sim.compare.manoeuvres import BEND, SIDEWAYS, SPOT_TURNS, THEN_ZEROS
 from rover_sim.compare.trace import Span, Trace, TruePose, path_length
 
 
