@@ -177,8 +177,8 @@ PX4_BOOT = BootTimes(
 
 ARDUPILOT_ESTIMATOR = {
     Gps.FINE: EstimatorError(  # standing 0.029 / 0.035 m/s, 0.02 m; yaw +0.7 to +1.1 deg
-        forward_speed=Wander(0.0045, 1.6, least=-0.020, most=-0.019),
-        lateral_speed=Wander(0.0045, 1.6, least=0.019, most=0.020),
+        forward_speed=Wander(0.0045, 1.6, least=-0.0195, most=-0.0185),
+        lateral_speed=Wander(0.0045, 1.6, least=0.0185, most=0.0195),
         position=Wander(0.018, 8.0),
         yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
         yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),

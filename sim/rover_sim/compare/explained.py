@@ -67,6 +67,13 @@ HEADING_ERROR = "It follows the error of the heading, which wanders by chance."
 PX4_DIFFERENTIAL_ONLY = (
     Explanation(
         "px4-differential",
+        STANDING,
+        "reported speed, max",
+        (0.005, 0.019),
+        "Four times 20 s recorded gave 0.005 to 0.019 m/s.",
+    ),
+    Explanation(
+        "px4-differential",
         "Standing armed",
         "reported yaw rate, *",
         (0.0, 1.5),
@@ -152,10 +159,17 @@ EXPLANATIONS: tuple[Explanation, ...] = (
     Explanation("*", STANDING, "* alike after 3 s", (-0.6, 0.9), SHORT_SAMPLE),
     Explanation(
         "ardupilot-*",
-        "Standing disarmed",
+        STANDING,
         "reported position from its mean, *",
         (0.0, 0.04),
         "The recorded position wandered by 2 mm in these 20 s, and by 21 mm in the next.",
+    ),
+    Explanation(
+        "ardupilot-*",
+        STANDING,
+        "reported speed below 0.03 m/s",
+        (30.0, 100.0),
+        "It wanders about 0.027 m/s, next to the limit: 20 s recorded gave 100 %, the next 58 %.",
     ),
     Explanation(
         "ardupilot-*",
