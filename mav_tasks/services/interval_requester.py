@@ -23,6 +23,9 @@ WANTED: dict[int, float] = {
     m.RcChannels.id: 0.1,  # sticks that leave neutral
 }
 
+#: what some vehicles have nothing to say in: asked for once, and again only if it has come
+OPTIONAL = frozenset({m.RcChannels.id})
+
 SHORTEST = 0.02  # s: what a vehicle's main loop can give; a shorter one is refused altogether
 MAX_WANTED = 64  # messages; clients can name more ids than any vehicle has
 
@@ -111,6 +114,7 @@ class IntervalRequester:
             expected = seconds / interval
             if (
                 expected >= 2
+                and not (message_id in OPTIONAL and not self._count.get(message_id))
                 and self._count.get(message_id, 0) < ENOUGH * expected
                 and message_id not in self._refused
             ):

@@ -257,7 +257,7 @@ class Executor:
     def _start(self, task: Task, seen: VehicleView, now: float) -> Demand:
         is_waited_for = now - self._since < self._settings.watch.ready_timeout
         is_not_ready = self.waits_for[0] is R.NOT_READY and is_waited_for and not has_moved(task)
-        if is_not_ready and self._is_lost(seen, now):
+        if is_not_ready and start_blocker(seen, watch=self._settings.watch, now=now):
             self._taking_since = now
             return view.HOLD
         if self._pause_if_lost(seen, now):

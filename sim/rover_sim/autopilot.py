@@ -33,7 +33,7 @@ from rover_sim.personas import Mode, Persona
 from rover_sim.realism import Change, Home, Realism, Wire
 from rover_sim.setpoints import Destination
 from rover_sim.sticks import Sticks
-from rover_sim.streams import Streams, with_sticks
+from rover_sim.streams import OFF, Streams, with_sticks
 from rover_sim.telemetry import Telemetry
 from rover_sim.timing import Departures
 
@@ -213,9 +213,9 @@ class Autopilot:
         self._up_at = up_at
         self._gps = GpsLoss()
         self._runtime_due = up_at + RUNTIME_INTERVAL
-        table = persona.streams
-        if realism.wire is Wire.REAL:
-            table = with_sticks(table, UNASKED_STICKS)
+        # a tidy one takes the request for RC_CHANNELS, too, and has nothing to say
+        shows_sticks = realism.wire is Wire.REAL
+        table = with_sticks(persona.streams, UNASKED_STICKS if shows_sticks else OFF)
         self._streams = Streams(table, now=up_at)
         boot = Boot(realism.boot, persona.boot_script, started=up_at)
         self._motion = drive_train_of(realism.drive, persona.drive, persona.frame, self._parameters)

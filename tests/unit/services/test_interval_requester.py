@@ -5,6 +5,7 @@ from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.services.interval_requester import (
     CHECK,
     MAX_WANTED,
+    OPTIONAL,
     SHORTEST,
     WANTED,
     IntervalRequester,
@@ -77,7 +78,15 @@ def test_what_was_not_answered_is_asked_for_again() -> None:
     requester = IntervalRequester(now=0.0)
     asked(requester, now=0.0, accepted=None)
     frequent = [number for number, interval in WANTED.items() if CHECK / interval >= 2]
-    assert asked(requester, now=CHECK) == frequent
+    assert asked(requester, now=CHECK) == [each for each in frequent if each not in OPTIONAL]
+
+
+def test_what_a_vehicle_may_have_nothing_to_say_in_is_asked_for_again_once_it_came() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    for number in OPTIONAL:
+        requester.heard(number)
+    assert set(asked(requester, now=CHECK)) >= OPTIONAL
 
 
 def test_after_a_restart_of_the_vehicle_everything_is_asked_for_again() -> None:
