@@ -36,14 +36,16 @@ RAISE = 1.6  # times the least speed, when it had no effect
 MOST_CREEP = 0.4  # m/s or rad/s, the most that it is raised to
 LONGEST_LAG = 2.5  # s; 1.7 was measured
 MOST_COAST = 0.12  # m or rad before the end at which zero is asked for at the most
+#: the same of a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot's)
+MOST_COAST_OF_CAR, LAG_OF_CAR = 1.0, 0.95  # m, s
 GAIN_BY_LAG = 0.7  # the approach is slower for a rover that rolls on for longer
 
 
 class Creeping:
     """What was learnt of one rover's slowest motion, along or around: kept for all its tasks."""
 
-    def __init__(self, *, least: float, lag: float) -> None:
-        self._least_known = least
+    def __init__(self, *, least: float, lag: float, most: float = MOST_COAST) -> None:
+        self._least_known, self._most = least, most
         self.least = least  # m/s or rad/s that moves it
         self.lag = lag  # s times the speed: how far it rolls on after zero
 
@@ -52,7 +54,7 @@ class Creeping:
 
     def coast(self, speed: float) -> float:
         """Return how far before the end zero is to be asked for, m or rad."""
-        return min(abs(speed) * self.lag, MOST_COAST)
+        return min(abs(speed) * self.lag, self._most)
 
     def gain(self, usual: float) -> float:
         """Return the speed per distance left, 1/s, that does not overshoot."""
@@ -83,6 +85,7 @@ class Arrival:
     def __init__(self) -> None:
         self.along = Creeping(least=CREEP_SPEED, lag=0.1)
         self.around = Creeping(least=CREEP_RATE, lag=0.05)
+        self.as_car = Creeping(least=CREEP_SPEED, lag=LAG_OF_CAR, most=MOST_COAST_OF_CAR)
         self._is_settling = False  # zero is asked for until it stands
         self._gives_up = False  # what it reached is good enough, if it is near
         self._corrections = 0
@@ -95,10 +98,10 @@ class Arrival:
     def __repr__(self) -> str:
         return f"Arrival({self.along}, {self.around}, corrected {self._corrections} times)"
 
-    @property
-    def slowest(self) -> Slowest:
-        """How the last of a leg is to be driven."""
-        along, around = self.along, self.around
+    def slowest(self, course: Course) -> Slowest:
+        """Return how the last of a leg is to be driven."""
+        along = self.along if course.steering is None else self.as_car
+        around = self.around
         return Slowest(along.least, around.least, along.gain(APPROACH_GAIN), around.gain(TURN_GAIN))
 
     def begin_leg(self) -> None:
@@ -108,6 +111,7 @@ class Arrival:
         self._left_at_zero = self._best_at = self._crept = None
         self.along.begins_again()
         self.around.begins_again()
+        self.as_car.begins_again()
 
     def stands_here(
         self,
@@ -129,13 +133,13 @@ class Arrival:
             return self._judge(course, driving=driving)
         self._watch(course, driving=driving, now=now)
         self._look_for_effect(course, motion, last, now=now)
-        asked = self._asked(course, last)
-        coast = self._creeping(course).coast(asked)
+        speed = max(self._asked(course, last), self._measured(course, motion))
+        coast = self._creeping(course).coast(speed)
         if self._is_settling or self._gives_up:
             return True
         if course.has_arrived(stands=False, driving=driving, coast=coast):
             self._is_settling = True
-            self._left_at_zero = (course.remaining, asked) if asked else None
+            self._left_at_zero = (course.remaining, speed) if speed else None
             return True
         return False
 
@@ -180,7 +184,13 @@ class Arrival:
             self._crept = None
 
     def _creeping(self, course: Course) -> Creeping:
-        return self.around if isinstance(course.leg, Rotate) else self.along
+        if isinstance(course.leg, Rotate):
+            return self.around
+        return self.along if course.steering is None else self.as_car
+
+    def _measured(self, course: Course, motion: Motion) -> float:
+        """What it does: a rover slows down later than it is asked to."""
+        return abs(motion.yaw_rate if isinstance(course.leg, Rotate) else motion.forward)
 
     def _asked(self, course: Course, last: Velocity) -> float:
         return abs(last.yaw_rate if isinstance(course.leg, Rotate) else last.forward)

@@ -403,7 +403,7 @@ class Executor:
             self._set_aside_as_astray(task, now=now)
             return view.HOLD
         speed = None if course is self._way_back else course.progress.speed
-        driving, slowest = self._driving_of(task), self._arrival.slowest
+        driving, slowest = self._driving_of(task), self._arrival.slowest(course)
         wish = course.steer(motion, driving=driving, speed=speed, slowest=slowest)
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
