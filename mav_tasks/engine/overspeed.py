@@ -32,7 +32,7 @@ class Overspeed:
         while self._asked[0][0] < now - LATELY:
             self._asked.popleft()
         most = max(each for _, each in self._asked)
-        if speed <= OVERSHOOT * most + NOISE:
+        if most == 0.0 or speed <= OVERSHOOT * most + NOISE:  # told to stand: ``stop_ladder``'s
             self._since = None
             return None
         if self._since is None:

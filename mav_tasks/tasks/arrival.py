@@ -37,7 +37,7 @@ MOST_CREEP = 0.4  # m/s or rad/s, the most that it is raised to
 LONGEST_LAG = 2.5  # s; 1.7 was measured
 MOST_COAST = 0.12  # m or rad before the end at which zero is asked for at the most
 #: the same of a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot's)
-MOST_COAST_OF_CAR, LAG_OF_CAR = 1.0, 0.95  # m, s
+MOST_COAST_OF_CAR = 1.0  # m
 GAIN_BY_LAG = 0.7  # the approach is slower for a rover that rolls on for longer
 
 
@@ -85,7 +85,7 @@ class Arrival:
     def __init__(self) -> None:
         self.along = Creeping(least=CREEP_SPEED, lag=0.1)
         self.around = Creeping(least=CREEP_RATE, lag=0.05)
-        self.as_car = Creeping(least=CREEP_SPEED, lag=LAG_OF_CAR, most=MOST_COAST_OF_CAR)
+        self.as_car = Creeping(least=CREEP_SPEED, lag=0.1, most=MOST_COAST_OF_CAR)
         self._is_settling = False  # zero is asked for until it stands
         self._gives_up = False  # what it reached is good enough, if it is near
         self._corrections = 0
