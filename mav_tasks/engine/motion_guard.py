@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 from mav_tasks.engine.motion_monitor import MotionMonitor
 from mav_tasks.engine.overspeed import Overspeed
-from mav_tasks.engine.stop_ladder import NO_EFFECT, Step, StopLadder
+from mav_tasks.engine.stop_ladder import MOVES, NO_EFFECT, Step, StopLadder
 from mav_tasks.settings import Watch
 
 NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
 SWINGS = 1.0  # s in which a car may swing back after its task's own zeros: to 0.15 m/s (ArduPilot)
+RUNS_ON = 0.4  # m/s on those, that are more than a speed loop that has wound up
 SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
 
 
@@ -97,10 +98,12 @@ class MotionGuard:
         speed = self._speed(now=now)
         if speed is None and not told.is_stopping:
             return []  # zeros go on, and HOLD follows them: nobody knows of a car that HOLD rolls
+        is_own = told.may_drive and not told.is_stopping  # the zeros of a task that goes on
         step = self.ladder.climb(
             speed=speed,
             is_held=told.is_held,
-            patience=SWINGS if told.may_drive and not told.is_stopping else NO_EFFECT,
+            patience=SWINGS if is_own else NO_EFFECT,
+            moves=RUNS_ON if is_own else MOVES,
             disarm_after=self._watch.disarm_moving or inf,
             now=now,
         )

@@ -80,17 +80,19 @@ class StopLadder:
         disarm_after: float,
         now: float,
         patience: float = NO_EFFECT,
+        moves: float = MOVES,
     ) -> Step | None:
         """Return the step that is due now and was not before; None if there is none.
 
         ``speed`` is m/s by displacement, None where nothing fresh is known of it; ``is_held``
         whether the vehicle shows HOLD. ``disarm_after`` is in s after HOLD was seen, ``patience``
-        in s without getting slower, after which set-points have no effect.
+        in s without getting slower, after which set-points have no effect, if it is faster than
+        ``moves`` m/s.
         """
         self._look(speed, now)
         if is_held and self._hold_seen_at is None:
             self._hold_seen_at = now
-        if self.step is Step.SETPOINTS and self._has_no_effect(speed, patience, now):
+        if self.step is Step.SETPOINTS and self._has_no_effect(speed, patience, moves, now):
             self.step = Step.HOLD
             return Step.HOLD
         if self.step is Step.SETPOINTS and is_held:
@@ -108,12 +110,14 @@ class StopLadder:
         self.step = Step.DISARM
         return Step.DISARM
 
-    def _has_no_effect(self, speed: float | None, patience: float, now: float) -> bool:
+    def _has_no_effect(
+        self, speed: float | None, patience: float, moves: float, now: float
+    ) -> bool:
         if now - self._began < REACTION + patience:
             return False
         if speed is None:
             return True
-        return speed > MOVES and now - self._slowed_at >= patience
+        return speed > moves and now - self._slowed_at >= patience
 
     def _look(self, speed: float | None, now: float) -> None:
         if speed is None:

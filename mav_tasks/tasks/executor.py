@@ -38,6 +38,9 @@ from mav_tasks.tasks.way_back import is_off_line, way_back
 
 S, R = TaskState, TaskReason
 
+#: m/s and s after which a vehicle that creeps on zeros is driven: a speed loop that has wound up on
+#: the estimate's offset may never let it stand (PX4, RO_SPEED_I 0.5)
+CREEPS, CREEPS_FOR = 0.3, 6.0
 #: times that a vehicle may drive past a place that its turning circle keeps it from
 MISSES = 3
 ASK_AGAIN = 4.0  # s, from the end of a try to arm to the next one, while a vehicle is not ready
@@ -278,7 +281,8 @@ class Executor:
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
-        if not seen.still:  # the heading at the start is that of a vehicle at rest
+        creeps = now - self._taking_since > CREEPS_FOR and motion.speed < CREEPS
+        if not seen.still and not creeps:  # the heading at the start is that of a vehicle at rest
             if now - self._since > 2 * self._settings.watch.start_timeout:
                 self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
                 return view.HOLD
