@@ -1,0 +1,121 @@
+"""The thirty tasks: what each asks, and where the rover is then."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import cos, pi, radians, sin
+
+from mav_tasks.client.wire import Goal
+from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate
+from rover_sim.field_trial.track import Place
+
+COUNT = 30  # tasks that are driven
+FAR = 30.0  # m, the longest go-to
+NEAR = 3.0  # m
+TURNS = (90.0, -90.0, 180.0, 45.0, -45.0, 120.0, -120.0, 30.0)  # deg
+DISTANCES = (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """Where the rover says that it is, and where it began the trial."""
+
+    now: Place
+    begun: Place
+
+    def ahead(self, forward: float, right: float) -> LocalPlace:
+        """Return the place that is so far from the trial's beginning, as the rover stood then."""
+        yaw = self.begun.yaw
+        north = self.begun.north + forward * cos(yaw) - right * sin(yaw)
+        east = self.begun.east + forward * sin(yaw) + right * cos(yaw)
+        return LocalPlace(north, east)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """One task: its words, its goals, and the end that it promises as the rover tells places."""
+
+    words: str
+    goals: tuple[Goal, ...]
+    end: Place | None = None  # None: a turn
+    turn: float | None = None  # rad
+
+
+Maker = Callable[[Where], Asked]
+
+
+def move(distance: float) -> Maker:
+    """Return a move along the heading."""
+
+    def make(where: Where) -> Asked:
+        yaw = where.now.yaw
+        end = where.now.moved(distance * cos(yaw), distance * sin(yaw))
+        return Asked(f"move {distance:g} m", (Move(distance),), end)
+
+    return make
+
+
+def turn(angle: float) -> Maker:
+    """Return a turn on the spot, deg."""
+
+    def make(_where: Where) -> Asked:
+        return Asked(f"turn {angle:g} deg", (Rotate(radians(angle)),), turn=radians(angle))
+
+    return make
+
+
+def go(forward: float, right: float) -> Maker:
+    """Return a way to a place, by the trial's beginning."""
+
+    def make(where: Where) -> Asked:
+        place = where.ahead(forward, right)
+        end = Place(0.0, place.north, place.east, 0.0)
+        return Asked(f"go to {forward:g}, {right:g} m", (GoTo(place),), end)
+
+    return make
+
+
+def near(distance: float) -> Maker:
+    """Return a way to a place so far ahead of where the rover is."""
+
+    def make(where: Where) -> Asked:
+        yaw = where.now.yaw
+        end = where.now.moved(distance * cos(yaw), distance * sin(yaw))
+        return Asked(f"go {distance:g} m ahead", (GoTo(LocalPlace(end.north, end.east)),), end)
+
+    return make
+
+
+def mission(where: Where) -> Asked:
+    """Return five places, 6 m apart in a wide arc that suits a car as well."""
+    bearings = (0.0, pi / 4, pi / 2, 3 * pi / 4, pi)
+    forward, right, places = 4.0, 0.0, []
+    for bearing in bearings:
+        forward += 6.0 * cos(bearing)
+        right += 6.0 * sin(bearing)
+        places.append(where.ahead(forward, right))
+    last = places[-1]
+    goals = tuple(GoTo(place) for place in places)
+    return Asked("mission of 5", goals, Place(0.0, last.north, last.east, 0.0))
+
+
+def home(where: Where) -> Asked:
+    """Return the way home, which is where the trial began."""
+    return Asked("return", (GoTo(None),), where.begun)
+
+
+def plan() -> Sequence[Maker]:
+    """Return the thirty tasks, with further moves where a rover turns down turns or reversing."""
+    return (
+        *(move(0.3), move(0.5), turn(90), move(1.0), turn(-90), move(2.0), move(-1.0), turn(45)),
+        *(move(0.3), turn(-45), move(3.0), turn(180), move(3.0), turn(120), turn(60), near(NEAR)),
+        *(go(FAR, 0.0), go(20.0, 8.0), move(0.5), turn(-120), move(-1.0), go(0.0, 0.0), move(10.0)),
+        *(turn(30), move(1.0), move(5.0), mission, move(0.3), move(2.0), home),
+    )
+
+
+def further() -> Sequence[Maker]:
+    """Return what is driven instead of what the rover turns down, before the way home."""
+    return (
+        *(near(NEAR), move(0.3), move(0.5), move(1.0), go(10.0, 4.0), move(2.0), near(NEAR)),
+        *(move(0.3), go(18.0, -4.0), move(1.0), move(0.5), move(0.3), go(2.0, 0.0)),
+    )

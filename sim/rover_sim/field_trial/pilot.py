@@ -1,0 +1,132 @@
+"""Drives the rover itself, without the server: which way of stopping is the better one?"""
+
+import asyncio
+from collections.abc import Callable
+from enum import Enum
+from math import cos, sin
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mav
+
+from mav_tasks.links.base import Link
+from rover_sim.field_trial.endpoint import Endpoint
+from rover_sim.field_trial.track import Place, Track
+
+PERIOD = 0.05  # s between setpoints, 20 Hz
+RATE_US = 40_000  # of position and attitude
+OFFBOARD, PX4_HOLD = (6, 0), (4, 3)  # main and sub mode
+GUIDED, ARDUPILOT_HOLD = (15, 0), (4, 0)
+VELOCITY, VELOCITY_AND_YAW_RATE = 0x0DC7, 0x05C7  # type_mask
+READY_WITHIN = 60.0  # s; ArduPilot can be armed 41 s after it was switched on
+ASK_AGAIN = 1.0  # s
+BRAKES = 6.0  # s that it has to stop
+PRESS_ON = 1e-3  # m/s, that PX4 keeps its course when it is to stand
+
+
+class Way(Enum):
+    """A way of stopping."""
+
+    ZEROS = "zeros"
+    HOLD = "HOLD"
+
+
+class Pilot:
+    """Drives straight ahead, and measures how far the rover rolls."""
+
+    def __init__(self, link: Link, truth: Track | None) -> None:
+        self._told = Track()
+        self._endpoint = Endpoint(link, self._take)
+        self._loop = asyncio.get_running_loop()
+        self.track = self._told if truth is None else truth
+        self._acks: dict[int, int] = {}
+
+    async def close(self) -> None:
+        """Let the rover stand, and give the link back."""
+        for _ in range(20):
+            self._setpoint(0.0)
+            await asyncio.sleep(PERIOD)
+        await self._mode(Way.HOLD)
+        await self._ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        await self._endpoint.close()
+
+    async def ready(self) -> bool:
+        """Have the rover armed and driven by setpoints; return whether it is."""
+        end = self._loop.time() + READY_WITHIN
+        while self._loop.time() < end:
+            if "HEARTBEAT" in self._endpoint.last:
+                for number in (mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED, mav.MAVLINK_MSG_ID_ATTITUDE):
+                    self._endpoint.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, RATE_US)
+                await self._stand(0.5)
+                if await self._mode(None) and await self._ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0):
+                    return True
+            await self._stand(ASK_AGAIN)
+        return False
+
+    async def stopping(self, way: Way, *, speed: float, seconds: float) -> float | None:
+        """Return the metres that it rolls from such a speed; None: it did not come to it."""
+        if not await self.ready():
+            return None
+        await self._stream(speed, seconds)
+        if self.track.speed() < speed * 0.8:
+            return None
+        begun = self.track.last
+        if way is Way.HOLD:
+            await self._mode(Way.HOLD)
+            await asyncio.sleep(BRAKES)
+        else:
+            await self._stand(BRAKES)
+            await self._mode(Way.HOLD)
+            await asyncio.sleep(0.5)
+        return self.track.last.apart(begun)
+
+    async def _stand(self, seconds: float) -> None:
+        await self._stream(PRESS_ON if self._is_px4 else 0.0, seconds)
+
+    async def _stream(self, speed: float, seconds: float) -> None:
+        end = self._loop.time() + seconds
+        while self._loop.time() < end:
+            self._setpoint(speed)
+            await asyncio.sleep(PERIOD)
+
+    def _setpoint(self, speed: float) -> None:
+        attitude = self._endpoint.last.get("ATTITUDE")
+        course = 0.0 if attitude is None else attitude.yaw
+        if self._is_px4:
+            frame, mask = mav.MAV_FRAME_LOCAL_NED, VELOCITY
+            vx, vy = speed * cos(course), speed * sin(course)
+        else:
+            frame, mask, vx, vy = mav.MAV_FRAME_BODY_NED, VELOCITY_AND_YAW_RATE, speed, 0.0
+        self._endpoint.out.set_position_target_local_ned_send(
+            0, self._endpoint.system, 1, frame, mask, *(0.0,) * 3, vx, vy, *(0.0,) * 6
+        )
+
+    @property
+    def _is_px4(self) -> bool:
+        heartbeat = self._endpoint.last.get("HEARTBEAT")
+        return heartbeat is not None and heartbeat.autopilot == mav.MAV_AUTOPILOT_PX4
+
+    async def _mode(self, way: Way | None) -> bool:
+        hold = way is Way.HOLD
+        modes = (PX4_HOLD if hold else OFFBOARD) if self._is_px4 else (ARDUPILOT_HOLD if hold else GUIDED)
+        return await self._ask(mav.MAV_CMD_DO_SET_MODE, 1.0, *modes)
+
+    async def _ask(self, number: int, *parameters: float) -> bool:
+        self._acks.pop(number, None)
+        self._endpoint.command(number, *parameters)
+        end = self._loop.time() + ASK_AGAIN
+        while number not in self._acks and self._loop.time() < end:
+            await asyncio.sleep(0.01)
+        return self._acks.get(number) == mav.MAV_RESULT_ACCEPTED
+
+    def _take(self, message: Any) -> None:
+        name = message.get_type()
+        if name == "COMMAND_ACK":
+            self._acks[message.command] = message.result
+        elif name == "LOCAL_POSITION_NED" and "ATTITUDE" in self._endpoint.last:
+            yaw = self._endpoint.last["ATTITUDE"].yaw
+            self._told.add(Place(self._loop.time(), message.x, message.y, yaw))
+
+
+def better(distances: dict[Way, list[float]], middle: Callable[[list[float]], float]) -> float:
+    """Return the middle of the better way's distances, m."""
+    return min(middle(values) for values in distances.values() if values)

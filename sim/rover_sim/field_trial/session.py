@@ -1,0 +1,236 @@
+"""What the rows have in common: to submit, to wait with a limit, to look where the rover is."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+from mav_tasks.client.aio import Client
+from mav_tasks.client.handle import Task
+from mav_tasks.client.values import TaskStatus, VehicleStatus
+from mav_tasks.client.wire import Goal
+from mav_tasks.errors import ClientError, NoAnswer, Refused
+from mav_tasks.tasks.lifecycle import TaskState
+from rover_sim.field_trial.ground import Ground, Limits
+from rover_sim.field_trial.track import Place, Track
+
+T = TypeVar("T")
+
+LOOK = 0.1  # s between two looks at what is waited for
+SAMPLE = 0.05  # s between two places that the rover tells
+ASK = 0.5  # s between two questions for a task's state
+FOUND_WITHIN = 60.0  # s; an ArduPilot restarts within 10 s, PX4 within 5 s
+STANDS_WITHIN = 8.0  # s
+SETTLE = 0.6  # s at rest before a place is measured: the window of ``Track.stands`` and a little
+
+
+class TrialError(Exception):
+    """A row cannot go on; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """How a task ended, or that it did not in time."""
+
+    state: str
+    words: str
+    seconds: float
+
+    @property
+    def is_completed(self) -> bool:
+        """Whether it was driven to its end."""
+        return self.state == TaskState.COMPLETED.name
+
+    def __str__(self) -> str:
+        return self.state if self.is_completed else f"{self.state} ({self.words})"
+
+
+class Session:
+    """One client of one server, and the rover's track."""
+
+    def __init__(
+        self,
+        ground: Ground,
+        *,
+        limits: Limits,
+        say: Callable[[str], None],
+    ) -> None:
+        self.ground = ground
+        self.limits = limits
+        self.say = say
+        self.told = Track()
+        self._client: Client | None = None
+        self._sampling: asyncio.Task[None] | None = None
+
+    # the server's life
+
+    async def begin(self) -> None:
+        """Start the server, and be its client."""
+        await self.ground.start_server()
+        await self.connect()
+
+    async def connect(self) -> None:
+        """Be a client of the server that runs now."""
+        await self.disconnect()
+        client = self.ground.client()
+        client.open()
+        self._client = client
+        await self.until(self._is_found, within=FOUND_WITHIN, what="a rover at the server")
+        if self._sampling is None:
+            self._sampling = asyncio.ensure_future(self._sample())
+        await self.until(lambda: len(self.track) > 0, within=20.0, what="the rover's position")
+
+    async def disconnect(self) -> None:
+        """Be no client any more."""
+        client, self._client = self._client, None
+        if client is not None:
+            await client.close()
+
+    async def end(self) -> None:
+        """End client and server in order."""
+        if self._sampling is not None:
+            self._sampling.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._sampling
+            self._sampling = None
+        await self.disconnect()
+        await self.ground.end_server()
+
+    # what is there
+
+    @property
+    def client(self) -> Client:
+        """The client; TrialError while there is none."""
+        if self._client is None:
+            raise TrialError("no client")
+        return self._client
+
+    @property
+    def now(self) -> float:
+        """Seconds, of the loop's clock."""
+        return asyncio.get_running_loop().time()
+
+    @property
+    def track(self) -> Track:
+        """The true track, or else the one that the rover tells."""
+        return self.told if self.ground.truth is None else self.ground.truth
+
+    @property
+    def rover(self) -> VehicleStatus | None:
+        """The rover as the server tells it."""
+        found = () if self._client is None else self._client.vehicles()
+        return found[0] if found else None
+
+    @property
+    def is_px4(self) -> bool:
+        """Whether the rover is a PX4."""
+        return self.rover is not None and self.rover.kind == "px4"
+
+    def told_place(self) -> Place:
+        """Return where the rover says that it is."""
+        return self.told.last
+
+    # waiting
+
+    async def until(self, condition: Callable[[], bool], *, within: float, what: str) -> None:
+        """Wait for a condition; TrialError says what was waited for in vain."""
+        if not await self.comes_true(condition, within=within):
+            raise TrialError(f"{what}: not within {within:g} s")
+
+    async def comes_true(self, condition: Callable[[], bool], *, within: float) -> bool:
+        """Wait for a condition; return whether it came true in time."""
+        end = self.now + within
+        while not condition():
+            if self.now >= end:
+                return False
+            await asyncio.sleep(LOOK)
+        return True
+
+    async def rest(self, *, within: float = STANDS_WITHIN) -> Place:
+        """Wait until the rover stands; return where."""
+        await asyncio.sleep(SETTLE)
+        await self.comes_true(self.track.stands, within=within)
+        return self.track.last
+
+    # tasks
+
+    async def submit(self, goals: Goal | Sequence[Goal], *, within: float = 20.0) -> Task:
+        """Submit, and again while nobody answers. Refused."""
+        end, nonce = self.now + within, 0
+        while True:
+            try:
+                return await self.client.submit(goals, nonce=nonce)
+            except NoAnswer as error:
+                nonce = error.nonce
+                if self.now >= end:
+                    raise
+
+    async def outcome(self, task: Task, *, within: float) -> End:
+        """Wait until a task is over or held, or the time is; what still runs then is called off."""
+        begun = self.now
+        status: TaskStatus | None = None
+        while self.now < begun + within:
+            with suppress(NoAnswer):
+                status = await self.client.status(task.id)
+                if status.is_over or status.state is TaskState.HELD:
+                    return End(status.state.name, status.words, self.now - begun)
+            await asyncio.sleep(ASK)
+        with suppress(ClientError):
+            await self.client.cancel(task.id)
+        words = "no answer" if status is None else f"{status.state.name.lower()}: {status.words}"
+        return End("TIMEOUT", f"{words}, after {within:g} s", self.now - begun)
+
+    async def drive(self, goals: Goal | Sequence[Goal], *, within: float) -> End:
+        """Submit and wait for the end; Refused is an end of its own."""
+        try:
+            task = await self.submit(goals)
+        except Refused as refused:
+            return End("REFUSED", str(refused), 0.0)
+        return await self.outcome(task, within=within)
+
+    async def running_since(self, task: Task, distance: float, *, within: float) -> Place:
+        """Wait until a task has driven so far; return where it began. TrialError."""
+        begun = self.track.last
+        await self.until(
+            lambda: self.track.last.apart(begun) >= distance,
+            within=within,
+            what=f"task {task.id} driving {distance:g} m",
+        )
+        return begun
+
+    async def clean(self) -> None:
+        """Call everything off and let the queue run again."""
+        for action in (lambda: self.client.clear(running_too=True), self._skip, self._resume):
+            await quietly(action)
+        await self.rest()
+
+    async def _skip(self) -> None:
+        await self.client.release(None, "skip")
+
+    async def _resume(self) -> None:
+        queue = await self.client.queue(limit=0)
+        if queue.paused is not None:
+            await self.client.resume()
+
+    # inside
+
+    def _is_found(self) -> bool:
+        rover = self.rover
+        return rover is not None and rover.is_heard and rover.north is not None
+
+    async def _sample(self) -> None:
+        while True:
+            rover = self.rover
+            if rover is not None and None not in (rover.north, rover.east, rover.yaw):
+                assert rover.north is not None
+                assert rover.east is not None
+                assert rover.yaw is not None
+                self.told.add(Place(self.now, rover.north, rover.east, rover.yaw))
+            await asyncio.sleep(SAMPLE)
+
+
+async def quietly(action: Callable[[], Awaitable[object]]) -> None:
+    """Do it, and let a refusal or a missing answer pass."""
+    with suppress(ClientError):
+        await action()

@@ -1,0 +1,62 @@
+"""The table of ``tools/field_trial`` on the simulated rovers as they are by default, in virtual time.
+
+Each row has a rover of its own that has just been switched on. What fails for a known reason is
+named with it; strict, so that whoever mends it is told.
+"""
+
+from typing import Any
+
+import pytest
+
+from rover_sim.field_trial.ground import Limits
+from rover_sim.field_trial.rows import Row, Verdict, table
+from rover_sim.field_trial.rows_run import run_rows
+from rover_sim.field_trial.session import Session
+from tests.kit.trial_ground import MAKES, TrialGround
+
+#: issue 16, section 3
+LIMITS = {
+    "ardupilot skid": Limits(end=0.05, turn=1.0, stick=1.5, remainder=0.05),
+    "ardupilot ackermann": Limits(end=0.10, stick=2.5, remainder=0.10),
+    "px4 differential": Limits(end=0.05, turn=2.0, remainder=0.05),
+    "px4 ackermann": Limits(end=0.5, remainder=0.5),
+}
+NAMES = ("tasks", "stop", "restart", "kill", "reboot", "boot")
+KNOWN: dict[tuple[str, str], str] = {}
+
+
+def trial(make: str, row: str) -> list[Row]:
+    """Run one row on a new rover."""
+    ground = TrialGround(MAKES[make])
+    said: list[str] = []
+
+    async def run() -> list[Row]:
+        session = Session(ground, limits=LIMITS[make], say=said.append)
+        try:
+            return list(await run_rows(session, (row,)))
+        finally:
+            await session.end()
+
+    rows = ground.run(run())
+    print(*said, *table(rows), sep="\n")  # noqa: T201  # shown where it fails
+    return rows
+
+
+def cases() -> list[Any]:
+    """Return each row of each rover, with why it fails if that is known."""
+    found = []
+    for make in MAKES:
+        names = (*NAMES, "stick") if make.startswith("ardupilot") else NAMES
+        for name in names:
+            why = KNOWN.get((make, name))
+            marks = () if why is None else pytest.mark.xfail(strict=True, reason=why)
+            found.append(pytest.param(make, name, marks=marks, id=f"{make} {name}"))
+    return found
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(("make", "row"), cases())
+def test_a_rover_as_it_is_holds_the_table(make: str, row: str) -> None:
+    rows = trial(make, row)
+    assert rows
+    assert {each.verdict for each in rows} == {Verdict.PASS}
