@@ -190,6 +190,14 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.tasks",
         }
     ),
+    "rover_sim.field_trial": frozenset(
+        {
+            "mav_tasks.client",
+            "mav_tasks.links",
+            "mav_tasks.tasks",
+            "mav_tasks.errors",
+        }
+    ),
     "rover_sim.demo": frozenset(
         {
             "rover_sim",
@@ -262,7 +270,7 @@ def layer_of(module: str) -> str | None:
     """The rule that a module falls under, or None for what is not ours."""
     parts = module.split(".")
     if parts[0] == "rover_sim":
-        parts = parts[:2] if parts[1:2] in (["testing"], ["demo"]) else parts[:1]
+        parts = parts[:2] if parts[1:2] in (["testing"], ["demo"], ["field_trial"]) else parts[:1]
         return ".".join(parts)
     return ".".join(parts[:2]) if parts[0] == "mav_tasks" and len(parts) > 1 else None
 

@@ -90,9 +90,11 @@ class TrialGround:
         """Its orderly end."""
         if self._server.is_running:
             self._server.stop()
-        async with asyncio.timeout(SIGTERM_WITHIN):
-            while self._server.is_running:
-                await asyncio.sleep(LOOK)
+        for _ in range(round(SIGTERM_WITHIN / LOOK)):
+            if not self._server.is_running:
+                return
+            await asyncio.sleep(LOOK)
+        raise TimeoutError(f"the server still runs {SIGTERM_WITHIN} s after it was asked to end")
 
     async def kill_server(self) -> None:
         """It is gone from one moment to the next."""

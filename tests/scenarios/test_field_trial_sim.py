@@ -1,4 +1,4 @@
-"""The table of ``tools/field_trial`` on the simulated rovers as they are by default, in virtual time.
+"""The table of ``tools/field_trial`` on simulated rovers as they are by default, in virtual time.
 
 Each row has a rover of its own that has just been switched on. What fails for a known reason is
 named with it; strict, so that whoever mends it is told.
@@ -38,7 +38,7 @@ def trial(make: str, row: str) -> list[Row]:
             await session.end()
 
     rows = ground.run(run())
-    print(*said, *table(rows), sep="\n")  # noqa: T201  # shown where it fails
+    print(*said, *table(rows), sep="\n")  # shown where it fails
     return rows
 
 

@@ -11,7 +11,7 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import AsyncExitStack, suppress
 from functools import partial
 from pathlib import Path
@@ -69,18 +69,52 @@ def make_parser() -> argparse.ArgumentParser:
     add("url", metavar="URL", help="of the rover, as mav-tasks serve --vehicle has it")
     add("--only", metavar="ROWS", default="", help=f"of {','.join(NAMES)}; default: all")
     add("--yes", "-y", action="store_true", help="do not ask whether there is room")
-    add("--truth", metavar="FILE|URL", default="", help="true poses: a file of lines"
+    add(
+        "--truth",
+        metavar="FILE|URL",
+        default="",
+        help="true poses: a file of lines"
         " t,north,east,yaw or of JSON objects, or a link\nwith SIM_STATE or HIL_STATE_QUATERNION;"
-        " default: what the rover tells counts")
-    add("--stick", metavar="URL", default="", help="a second link to an ArduPilot, for"
-        " RC_CHANNELS_OVERRIDE and a restart;\ndefault: that of --truth if it is a link")
+        " default: what the rover tells counts",
+    )
+    add(
+        "--stick",
+        metavar="URL",
+        default="",
+        help="a second link to an ArduPilot, for"
+        " RC_CHANNELS_OVERRIDE and a restart;\ndefault: that of --truth if it is a link",
+    )
     add("--reboot-command", metavar="CMD", default="", help="restarts the rover's autopilot")
-    add("--stop-distance", metavar="M", type=float, help="of the better way of stopping from 1 m/s;"
-        " default: it is measured")
-    add("--end-error", metavar="M", type=float, default=DEFAULTS.end, help="p95 (default %(default)s)")
-    add("--turn-error", metavar="DEG", type=float, default=DEFAULTS.turn, help="default %(default)s")
-    add("--remainder", metavar="M", type=float, default=DEFAULTS.remainder, help="default %(default)s")
-    add("--stick-seconds", metavar="S", type=float, default=DEFAULTS.stick, help="default %(default)s")
+    add(
+        "--stop-distance",
+        metavar="M",
+        type=float,
+        help="of the better way of stopping from 1 m/s; default: it is measured",
+    )
+    add(
+        "--end-error",
+        metavar="M",
+        type=float,
+        default=DEFAULTS.end,
+        help="p95 (default %(default)s)",
+    )
+    add(
+        "--turn-error", metavar="DEG", type=float, default=DEFAULTS.turn, help="default %(default)s"
+    )
+    add(
+        "--remainder",
+        metavar="M",
+        type=float,
+        default=DEFAULTS.remainder,
+        help="default %(default)s",
+    )
+    add(
+        "--stick-seconds",
+        metavar="S",
+        type=float,
+        default=DEFAULTS.stick,
+        help="default %(default)s",
+    )
     add("--keep", metavar="FOLDER", default="", help="keep store and log there")
     add("--set", metavar="KEY=VALUE", action="append", default=[], help="a setting of the server")
     return parser
@@ -88,8 +122,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 async def _trial(options: argparse.Namespace, only: Sequence[str]) -> Sequence[Row]:
     async with AsyncExitStack() as stack:
-        folder = Path(options.keep or stack.enter_context(tempfile.TemporaryDirectory()))
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = _folder(options.keep, stack)
         truth, second = None, None
         if ":" in options.truth:
             heard = LinkTruth(options.truth)
@@ -127,9 +160,13 @@ async def _trial(options: argparse.Namespace, only: Sequence[str]) -> Sequence[R
         stack.push_async_callback(partial(_leave, session))
         if truth is not None:
             await session.until(lambda: len(truth) > 0, within=20.0, what="true poses")
-        return await run_rows(
-            session, only, stop_distance=options.stop_distance, done=_tell
-        )
+        return await run_rows(session, only, stop_distance=options.stop_distance, done=_tell)
+
+
+def _folder(keep: str, stack: AsyncExitStack) -> Path:
+    folder = Path(keep or stack.enter_context(tempfile.TemporaryDirectory()))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 async def _leave(session: Session) -> None:

@@ -1,4 +1,4 @@
-"""One end of a MAVLink link on the running loop, spoken with pymavlink: none of the server's code."""
+"""One end of a MAVLink link on the running loop, spoken with pymavlink instead of our codec."""
 
 import asyncio
 import os

@@ -11,8 +11,6 @@ from rover_sim.field_trial.track import Place
 COUNT = 30  # tasks that are driven
 FAR = 30.0  # m, the longest go-to
 NEAR = 3.0  # m
-TURNS = (90.0, -90.0, 180.0, 45.0, -45.0, 120.0, -120.0, 30.0)  # deg
-DISTANCES = (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +36,7 @@ class Asked:
     goals: tuple[Goal, ...]
     end: Place | None = None  # None: a turn
     turn: float | None = None  # rad
+    is_relative: bool = False  # to where the rover is when it begins: a move
 
 
 Maker = Callable[[Where], Asked]
@@ -49,7 +48,7 @@ def move(distance: float) -> Maker:
     def make(where: Where) -> Asked:
         yaw = where.now.yaw
         end = where.now.moved(distance * cos(yaw), distance * sin(yaw))
-        return Asked(f"move {distance:g} m", (Move(distance),), end)
+        return Asked(f"move {distance:g} m", (Move(distance),), end, is_relative=True)
 
     return make
 

@@ -19,6 +19,7 @@ GUIDED, ARDUPILOT_HOLD = (15, 0), (4, 0)
 VELOCITY, VELOCITY_AND_YAW_RATE = 0x0DC7, 0x05C7  # type_mask
 READY_WITHIN = 60.0  # s; ArduPilot can be armed 41 s after it was switched on
 ASK_AGAIN = 1.0  # s
+LOOK = 0.01  # s between two looks for an answer
 BRAKES = 6.0  # s that it has to stop
 PRESS_ON = 1e-3  # m/s, that PX4 keeps its course when it is to stand
 
@@ -57,7 +58,9 @@ class Pilot:
                 for number in (mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED, mav.MAVLINK_MSG_ID_ATTITUDE):
                     self._endpoint.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, number, RATE_US)
                 await self._stand(0.5)
-                if await self._mode(None) and await self._ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0):
+                if await self._mode(None) and await self._ask(
+                    mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0
+                ):
                     return True
             await self._stand(ASK_AGAIN)
         return False
@@ -107,16 +110,21 @@ class Pilot:
 
     async def _mode(self, way: Way | None) -> bool:
         hold = way is Way.HOLD
-        modes = (PX4_HOLD if hold else OFFBOARD) if self._is_px4 else (ARDUPILOT_HOLD if hold else GUIDED)
+        modes = (
+            (PX4_HOLD if hold else OFFBOARD)
+            if self._is_px4
+            else (ARDUPILOT_HOLD if hold else GUIDED)
+        )
         return await self._ask(mav.MAV_CMD_DO_SET_MODE, 1.0, *modes)
 
     async def _ask(self, number: int, *parameters: float) -> bool:
         self._acks.pop(number, None)
         self._endpoint.command(number, *parameters)
-        end = self._loop.time() + ASK_AGAIN
-        while number not in self._acks and self._loop.time() < end:
-            await asyncio.sleep(0.01)
-        return self._acks.get(number) == mav.MAV_RESULT_ACCEPTED
+        for _ in range(round(ASK_AGAIN / LOOK)):
+            if number in self._acks:
+                break
+            await asyncio.sleep(LOOK)
+        return number in self._acks and self._acks[number] == int(mav.MAV_RESULT_ACCEPTED)
 
     def _take(self, message: Any) -> None:
         name = message.get_type()

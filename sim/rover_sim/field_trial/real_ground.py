@@ -61,7 +61,10 @@ class RealGround:
         command += ["--vehicle", self._url, "--store", str(self._folder / "tasks.sqlite3")]
         with self.log.open("ab") as output:
             self._server = await asyncio.create_subprocess_exec(
-                *command, *self._options, stdout=output, stderr=asyncio.subprocess.STDOUT,
+                *command,
+                *self._options,
+                stdout=output,
+                stderr=asyncio.subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C is ours: the server is ended when all is said
             )
 

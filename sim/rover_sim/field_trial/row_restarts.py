@@ -102,7 +102,9 @@ async def _interrupted(
     holds = end.is_completed and not note
     holds = holds and (not event.is_exact or abs(wrong) <= session.limits.remainder)
     figure = f"{wrong * 100:+.1f} cm"
-    return judged(event.name, event.words, result=f"{note}{end}", figure=figure, limit=limit, holds=holds)
+    return judged(
+        event.name, event.words, result=f"{note}{end}", figure=figure, limit=limit, holds=holds
+    )
 
 
 def _wrong(begun: Place, after: Place) -> float:
@@ -130,9 +132,7 @@ async def _let_go_on(session: Session, task: Task) -> None:
         await _insist(session.client.resume, session, end=end)
 
 
-async def _insist(
-    action: Callable[[], Awaitable[object]], session: Session, *, end: float
-) -> None:
+async def _insist(action: Callable[[], Awaitable[object]], session: Session, *, end: float) -> None:
     """Do it, again and again while it is refused; TrialError at the end."""
     while True:
         try:

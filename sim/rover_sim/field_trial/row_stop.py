@@ -52,7 +52,9 @@ async def stop(session: Session, *, best: float | None) -> Row:
     allowed = session.limits.stop
     holds = len(metres) == RUNS and median(metres) <= allowed * best
     shown = ", ".join(f"{value:.2f}" for value in metres)
-    figure = f"{shown} m beside {best:.2f} m" + (f" = {median(metres) / best:.2f}" if metres else "")
+    figure = f"{shown} m beside {best:.2f} m" + (
+        f" = {median(metres) / best:.2f}" if metres else ""
+    )
     result = wrong or f"stopped {len(metres)} times"
     return judged(NAME, ASKED, result=result, figure=figure, limit=f"{allowed:g} x", holds=holds)
 

@@ -2,7 +2,8 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from math import atan2, cos, degrees, hypot, remainder, sin, tau
+from math import degrees, hypot, remainder, tau
+from statistics import fmean
 
 from rover_sim.field_trial.goals import Asked, Maker, Where, further, plan
 from rover_sim.field_trial.rows import Row, judged, quantile
@@ -15,45 +16,53 @@ MOST_SHOWN = 4  # of what went wrong
 UNABLE = ("not turn", "not reverse", "cannot turn")  # in refusals of what the rover cannot do
 
 
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """One task that was driven to its end, as it truly was and as the rover told it."""
+
+    asked: Asked
+    before: Place
+    after: Place
+    told: Place  # before
+
+
 @dataclass(slots=True)
 class Tally:
     """What came of the tasks so far."""
 
     ends: list[tuple[Asked, End]] = field(default_factory=list)
     refused: list[Asked] = field(default_factory=list)
-    metres: list[float] = field(default_factory=list)
-    degrees: list[float] = field(default_factory=list)
+    driven: list[Driven] = field(default_factory=list)
+    shifts: list[tuple[float, float]] = field(default_factory=list)
+
+    def add_shift(self, true: Place, told: Place) -> None:
+        """Take in by how much the frames of truth and telemetry are apart, at rest."""
+        self.shifts.append((true.north - told.north, true.east - told.east))
 
     @property
-    def driven(self) -> int:
-        """How many were driven to their ends."""
-        return sum(end.is_completed for _, end in self.ends)
+    def shift(self) -> tuple[float, float]:
+        """By how much they are, m: the mean, as each single one has the estimate's error in it."""
+        return fmean(north for north, _ in self.shifts), fmean(east for _, east in self.shifts)
 
 
 async def drive_tasks(session: Session) -> Row:
     """Drive them."""
     tally = Tally()
     true = await session.rest()
-    told = session.told_place()
-    shift = true.north - told.north, true.east - told.east
+    begun = session.told_place()
+    tally.add_shift(true, begun)
     makers, instead = list(plan()), list(further())
     while makers:
-        maker = makers.pop(0)
-        await _drive_one(session, maker, Where(session.told_place(), told), shift, tally)
+        await _drive_one(session, makers.pop(0), begun, tally)
         if len(makers) == 1:  # before the way home make up for what was turned down
             missing = len(tally.refused)
             makers[:0], instead = instead[:missing], []
     return _row(session, tally)
 
 
-async def _drive_one(
-    session: Session,
-    maker: Maker,
-    where: Where,
-    shift: tuple[float, float],
-    tally: Tally,
-) -> None:
-    asked = maker(where)
+async def _drive_one(session: Session, maker: Maker, begun: Place, tally: Tally) -> None:
+    told = session.told_place()
+    asked = maker(Where(told, begun))
     before = session.track.last
     end = await session.drive(asked.goals, within=WITHIN)
     if _is_turned_down(end):
@@ -62,10 +71,13 @@ async def _drive_one(
         return
     after = await session.rest()
     tally.ends.append((asked, end))
-    told_error = ""
+    tally.add_shift(after, session.told_place())
+    wrong = ""
     if end.is_completed:
-        told_error = _measure(asked, before, after, where, shift, tally)
-    session.say(f"  {asked.words}: {end}, {end.seconds:.1f} s{told_error}")
+        driven = Driven(asked, before, after, told)
+        tally.driven.append(driven)
+        wrong = _shown(driven, tally.shift)
+    session.say(f"  {asked.words}: {end}, {end.seconds:.1f} s{wrong}")
     if not end.is_completed:
         await session.clean()
 
@@ -75,30 +87,34 @@ def _is_turned_down(end: End) -> bool:
     return end.state == "REFUSED" and (any(word in end.words for word in UNABLE))
 
 
-def _measure(
-    asked: Asked,
-    before: Place,
-    after: Place,
-    where: Where,
-    shift: tuple[float, float],
-    tally: Tally,
-) -> str:
-    if asked.turn is not None:
-        wrong = degrees(abs(remainder(after.yaw - before.yaw - asked.turn, tau)))
-        tally.degrees.append(wrong)
-        return f", {wrong:.2f} deg off"
-    assert asked.end is not None
-    if len(asked.goals) == 1 and asked.words.startswith("move"):
-        north = before.north + asked.end.north - where.now.north
-        east = before.east + asked.end.east - where.now.east
+def _turned_wrong(driven: Driven) -> float:
+    """Return by how many degrees a turn ended beside what was asked."""
+    assert driven.asked.turn is not None
+    turned = driven.after.yaw - driven.before.yaw
+    return degrees(abs(remainder(turned - driven.asked.turn, tau)))
+
+
+def _off(driven: Driven, shift: tuple[float, float]) -> tuple[float, float]:
+    """Return how far north and east of where it should be the rover ended, m.
+
+    A move ends at its distance from where it truly began, along the heading that was told. A place
+    is in the rover's frame, which is shifted against that of the truth.
+    """
+    end = driven.asked.end
+    assert end is not None
+    if driven.asked.is_relative:
+        north = driven.before.north + end.north - driven.told.north
+        east = driven.before.east + end.east - driven.told.east
     else:
-        north, east = asked.end.north + shift[0], asked.end.east + shift[1]
-    off_north, off_east = after.north - north, after.east - east
-    tally.metres.append(hypot(off_north, off_east))
-    course = atan2(north - before.north, east - before.east)
-    along = off_north * sin(course) + off_east * cos(course)
-    across = off_east * sin(course) - off_north * cos(course)
-    return f", {hypot(along, across) * 100:.1f} cm off ({along * 100:+.1f} on, {across * 100:+.1f} right)"
+        north, east = end.north + shift[0], end.east + shift[1]
+    return driven.after.north - north, driven.after.east - east
+
+
+def _shown(driven: Driven, shift: tuple[float, float]) -> str:
+    if driven.asked.turn is not None:
+        return f", {_turned_wrong(driven):.2f} deg off"
+    north, east = _off(driven, shift)
+    return f", {hypot(north, east) * 100:.1f} cm off ({north * 100:+.1f} N, {east * 100:+.1f} E)"
 
 
 def _row(session: Session, tally: Tally) -> Row:
@@ -107,21 +123,25 @@ def _row(session: Session, tally: Tally) -> Row:
     result = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
     if tally.refused:
         result += f"; {len(tally.refused)} turned down"
-    metres, angles = tally.metres, tally.degrees
+    moved = [each for each in tally.driven if each.asked.turn is None]
+    metres = [hypot(*_off(each, tally.shift)) for each in moved]
+    angles = [_turned_wrong(each) for each in tally.driven if each.asked.turn is not None]
     figure = f"end p50/p95/max {_three(metres, 100)} cm"
     limit = f"p95 {limits.end * 100:g} cm"
     if angles:
         figure += f", turns {_three(angles, 1)} deg"
         limit += f", {limits.turn:g} deg"
     holds = (
-        tally.driven == len(tally.ends) > 0
+        len(tally.driven) == len(tally.ends) > 0
         and quantile(metres, 0.95) <= limits.end
         and quantile(angles, 0.95) <= limits.turn
     )
     wrong = [f"{asked.words}: {end}" for asked, end in tally.ends if not end.is_completed]
     if wrong:
         result += " (" + "; ".join(wrong[:MOST_SHOWN]) + ")"
-    return judged(NAME, f"{len(tally.ends)} tasks", result=result, figure=figure, limit=limit, holds=holds)
+    return judged(
+        NAME, f"{len(tally.ends)} tasks", result=result, figure=figure, limit=limit, holds=holds
+    )
 
 
 def _three(values: list[float], factor: float) -> str:

@@ -43,7 +43,9 @@ def table(rows: Sequence[Row]) -> list[str]:
     head = ("row", "asked", "result", "figure", "limit", "verdict")
     cells = [head] + [(r.name, r.asked, r.result, r.figure, r.limit, r.verdict.value) for r in rows]
     widths = [max(len(line[n]) for line in cells) for n in range(len(head))]
-    return ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]
+    return [
+        "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells
+    ]
 
 
 def quantile(values: Sequence[float], share: float) -> float:

@@ -173,13 +173,19 @@ class Session:
         while self.now < begun + within:
             with suppress(NoAnswer):
                 status = await self.client.status(task.id)
-                if status.is_over or status.state is TaskState.HELD:
+                if status.is_over or await self._waits_for_somebody(status):
                     return End(status.state.name, status.words, self.now - begun)
             await asyncio.sleep(ASK)
         with suppress(ClientError):
             await self.client.cancel(task.id)
         words = "no answer" if status is None else f"{status.state.name.lower()}: {status.words}"
         return End("TIMEOUT", f"{words}, after {within:g} s", self.now - begun)
+
+    async def _waits_for_somebody(self, status: TaskStatus) -> bool:
+        """Whether a person has to decide; one that is released stays held until it starts."""
+        if status.state is not TaskState.HELD:
+            return False
+        return (await self.client.queue(limit=0)).paused is not None
 
     async def drive(self, goals: Goal | Sequence[Goal], *, within: float) -> End:
         """Submit and wait for the end; Refused is an end of its own."""

@@ -93,7 +93,9 @@ class LinkTruth:
             self._place(message.lat_int, message.lon_int, message.yaw)
         elif name == "HIL_STATE_QUATERNION" and message.lat:
             w, x, y, z = message.attitude_quaternion
-            self._place(message.lat, message.lon, atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+            self._place(
+                message.lat, message.lon, atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+            )
 
     def _place(self, latitude: int, longitude: int, yaw: float) -> None:
         zero = self._zero = self._zero or (latitude, longitude)
