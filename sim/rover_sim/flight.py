@@ -177,6 +177,8 @@ class FlightControl:
             self._outbox.say(MavSeverity.CRITICAL, self._rules.no_position_text)
             return False
         refusal = self._rules.arming_refusal(self.mode, forced=forced, now=now)
+        if refusal is None and not forced:
+            refusal = self._radio.arming_refusal(now=now)
         if refusal is not None:
             self._outbox.say(MavSeverity.CRITICAL, refusal)
             return False

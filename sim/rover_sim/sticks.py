@@ -65,6 +65,12 @@ class Sticks:
         yaw_rate = _part(channels[STEERING]) * MAX_YAW_RATE
         return None if speed == yaw_rate == 0.0 else Demand(speed, yaw_rate)
 
+    def arming_refusal(self, *, now: float) -> str | None:
+        """Return why it cannot be armed; a real ArduPilot says so in these words (4.6.3)."""
+        if not self._adds_speed or _part(self.channels(now=now)[THROTTLE]) == 0.0:
+            return None
+        return "Arm: Throttle (RC3) is not neutral"
+
     def nudged(self, demand: Demand, *, now: float) -> Demand:
         """Return what is driven in GUIDED for a velocity that is asked for."""
         if not self._adds_speed:

@@ -133,3 +133,14 @@ def test_a_rover_with_a_faster_frame_is_driven_faster() -> None:
     rig.send(throttle(1750))
     rig.run(2.9, velocity(0.0))
     assert 2.6 / 1.5 < rig.truth.forward_speed < 3.1 * 1.5  # recorded on Ackermann, after 3 s
+
+
+def test_an_ardupilot_is_not_armed_while_the_throttle_stick_is_off_its_centre() -> None:
+    rig = RealRig(ARDUPILOT)
+    rig.run(3.0)
+    rig.send(throttle(1700))
+    refused = rig.try_to_arm()
+    assert refused.result == MavResult.FAILED
+    assert refused.texts == ("Arm: Throttle (RC3) is not neutral",)
+    rig.send(throttle(1500))
+    assert rig.try_to_arm().result == MavResult.ACCEPTED
