@@ -22,7 +22,20 @@ LIMITS = {
     "px4 ackermann": Limits(end=0.5, remainder=0.5),
 }
 NAMES = ("tasks", "stop", "restart", "kill", "reboot", "boot")
-KNOWN: dict[tuple[str, str], str] = {}
+UNREAD_STICK = "the stick is seen only by overspeed, and zeros come before HOLD"
+SWINGS_BACK = "a car that swings back through zero is taken for one that does not stop"
+STUCK = "metre GPS: stuck within centimetres of the goal, and taken to move where it stands"
+KNOWN = {
+    ("ardupilot skid", "stick"): UNREAD_STICK,
+    ("ardupilot ackermann", "stick"): UNREAD_STICK,
+    ("ardupilot ackermann", "restart"): "the orderly end leaves a car in GUIDED that still rolls",
+    ("ardupilot ackermann", "kill"): SWINGS_BACK,
+    ("px4 ackermann", "tasks"): STUCK,
+    ("px4 ackermann", "restart"): STUCK,
+    ("px4 ackermann", "kill"): STUCK,
+    ("px4 ackermann", "reboot"): STUCK,
+    ("px4 ackermann", "boot"): STUCK,
+}
 
 
 def trial(make: str, row: str) -> list[Row]:
