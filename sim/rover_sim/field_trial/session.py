@@ -22,6 +22,7 @@ SAMPLE = 0.05  # s between two places that the rover tells
 ASK = 0.5  # s between two questions for a task's state
 FOUND_WITHIN = 60.0  # s; an ArduPilot restarts within 10 s, PX4 within 5 s
 STANDS_WITHIN = 8.0  # s
+RELEASED_WITHIN = 60.0  # s that a released task waits for a rover that boots: ArduPilot, 41 s
 SETTLE = 0.6  # s at rest before a place is measured: the window of ``Track.stands`` and a little
 
 
@@ -170,10 +171,14 @@ class Session:
         """Wait until a task is over or held, or the time is; what still runs then is called off."""
         begun = self.now
         status: TaskStatus | None = None
+        driven_at = begun
         while self.now < begun + within:
             with suppress(NoAnswer):
                 status = await self.client.status(task.id)
-                if status.is_over or await self._waits_for_somebody(status):
+                if status.state is not TaskState.HELD:
+                    driven_at = self.now
+                late = self.now > driven_at + RELEASED_WITHIN
+                if status.is_over or late or await self._waits_for_somebody(status):
                     return End(status.state.name, status.words, self.now - begun)
             await asyncio.sleep(ASK)
         with suppress(ClientError):
