@@ -23,12 +23,10 @@ LIMITS = {
 }
 NAMES = ("tasks", "stop", "restart", "kill", "reboot", "boot")
 ROLLS_ON = "a car rolls on for seconds in HOLD after the stick was pushed"
-SWINGS_BACK = "a car that swings back through zero is taken for one that does not stop"
 STUCK = "metre GPS: stuck within centimetres of the goal, and taken to move where it stands"
 KNOWN = {
     ("ardupilot ackermann", "stick"): ROLLS_ON,
     ("ardupilot ackermann", "tasks"): "a few go-tos end 10 to 12 cm beside: p95 is 10.1 cm",
-    ("ardupilot ackermann", "kill"): SWINGS_BACK,
     ("px4 ackermann", "tasks"): STUCK,
     ("px4 ackermann", "restart"): STUCK,
     ("px4 ackermann", "kill"): STUCK,
