@@ -113,6 +113,8 @@ def _off(driven: Driven, shift: tuple[float, float]) -> tuple[float, float]:
 def _shown(driven: Driven, shift: tuple[float, float]) -> str:
     if driven.asked.turn is not None:
         return f", {_turned_wrong(driven):.2f} deg off"
+    if driven.asked.end is None:
+        return ""
     north, east = _off(driven, shift)
     return f", {hypot(north, east) * 100:.1f} cm off ({north * 100:+.1f} N, {east * 100:+.1f} E)"
 
@@ -123,7 +125,7 @@ def _row(session: Session, tally: Tally) -> Row:
     result = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
     if tally.refused:
         result += f"; {len(tally.refused)} turned down"
-    moved = [each for each in tally.driven if each.asked.turn is None]
+    moved = [each for each in tally.driven if each.asked.end is not None]
     metres = [hypot(*_off(each, tally.shift)) for each in moved]
     angles = [_turned_wrong(each) for each in tally.driven if each.asked.turn is not None]
     figure = f"end p50/p95/max {_three(metres, 100)} cm"
