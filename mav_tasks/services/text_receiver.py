@@ -40,7 +40,7 @@ class _Open:
 
     @property
     def words(self) -> str:
-        end = max(self.chunks) if self.last is None else self.last
+        end = max(self.chunks, default=-1) if self.last is None else self.last
         pieces = b""
         for number in range(end + 1):
             pieces += self.chunks.get(number, GAP.encode())

@@ -77,6 +77,13 @@ def test_a_text_without_an_end_is_cut() -> None:
     assert words(receiver, *endless) == ["a" * 50 * MOST_CHUNKS + "[…]"]
 
 
+def test_a_text_of_which_only_what_is_cut_has_come_does_no_harm() -> None:
+    receiver = TextReceiver()
+    for number in (MOST_CHUNKS, 255):
+        assert words(receiver, Statustext(6, b"a" * 50, 3, number)) == ["[…]"]
+    assert receiver.next_deadline() == inf
+
+
 def test_bytes_that_are_no_text_and_severities_that_are_none_do_no_harm() -> None:
     (text,) = TextReceiver().receive(ROVER, Statustext(200, b"\xff\xfe"), now=0.0)
     assert text == (ROVER, MavSeverity.DEBUG, "\ufffd\ufffd")
