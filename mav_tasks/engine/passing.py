@@ -59,11 +59,15 @@ class Passing:
     def pass_on(
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
-        """Pass a packet to the vehicles that it is for; what is for us ends here."""
+        """Pass a packet to the vehicles that it is for; what is for us ends here.
+
+        Without a ``message`` its id is unknown and its bytes are unverified: noise may look like
+        it, and is no refusal worth a line.
+        """
         target = EVERYBODY if message is None else _target(message)
         why_not = self._why_not(client, packet, message)
         if why_not is not None:
-            if packet.message_id not in TELLING:
+            if message is not None and packet.message_id not in TELLING:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
         behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
@@ -86,6 +90,8 @@ class Passing:
                 continue
             for vehicle in vehicles:
                 withheld(vehicle, client.key, packet, message, now=now)
+            if message is None:
+                continue
             for vehicle in refusing:
                 why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client))
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)

@@ -85,6 +85,18 @@ def test_a_stream_that_does_not_pass_has_one_line_in_half_a_minute(world: World)
     assert len(refusals(world)) == 2
 
 
+def test_what_nobody_can_verify_has_no_line_as_a_refusal_whoever_it_says_it_is_of(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(settings=Settings(roles=Roles(unsigned="observer")))
+    unknown = 0x0ABCDE
+    for source in ((1, 1), (250, 191), (255, 190)):
+        header = bytes((0xFD, 1, 0, 0, 0, *source)) + unknown.to_bytes(3, "little")
+        world.client.send_raw(header + b"\x07\0\0")
+    world.run(1)
+    assert refusals(world) == []
+
+
 def test_what_a_role_may_not_pass_on_has_its_line(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(roles=Roles(unsigned="observer")))
     world.client.send(setpoint(0.5))
