@@ -16,7 +16,7 @@ from mav_tasks.engine.gcs_side import GcsSide
 from mav_tasks.engine.item_check import ItemCheck
 from mav_tasks.engine.mission_answers import MissionAnswers
 from mav_tasks.engine.plan_items import result_of
-from mav_tasks.engine.plans import MISSION, Plans, Stored, plan_of_task
+from mav_tasks.engine.plans import MISSION, Plans, Stored
 from mav_tasks.engine.submissions import Submissions
 from mav_tasks.engine.vehicle import Vehicle
 from mav_tasks.engine.vehicle_side import VehicleSide
@@ -35,7 +35,7 @@ from mav_tasks.services.mission_receiver import (
     Upload,
 )
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.goal import Plan, describe
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
 
@@ -185,7 +185,7 @@ class MissionUploads:
         if task.terms.is_staged:
             self._plans.begin_at(vehicle, 0)
         what = "ready to be started" if task.terms.is_staged else "queued"
-        words = f"Task {task.id} {what}: plan of {len(plan_of_task(task).steps)} items"
+        words = f"Task {task.id} {what}: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
     def _withdraw(

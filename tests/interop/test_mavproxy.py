@@ -234,7 +234,7 @@ def places(it: MavProxy, running: Stand) -> None:
     it.ask(f"guided {NORTH + METRE} {lon} 0", "DO_REPOSITION: DENIED")
     it.wait_for("AP: .* fence")
     it.ask("mode RTL", "RTL> ")
-    it.wait_for("AP: Task 5 queued: return home")
+    it.wait_for("AP: Task 5 begins now: return home")
     it.wait_for("AP: Task 5 started")
     it.ask("mode HOLD", "AP: Task 5 paused: operator")
     it.wait_for_mode("HOLD")
