@@ -152,14 +152,18 @@ def test_after_a_kill_the_acknowledged_task_is_held_and_can_be_finished(
             wait_until(lambda: "found" in server_log.read_text(), within=20, what="the rover")
             link = running.connect()
             hold_is_seen(link)
-            assert command_long(link, CONTINUE, 1).result != 0  # held: release it first
+            submit(link, CONTINUE, 1)  # the queue; what is held stays so
+            wait_for(link, "STATUSTEXT", "'has task 1 on hold' in STATUSTEXT.text")
+            another = 0, 0, 0, 0, 0, 2  # in param7: no repeat of the first
+            assert command_long(link, CONTINUE, 1, *another).result != 0  # release it first
+            continued = running.truth()[-1]
             submit(link, 54013, 1, 1)  # the remainder
             wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=30)
             end = running.truth()[-1]
-            submit(link, CONTINUE, 1)
             text = f"'Task {waiting} done' in STATUSTEXT.text"
             wait_for(link, "STATUSTEXT", text, within=30)
     assert stopped["north"] > 0.5
+    assert continued["north"] == pytest.approx(stopped["north"], abs=0.01)
     assert end["north"] == pytest.approx(3.0, abs=0.05)
 
 
