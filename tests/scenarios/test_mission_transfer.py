@@ -81,9 +81,18 @@ def uploaded(world: World | QuietWorld, items: Sequence[Item], target: tuple[int
 
 
 def downloaded(world: World | QuietWorld, target: tuple[int, int] = AUTOPILOT) -> list[bytes]:
+    download = ended_download(world, target)
+    assert download.is_done, f"seed {world.seed}: {len(download.items)} of {download.count}"
+    return received(download)
+
+
+def ended_download(world: World | QuietWorld, target: tuple[int, int]) -> Download:
     download = Download(world.client, target=target)
     world.until(lambda: download.is_done or download.has_failed, within=LONGEST_UPLOAD)
-    assert download.is_done, f"seed {world.seed}: {len(download.items)} of {download.count}"
+    return download
+
+
+def received(download: Download) -> list[bytes]:
     mav = common.MAVLink(None, 1, 1)
     return [payload(message, mav) for message in download.items]
 
@@ -102,9 +111,11 @@ def places(task: Task) -> list[int]:
 @pytest.mark.parametrize("first", range(0, 200, 50))
 def test_500_items_arrive_at_5_percent_loss(first: int) -> None:
     """Now and then a client gives up and tries again: it missed the last ack, or it was asked late
-    for an item long sent, after which MAVSDK answers no more.
+    for an item long sent, after which MAVSDK answers no more. A download fails when five exchanges
+    in a row are lost: of 500 items, one download in 200.
     """
     tries: Counter[int] = Counter()
+    downloads_again = 0
     for seed in range(first, first + 50):
         random = Random(seed)
         plan, world = survey(random, 500), QuietWorld(seed=seed)
@@ -119,10 +130,15 @@ def test_500_items_arrive_at_5_percent_loss(first: int) -> None:
         assert [task.id for task in tasks] == [upload.opaque_id], f"seed {seed}"
         assert places(tasks[0]) == [item.x for item in plan], f"seed {seed}"
         if target == AUTOPILOT:  # the task server shows its own when it drives, or the staged one
-            kept = downloaded(world, random.choice([AUTOPILOT, SERVER]))
-            assert kept == payloads(plan), f"seed {seed}"
+            source = random.choice([AUTOPILOT, SERVER])
+            download = ended_download(world, source)
+            if download.has_failed:
+                downloads_again += 1
+                download = ended_download(world, source)
+            assert received(download) == payloads(plan), f"seed {seed}"
     print(f"seeds {first} to {first + 49}: uploads after so many tries: {dict(tries)}")
     assert tries[1] > 35
+    assert downloads_again <= 2
 
 
 @pytest.mark.slow
