@@ -86,7 +86,7 @@ def test_what_needs_a_hand_is_a_warning(world: World) -> None:
     said = severities(world)
     assert said["Task 1 paused: takeover"] == said["Queue paused: takeover"] == WARNING
     assert said["STOP: nothing runs until continued"] == WARNING
-    assert said["cannot go on: wrong mode"] == WARNING
+    assert said["cannot go on: wrong mode, set HOLD first"] == WARNING
     assert said["Task 1 killed: stop"] == INFO
     assert NOTICE not in said.values()
 
