@@ -58,7 +58,7 @@ def test_an_orderly_end_stops_the_rover_at_once(running: Stand, number: int) -> 
     took = running.server.end(number)
 
     assert running.server.popen.returncode == 0
-    assert took < 1.0
+    assert took < 1.5  # 0.9 s idle: it brakes, and must be seen to get nowhere
     wait_until(lambda: running.speed() < 0.01, within=10, what="the rover to stand")
     assert running.truth()[-1]["time"] - asked_at < SETPOINT_TIMEOUT  # not by the time-out
     heartbeat = wait_for(running.connect_to_rover(), "HEARTBEAT", "HEARTBEAT.type==10")
