@@ -221,13 +221,18 @@ def on_board(world: World, kind: int = FENCE) -> list[tuple[int, int, int]]:
     return [(item.command, item.x, item.y) for item in stored]
 
 
-@pytest.mark.parametrize("loss", [0.0, 0.05])
-def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float) -> None:
+@pytest.mark.parametrize(("loss", "tries"), [(0.0, 1), (0.05, 4)])
+def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries: int) -> None:
+    """Of two losses in one upload the rover asks again too late for the client, one time in six."""
     world = make_world(conditions=Conditions(delay=0.01, loss=loss))
-    assert fenced(world, *YARD) == 0
+    while (result := fenced(world, *YARD)) != 0 and tries > 1:
+        assert on_board(world) == []
+        tries -= 1
+    assert result == 0
     assert on_board(world) == [(item.command, item.x, item.y) for item in YARD]
-    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
-    world.run(1)
+    for _ in range(tries):  # who clears hears of it, or says it again
+        world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
+        world.run(1)
     assert on_board(world) == []
 
 
