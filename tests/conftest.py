@@ -1,6 +1,8 @@
 """No test, and no process of one, reads the configuration of whoever runs the tests."""
 
 import os
+import signal
+import threading
 
 import pytest
 
@@ -12,6 +14,13 @@ os.environ["MAV_TASKS_CONFIG"] = ""
 
 # pymavlink settles on a version of MAVLink when it is first imported, whichever test that is in.
 os.environ["MAVLINK20"] = "1"
+
+# A shell lets what it runs in the background ignore Ctrl-C, and so would all that tests begin.
+if (
+    threading.current_thread() is threading.main_thread()
+    and signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+):
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_configure(config: pytest.Config) -> None:
