@@ -1,8 +1,8 @@
 """Which local frame a vehicle's positions are in, and where its home is.
 
 The origin is what GPS_GLOBAL_ORIGIN says. A vehicle that never says it has its origin worked out
-from GLOBAL_POSITION_INT and LOCAL_POSITION_NED of the same instant. Home alone says nothing: it is
-a place, and no autopilot promises that its frame begins there.
+from GLOBAL_POSITION_INT and LOCAL_POSITION_NED of nearly the same instant. Home alone says nothing:
+it is a place, and no autopilot promises that its frame begins there.
 """
 
 from math import hypot
@@ -14,6 +14,8 @@ from mav_tasks.tasks.task import Frame
 
 MOVED_SAID = 0.05  # m between two origins that a vehicle says, that are not the same
 MOVED_WORKED_OUT = 1.0  # m, the same where positions were rounded and filtered in between
+#: s between two messages of which the origin is worked out: a PX4 1.17 sends them 24 to 80 ms apart
+APART = 0.1
 MAX_LATITUDE_DEGE7 = 900_000_000
 MAX_LONGITUDE_DEGE7 = 1_800_000_000
 
@@ -77,11 +79,14 @@ class FrameMonitor:
         where, local = self._global, self._local
         if self._is_said or where is None or local is None:
             return
-        if where.time_boot_ms != local.time_boot_ms:
+        later = (where.time_boot_ms - local.time_boot_ms) / 1000
+        # between two instants a position may have been corrected: that is no other origin
+        if abs(later) > (APART if self._origin is None else 0.0):
             return
         place = _place(where)
         if place is not None:
-            self._set_origin(origin_of(place, LocalPlace(local.x, local.y)), is_said=False)
+            there = LocalPlace(local.x + later * local.vx, local.y + later * local.vy)
+            self._set_origin(origin_of(place, there), is_said=False)
 
     def _set_origin(self, origin: GlobalPlace | None, *, is_said: bool) -> None:
         if origin is None:

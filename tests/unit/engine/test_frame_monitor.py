@@ -61,8 +61,22 @@ def test_it_is_worked_out_from_both_positions_of_one_instant(order: int) -> None
 def test_positions_of_different_instants_are_not_put_together() -> None:
     monitor = FrameMonitor()
     monitor.receive(local(120.0, -40.0, boot_ms=5_000), now=1.0)
-    monitor.receive(on_earth(120.5, -40.0, boot_ms=5_100), now=1.1)
+    monitor.receive(on_earth(120.5, -40.0, boot_ms=5_200), now=1.2)
     assert monitor.origin is None
+
+
+def test_a_first_origin_is_worked_out_from_instants_that_are_near_to_each_other() -> None:
+    """A PX4 whose origin was told before anybody listened sends the two 24 to 80 ms apart."""
+    monitor = FrameMonitor()
+    moving = local(120.0, -40.0, boot_ms=5_000)
+    moving.vx = 1.0
+    monitor.receive(moving, now=1.0)
+    monitor.receive(on_earth(120.06, -40.0, boot_ms=5_060), now=1.06)
+    origin = monitor.origin
+    assert origin is not None
+    assert abs(origin.latitude_degE7 - ORIGIN.latitude_degE7) <= 2
+    monitor.receive(on_earth(122.0, -40.0, boot_ms=5_060 + 20), now=1.08)
+    assert (monitor.origin, monitor.changed) == (origin, False), "it may have been corrected"
 
 
 def test_a_small_difference_is_rounding_and_a_large_one_another_origin() -> None:
