@@ -16,6 +16,8 @@ from mav_tasks.tasks.view import VehicleView
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
 FULL_TURNS = 2 * pi  # rad that it turns by itself towards its course, at the most; more is a circle
 TURNED = radians(5)  # rad, more is a turn on the spot, or in a bow, and it does follow
+LIVES = 1e-6  # m from one look to the next: an estimate that has not stopped
+SLOW = 0.3  # of the way that was asked for; more is motion
 BLIND = 1.0  # m or rad commanded without progress, or without motion: the same, but sooner
 
 
@@ -69,6 +71,7 @@ class StuckWatch:
         self._course: float | None = None  # that it was told to drive in, if it was
         self._turned = 0.0  # rad, by itself since the last progress
         self._yaw: float | None = None  # when that was last looked at
+        self._pose: Pose | None = None  # at the last look
 
     def begin(self, *, now: float) -> None:
         """Begin anew: another leg, or nothing has been asked for yet."""
@@ -87,10 +90,12 @@ class StuckWatch:
         """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
         leg = course.leg
         forward, turned = self._last
+        lives = self._lives(seen)
         if self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS:
             self._progressed(now)
         if isinstance(leg, Move | Rotate | Follow):
-            self._commanded += turned if isinstance(leg, Rotate) else forward
+            if not lives:
+                self._commanded += turned if isinstance(leg, Rotate) else forward
             left = abs(course.remaining)
             if left < self._best_remaining - PROGRESS:
                 self._best_remaining = left
@@ -98,9 +103,21 @@ class StuckWatch:
                 self._progressed(now)
         elif not seen.still or not (forward or turned):
             self._progressed(now)
-        else:
+        elif not lives:
             self._commanded += max(forward, turned)
         return now - self._progress_at > limit or self._commanded > BLIND
+
+    def _lives(self, seen: VehicleView) -> bool:
+        """Whether a rover hardly moves by an estimate that is never twice the same.
+
+        One that stands for seconds before its speed loop overcomes friction (PX4) is only slow; of
+        one whose estimate stands nobody knows what it does, and it soon counts as stuck.
+        """
+        before, self._pose = self._pose, None if seen.motion is None else seen.motion.pose
+        if before is None or self._pose is None:
+            return False
+        moved = hypot(self._pose.north - before.north, self._pose.east - before.east)
+        return LIVES < moved < SLOW * self._last[0]
 
     def _turns_by_itself(self, seen: VehicleView) -> bool:
         """Whether it was told to drive where it does not point yet."""

@@ -1,11 +1,14 @@
 """The end of a move on rovers that do not move slowly, and roll on."""
 
+from dataclasses import replace
 from functools import partial
 
 import pytest
 
 from mav_tasks.tasks.lifecycle import TaskState
-from tests.kit.bodies import Sticky
+from rover_sim.realism import EXACT
+from tests.kit.bodies import LateStart, Sticky
+from tests.kit.world import PROMPT
 from tests.scenarios.conftest import MakeWorld
 
 S = TaskState
@@ -46,3 +49,11 @@ def test_one_that_follows_is_not_told_of(make_world: MakeWorld) -> None:
     world.client.move(3.0)
     world.until_state(1, S.COMPLETED)
     assert not any("stands: look" in text for text in world.client.texts())
+
+
+def test_one_that_overcomes_friction_late_is_not_stuck(make_world: MakeWorld) -> None:
+    """A PX4 whose integral has to wind up stands for some seconds before it moves at 0.5 m/s."""
+    persona = PROMPT
+    world = make_world(body=LateStart, realism=replace(EXACT, estimator=persona.realism.estimator))
+    world.client.move(2.0)
+    world.until_state(1, S.COMPLETED, within=60)
