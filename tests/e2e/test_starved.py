@@ -41,7 +41,8 @@ class Tap(LossyUdp):
     def see(self, data: bytes, *, is_for_server: bool) -> None:
         if is_for_server and data[7] == SETPOINT:  # the "server" of this proxy is the rover
             message = self._decoder.decode(bytearray(data))
-            moves = any((message.vx, message.vy, message.yaw_rate))
+            # a PX4 rover stands on 1 mm/s along its heading
+            moves = any(abs(v) >= 0.002 for v in (message.vx, message.vy, message.yaw_rate))
             self.setpoints.append(Passed(monotonic(), moves))
 
 

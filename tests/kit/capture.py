@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from struct import iter_unpack
 from time import monotonic
 
 from mav_tasks.links.memory import Conditions
@@ -9,6 +10,11 @@ from tests.kit.lossy_udp import LossyUdp, _Way
 
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
 SPEEDS = slice(10 + 16, 10 + 28)  # vx, vy, vz of it
+
+
+def moves(speeds: bytes) -> bool:
+    """Whether velocities, as they are on the wire, move a rover; a PX4 stands on 1 mm/s."""
+    return any(not abs(speed) < 0.002 for (speed,) in iter_unpack("<f", speeds.ljust(12, b"\0")))
 
 
 class Capture(LossyUdp):
@@ -32,7 +38,7 @@ class Capture(LossyUdp):
 
     def _put_under_way(self, way: _Way, data: bytes) -> None:
         if way.traffic is self.to_server and data[7] == SETPOINT:
-            self.setpoints.append((monotonic(), any(data[SPEEDS])))
+            self.setpoints.append((monotonic(), moves(data[SPEEDS])))
         super()._put_under_way(way, data)
 
 

@@ -13,6 +13,7 @@ from mav_tasks.cli.app import main
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.mavlink import messages as m
+from tests.kit.capture import moves
 
 VELOCITIES = slice(10 + 16, 10 + 28)  # vx, vy, vz of SET_POSITION_TARGET_LOCAL_NED
 
@@ -33,7 +34,7 @@ def stop_at(flag: Path) -> None:
 
 def _moves(outgoing: Outgoing) -> bool:
     data = outgoing.data
-    return data[7] == m.SetPositionTargetLocalNed.id and data[8] == 0 and any(data[VELOCITIES])
+    return data[7] == m.SetPositionTargetLocalNed.id and data[8] == 0 and moves(data[VELOCITIES])
 
 
 if __name__ == "__main__":

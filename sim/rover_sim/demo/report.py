@@ -8,7 +8,7 @@ from rich.table import Table
 
 from rover_sim.demo.third_party import ACCEPTED, ORDER, STATES, TASK_MOVE, Place, Seen, ThirdParty
 
-MOVE_TOLERANCE = 0.02  # m
+MOVE_TOLERANCE = 0.05  # m; the rover's own estimate is off by 2 to 4 cm
 TURN_TOLERANCE = 1.0  # deg
 
 
