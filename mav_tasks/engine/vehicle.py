@@ -103,7 +103,7 @@ class Vehicle:
         self._authority = Authority(persona, may_arm=may_arm)
         self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
-        self._restarted_at = -inf
+        self._shows_restart = False  # what the next heartbeat shows anew, a restart has done
         self._arming_texts = ArmingTexts()
         self._is_closing = False
         self._is_back_home = False  # by its last task; it is disarmed also where others wait
@@ -325,6 +325,7 @@ class Vehicle:
         by_client = self._authority.armed_by_client(now=now)
         if armed and by_hand and not by_client and self.control.is_asking_mode:
             self._take_over("armed to be driven by hand", now=now)
+        self._shows_restart = False
         self._note_rest(now=now)
         if not self._clock.is_running:
             self.step(now=now)
@@ -386,6 +387,8 @@ class Vehicle:
             self._mode_changed_in_spite_of_stop(mode, now=now)
         elif mode == booting:
             self._rebooted(booted_at=now, now=now)
+        elif self._shows_restart:
+            pass  # a restart, which its clock has told of before, and nobody's doing
         elif not ours and was_mode != booting:
             self._authority.withdraw_arming()
             may_be_lost = self.control.is_streaming and mode == self.persona.hold_mode
@@ -405,8 +408,9 @@ class Vehicle:
     def _disarmed(self, before: Before, *, now: float) -> None:
         if self.control.phase is Phase.STOPPING or self.control.may_have_disarmed(now=now):
             return
-        if self._restarted_at == now:  # this heartbeat has told of that as well: nobody did it
-            self._authority.restarted(was_allowed=before.may_arm)
+        if self._shows_restart:  # this heartbeat, or the clock before it, has told of that as well
+            was_allowed = before.may_arm or self._authority.is_withdrawn_by_restart
+            self._authority.restarted(was_allowed=was_allowed)
             return
         self._authority.withdraw_arming()
         self._zero_what_is_kept()
@@ -418,7 +422,7 @@ class Vehicle:
 
         A restart disarms: what was seen since ``booted_at`` was no person's doing.
         """
-        self._restarted_at = now
+        self._shows_restart = True
         self._arming_texts = ArmingTexts()
         self.where.forget()
         self.requests.ask_which_again()

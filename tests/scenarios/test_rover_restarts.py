@@ -8,7 +8,7 @@ from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.personas import Mode, Persona
+from rover_sim.personas import PX4, Mode, Persona
 from tests.kit import px4
 from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
 from tests.kit.world import PROMPT, World, near_pose
@@ -253,3 +253,22 @@ def test_a_task_of_which_nothing_was_driven_begins_when_the_rover_is_back(
     world.until_state(1, S.COMPLETED, within=60)
     assert world.paused() is R.NONE
     assert S.HELD not in [state for state, _ in world.history(1)]
+
+
+def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
+    make_world: MakeWorld,
+) -> None:
+    """A PX4's mode is in its next heartbeat, up to a second after its positions began anew."""
+    world = make_world(persona=PX4)
+    world.client.move(4)
+    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    world.fault(Faults(withheld=frozenset({0})))  # its heartbeat comes last
+    restart(world, up=2.0)
+    world.fault(Faults())
+    world.run(UP)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert world.paused() is R.RESTARTED
+    assert not any("taken over" in text for text in world.client.texts())
+    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
+    proceed(world)
+    world.until_state(1, S.COMPLETED, within=60)
