@@ -172,8 +172,15 @@ class Executor:
             self._resumes_by_itself = False
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Set a begun task aside until somebody decides."""
+        """Set a begun task aside until somebody decides.
+
+        One of which nothing was driven has no line that could be lost with its frame: a rover that
+        boots may find its place while it is being taken.
+        """
         task = self.task
+        is_starting = task is not None and task.state is S.STARTING and not has_moved(task)
+        if reason is R.FRAME_RESET and is_starting:
+            return
         if task is not None and task.state in (S.STARTING, S.EXECUTING, S.PAUSED):
             self._change(S.HELD, reason, actor=SERVER, now=now)
 

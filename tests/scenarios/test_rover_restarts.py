@@ -272,3 +272,18 @@ def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
     assert release(world, REMAINDER).answer == (ACCEPTED, 1)
     proceed(world)
     world.until_state(1, S.COMPLETED, within=60)
+
+
+def test_another_origin_holds_no_task_of_which_nothing_was_driven(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """A PX4 that boots has an origin of its own a second after it can be spoken to."""
+    world = make_world(persona=persona)
+    world.rover.autopilot.set_faults(Faults(refuse_arm=True))
+    world.client.move(1.0)
+    world.run(2.0)
+    assert world.state(1)[0] is S.STARTING
+    world.fault(Faults(refuse_arm=True, position_jump=(5.0, 3.0)))
+    world.run(2.0)
+    world.fault(Faults(position_jump=(5.0, 3.0)))
+    world.until_state(1, S.COMPLETED, within=60)
