@@ -48,6 +48,7 @@ class Told(NamedTuple):
     is_ours: bool  # we drive it, hand it back or stop it
     is_stopping: bool  # STOP, or what is like it
     may_drive: bool  # in our control, and STOP is not latched
+    goes_on: bool  # it stands for a task that goes on, or begins
     is_released: bool  # we do nothing to it any more
     is_held: bool  # it shows HOLD
     armed: bool
@@ -98,7 +99,7 @@ class MotionGuard:
         speed = self._speed(now=now)
         if speed is None and not told.is_stopping:
             return []  # zeros go on, and HOLD follows them: nobody knows of a car that HOLD rolls
-        is_own = told.may_drive and not told.is_stopping  # the zeros of a task that goes on
+        is_own = told.goes_on and not told.is_stopping
         step = self.ladder.climb(
             speed=speed,
             is_held=told.is_held,

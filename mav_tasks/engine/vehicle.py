@@ -912,6 +912,7 @@ class Vehicle:
             is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
             is_stopping=control.phase is Phase.STOPPING,
             may_drive=control.in_control and not self.tasks.is_stopped,
+            goes_on=demand.kind in (DemandKind.TAKE, DemandKind.DRIVE),
             is_released=not control.is_engaged,
             is_held=self._monitor.custom_mode == self.persona.hold_mode,
             armed=self.armed,
