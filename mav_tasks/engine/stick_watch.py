@@ -1,8 +1,9 @@
 """Whether the sticks of a vehicle's own transmitter leave neutral, by RC_CHANNELS.
 
 An ArduPilot in GUIDED takes the throttle stick for a speed of its own (1.9 m/s were measured where
-0 was asked for), and says so nowhere else. Where the sticks rest is what they show while we do not
-drive: a throttle may rest at its lowest. MAVLink guide: RC_CHANNELS.
+0 was asked for), and says so nowhere else. Where the sticks rest is what they show while the
+vehicle is disarmed: a throttle may rest at its lowest, and none is armed while it is held forward.
+What they show while it is armed may be held, also while nothing drives. MAVLink guide: RC_CHANNELS.
 """
 
 from mav_tasks.mavlink.messages import RcChannels
@@ -26,13 +27,13 @@ class StickWatch:
         """The vehicle has restarted: its transmitter may be another one."""
         self._rest, self._times = None, 0
 
-    def look(self, message: RcChannels, *, is_driven: bool) -> bool:
-        """Return whether a stick has left neutral; while not ``is_driven`` that is learnt."""
+    def look(self, message: RcChannels, *, armed: bool) -> bool:
+        """Return whether a stick is away from where it rests, which is learnt while disarmed."""
         now = message.chan1_raw, message.chan3_raw
         if not message.chancount or any(value in ABSENT for value in now):
             self._times = 0
             return False
-        if self._rest is None or not is_driven:
+        if self._rest is None or not armed:
             self._rest, self._times = now, 0
             return False
         moved = any(abs(value - rest) > LEAVES for value, rest in zip(now, self._rest, strict=True))

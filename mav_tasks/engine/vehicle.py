@@ -259,7 +259,7 @@ class Vehicle:
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.RcChannels):
-            if self._sticks.look(message, is_driven=self.armed and self.control.is_engaged):
+            if self._sticks.look(message, armed=self.armed) and self.control.is_engaged:
                 self._stick_moved(now=now)
         elif isinstance(message, m.AutopilotVersion):
             identity = identity_of(message)

@@ -74,6 +74,22 @@ def test_a_stick_held_forward_ends_in_hold(
     assert any("a stick is off its centre" in text for text in world.client.texts())
 
 
+def test_a_stick_that_is_still_held_when_somebody_continues_is_a_takeover_again(
+    make_world: MakeWorld,
+) -> None:
+    world = with_transmitter(make_world, Frame.SKID)
+    world.client.move(4.0)
+    world.run(4.0)
+    world.rover.autopilot.operator_pulses(FORWARD, CENTRE)
+    world.run(4.0)
+    north = world.truth.north
+    world.client.proceed()
+    world.run(6.0)
+    assert world.paused() is R.TAKEOVER
+    assert world.stands()
+    assert abs(world.truth.north - north) < 0.5
+
+
 def test_the_task_goes_on_when_the_stick_is_centred_and_somebody_says_continue(
     make_world: MakeWorld,
 ) -> None:

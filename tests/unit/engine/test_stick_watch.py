@@ -15,30 +15,30 @@ def channels(steering: int = 1500, throttle: int = 1500, *, count: int = 16) -> 
 @pytest.mark.parametrize("rest", [1500, 1000, 1520])
 def test_a_throttle_that_leaves_where_it_rests_is_seen_at_the_second_message(rest: int) -> None:
     watch = StickWatch()
-    assert not watch.look(channels(throttle=rest), is_driven=False)
-    assert not watch.look(channels(throttle=rest + 90), is_driven=True)
-    assert not watch.look(channels(throttle=rest + 250), is_driven=True)
-    assert watch.look(channels(throttle=rest + 250), is_driven=True)
+    assert not watch.look(channels(throttle=rest), armed=False)
+    assert not watch.look(channels(throttle=rest + 90), armed=True)
+    assert not watch.look(channels(throttle=rest + 250), armed=True)
+    assert watch.look(channels(throttle=rest + 250), armed=True)
 
 
 def test_steering_counts_too() -> None:
     watch = StickWatch()
-    watch.look(channels(), is_driven=False)
-    watch.look(channels(steering=1300), is_driven=True)
-    assert watch.look(channels(steering=1300), is_driven=True)
+    watch.look(channels(), armed=False)
+    watch.look(channels(steering=1300), armed=True)
+    assert watch.look(channels(steering=1300), armed=True)
 
 
-def test_what_they_show_while_nothing_is_driven_is_rest() -> None:
+def test_what_they_show_while_it_is_disarmed_is_rest() -> None:
     watch = StickWatch()
-    watch.look(channels(), is_driven=False)
-    watch.look(channels(throttle=1900), is_driven=False)
-    assert not watch.look(channels(throttle=1900), is_driven=True)
-    assert not watch.look(channels(throttle=1900), is_driven=True)
+    watch.look(channels(), armed=False)
+    watch.look(channels(throttle=1900), armed=False)
+    assert not watch.look(channels(throttle=1900), armed=True)
+    assert not watch.look(channels(throttle=1900), armed=True)
 
 
 @pytest.mark.parametrize("absent", [channels(0, 0), channels(65535, 65535), channels(count=0)])
 def test_a_rover_without_a_transmitter_has_no_sticks(absent: RcChannels) -> None:
     watch = StickWatch()
-    watch.look(channels(), is_driven=False)
+    watch.look(channels(), armed=False)
     for _ in range(5):
-        assert not watch.look(absent, is_driven=True)
+        assert not watch.look(absent, armed=True)
