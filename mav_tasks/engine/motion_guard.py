@@ -47,6 +47,7 @@ class Told(NamedTuple):
     moves: bool  # a velocity other than zero is asked for, and it is in our control
     is_ours: bool  # we drive it, hand it back or stop it
     is_stopping: bool  # STOP, or what is like it
+    swings_back: bool  # asked to stand in our mode, such a vehicle first swings back
     may_drive: bool  # in our control, and STOP is not latched
     goes_on: bool  # it stands for a task that goes on, or begins
     is_released: bool  # we do nothing to it any more
@@ -76,6 +77,10 @@ class MotionGuard:
         """Return whether it is known how the vehicle moves now."""
         motion = self._motion.latest()
         return motion is not None and now - motion.at <= self._watch.motion_fresh
+
+    def moves(self, *, now: float) -> bool:
+        """Return whether it is seen to get anywhere, faster than an estimate wanders at rest."""
+        return (self._speed(now=now) or 0.0) > MOVES
 
     def look(self, told: Told, *, now: float) -> list[Found]:
         """Return what is to be done now, in order."""
@@ -112,7 +117,8 @@ class MotionGuard:
             return [Found(Measure.HOLD)]
         if step is Step.DISARM and told.armed:
             return [Found(Measure.DISARM, f"moves in HOLD, {speed or 0.0:.1f} m/s: disarmed")]
-        if told.is_stopping and speed is not None and speed < NEARLY_STANDS:
+        ends = told.is_stopping or (told.swings_back and not told.goes_on)
+        if ends and speed is not None and speed < NEARLY_STANDS:
             return [Found(Measure.HOLD_NOW)]
         return []
 

@@ -19,23 +19,28 @@ class StickWatch:
     def __init__(self) -> None:
         self._rest: tuple[int, int] | None = None
         self._times = 0
+        #: 1 while the throttle is held forward of where it rests, -1 while back, else 0; a channel
+        #: that is reversed on the vehicle has it the other way round
+        self.throttle = 0
 
     def __repr__(self) -> str:
         return f"StickWatch(rest={self._rest})"
 
     def forget(self) -> None:
         """The vehicle has restarted: its transmitter may be another one."""
-        self._rest, self._times = None, 0
+        self._rest, self._times, self.throttle = None, 0, 0
 
     def look(self, message: RcChannels, *, armed: bool) -> bool:
         """Return whether a stick is away from where it rests, which is learnt while disarmed."""
         now = message.chan1_raw, message.chan3_raw
         if not message.chancount or any(value in ABSENT for value in now):
-            self._times = 0
+            self._times = self.throttle = 0
             return False
         if self._rest is None or not armed:
-            self._rest, self._times = now, 0
+            self._rest, self._times, self.throttle = now, 0, 0
             return False
+        off = now[1] - self._rest[1]
+        self.throttle = (off > LEAVES) - (off < -LEAVES)
         moved = any(abs(value - rest) > LEAVES for value, rest in zip(now, self._rest, strict=True))
         self._times = self._times + 1 if moved else 0
         return self._times >= TIMES

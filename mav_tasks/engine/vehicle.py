@@ -32,7 +32,7 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.identity import identity_of
 from mav_tasks.services.offboard import Phase, Refused
-from mav_tasks.services.orders import Speeds
+from mav_tasks.services.orders import Posture, Speeds
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import SET_FAILSAFE, Settings, Turning
 from mav_tasks.tasks.book import TaskBook
@@ -647,15 +647,21 @@ class Vehicle:
     def _stick_moved(self, *, now: float) -> None:
         """A person holds a stick of the vehicle's own transmitter, and it may drive by that.
 
-        In our mode nobody can steer by sticks, and zeros do not stop it: HOLD does.
+        In our mode nobody can steer by sticks, and zeros do not stop it. HOLD does; but one that
+        rolls on in HOLD first brakes by set-points against the stick.
         """
         phase = self.control.phase
         if phase in (Phase.STOPPING, Phase.RELEASING) or self.tasks.is_stopped:
             return
+        if self.tasks.paused is TaskReason.TAKEOVER and self._guard.ladder.is_on:
+            return  # and is being stopped for that
         self._note("a stick is off its centre: HOLD. Centre it, then continue", now=now)
         self._authority.note_other(now=now)
         self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
-        self.control.begin_release(now=now)
+        if self.persona.brakes_by_setpoints and self._sticks.throttle and self._guard.is_fresh(now=now):
+            self.step(now=now)
+        else:
+            self.control.begin_release(now=now)
         self._guard.ladder.begin(now=now)
         self.requests.flush(now=now)
         self._clock.restart(now=now)
@@ -896,10 +902,12 @@ class Vehicle:
         self._plan_tick(now=now)
 
     def _face(self, *, now: float) -> None:
-        """Tell its control where it points: what asks it to stand may have to say so."""
+        """Tell its control what decides how it is asked to stand."""
         motion = self.where.motion.latest()
         is_known = motion is not None and now - motion.at <= self._settings.watch.position_lost
-        self.control.face(motion.pose.yaw if motion is not None and is_known else None)
+        yaw = motion.pose.yaw if motion is not None and is_known else None
+        moves = not self.where.motion.is_still(now=now) and self._guard.moves(now=now)
+        self.control.posture = Posture(yaw, moves=moves, stick=self._sticks.throttle)
 
     def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         """See that it stands when it is told to, and drives no faster than it is told to."""
@@ -911,6 +919,7 @@ class Vehicle:
             moves=control.in_control and not wanted.is_zero,
             is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
             is_stopping=control.phase is Phase.STOPPING,
+            swings_back=self.persona.swings_back,
             may_drive=control.in_control and not self.tasks.is_stopped,
             goes_on=demand.kind in (DemandKind.TAKE, DemandKind.DRIVE),
             is_released=not control.is_engaged,
@@ -924,6 +933,8 @@ class Vehicle:
 
     def _take_measure(self, found: Found, demand: Demand, *, now: float) -> None:
         match found.measure:
+            case Measure.HOLD_NOW if self.control.in_control:
+                self.control.begin_release(now=now)
             case Measure.HOLD_NOW:
                 self.control.hold_now(now=now)
             case Measure.DISARM:

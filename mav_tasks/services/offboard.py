@@ -21,7 +21,7 @@ from mav_tasks.mavlink.messages import (
     SetPositionTargetLocalNed,
 )
 from mav_tasks.services.command_sender import Answered, CommandSender
-from mav_tasks.services.orders import STANDING, Orders, Speeds
+from mav_tasks.services.orders import STANDING, Orders, Posture, Speeds, to_stand
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Watch
 
@@ -101,7 +101,8 @@ class OffboardControl:
         #: HOLD was shown when it was asked for: only the answer tells it from that of a failsafe
         self._awaits_answer = False
         self._last_was_awaited = False  # the latest heartbeat was the first to show it
-        self._heading: float | None = None  # rad, where it points
+        #: what decides which set-point asks it to stand
+        self.posture = Posture()
         self._outgoing: list[Message] = []
         self._ask_until = -inf  # our mode or arming is asked for until then
         self._ask_again_at: float | None = None  # a refused request is repeated then
@@ -167,10 +168,6 @@ class OffboardControl:
     @property
     def _in_hold(self) -> bool:
         return self._is_settled and self._mode == self._persona.hold_mode
-
-    def face(self, yaw: float | None) -> None:
-        """Note where the vehicle points, rad from north; None: nothing fresh is known of that."""
-        self._heading = yaw
 
     def apply(self, watch: Watch) -> None:
         """Take new settings."""
@@ -590,10 +587,7 @@ class OffboardControl:
 
     @property
     def _standing(self) -> Speeds:
-        """What asks it to stand as it is; plain zeros to one that is not armed."""
-        if self._persona.stands_by_course and self._armed and self._heading is not None:
-            return Speeds(0.0, course=self._heading)
-        return STANDING
+        return to_stand(self._persona, self.posture, armed=self._armed)
 
     def _send_setpoint(self, wanted: Speeds) -> None:
         wanted = self._standing if wanted == STANDING else wanted

@@ -1,6 +1,6 @@
 """What is said to one vehicle so that it does what we want, in the way of its persona. Pure."""
 
-from math import cos, isfinite, sin
+from math import copysign, cos, isfinite, sin
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
@@ -32,10 +32,38 @@ class Speeds(NamedTuple):
 
 
 STANDING = Speeds(0.0)
-#: m/s along a course, on which a vehicle that is steered by course stands, or turns on the spot:
-#: 1e-6 to 1e-3 were seen to (PX4 1.17). Zero has no course, and is taken for north.
-STANDING_SPEED = 1e-3
-LEAST = 2 * STANDING_SPEED  # m/s or rad/s; what is slower does not set a vehicle in motion
+#: m/s along a course, on which a vehicle that is steered by course stands, or turns on the spot.
+#: Zero has no course, and is taken for north. Below 1.2e-7 (FLT_EPSILON) PX4 1.17 switches its
+#: speed loop off and forgets what that has wound up, so that no error of its estimate moves it.
+STANDING_SPEED = 1e-8
+#: m/s, on which one that moves brakes by its speed loop: PX4's along its heading, and an
+#: ArduPilot's against a throttle stick, which counts only in the direction that is asked for
+BRAKING_SPEED = 1e-3
+LEAST = 2 * BRAKING_SPEED  # m/s or rad/s; what is slower does not set a vehicle in motion
+
+
+class Posture(NamedTuple):
+    """What decides which set-point asks a vehicle to stand.
+
+    ``heading`` is in rad from north, None while nothing fresh is known of it; ``moves`` whether it
+    is seen to get anywhere; ``stick`` is 1 while its own throttle stick is held forward, -1 while
+    it is held back, 0 at rest or where nothing is known of it.
+    """
+
+    heading: float | None = None
+    moves: bool = False
+    stick: int = 0
+
+
+def to_stand(persona: Persona, posture: Posture, *, armed: bool) -> Speeds:
+    """Return what asks such a vehicle to stand as it is; plain zeros where it is not armed."""
+    if not armed:
+        return STANDING
+    if persona.stands_by_course and posture.heading is not None:
+        return Speeds(BRAKING_SPEED if posture.moves else 0.0, course=posture.heading)
+    if persona.heeds_throttle_stick and posture.stick:
+        return Speeds(-copysign(BRAKING_SPEED, posture.stick))
+    return STANDING
 
 
 class Orders:

@@ -50,6 +50,9 @@ class Persona:
     #: its set-points are speed and yaw rate, and it reverses; else they are speed and course, and
     #: it does not
     honours_yaw_rate: bool
+    #: in our mode it drives as fast as set-point or throttle stick asks, whichever is more; a stick
+    #: against the direction that is asked for does not count
+    heeds_throttle_stick: bool
     cruise_parameters: tuple[str, ...]  # m/s, of what names no speed
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
@@ -71,11 +74,19 @@ class Persona:
         return self.turning is Turning.STEERED
 
     @property
+    def swings_back(self) -> bool:
+        """Whether its speed loop, asked to stand, takes it back through zero to 0.17 m/s.
+
+        An ArduPilot that steers as a car does (4.6.3): HOLD at the last moment prevents it.
+        """
+        return self.turning is Turning.STEERED and self.heeds_throttle_stick
+
+    @property
     def stands_by_course(self) -> bool:
         """Whether it takes zero velocity for "to the north", and turns there.
 
         PX4 1.17 does: a differential rover turns on the spot, one that steers as a car bends while
-        it brakes. It stands, as it is, on a velocity of 1 mm/s along its heading.
+        it brakes. It stands, as it is, on a velocity of next to nothing along its heading.
         """
         return not self.honours_yaw_rate
 
@@ -138,6 +149,7 @@ ARDUPILOT = Persona(
     starts_when_armed=False,
     has_loss_failsafe=False,  # it stops after 3 s (observed on 4.6.3)
     honours_yaw_rate=True,
+    heeds_throttle_stick=True,  # 4.6.3
     cruise_parameters=("WP_SPEED", "CRUISE_SPEED"),
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
     setpoint_frame=MavFrame.BODY_NED,
@@ -183,6 +195,7 @@ PX4 = Persona(
     starts_when_armed=True,
     has_loss_failsafe=True,
     honours_yaw_rate=False,
+    heeds_throttle_stick=False,
     cruise_parameters=("RO_SPEED_LIM",),
     setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
     setpoint_frame=MavFrame.LOCAL_NED,

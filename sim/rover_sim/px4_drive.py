@@ -20,6 +20,7 @@ THRUST, BREAKAWAY, FRICTION, DRAG = 20.0, 4.9, 3.57, 1.43  # m/s², m/s², m/s²
 YAW_INTEGRAL = 1.0  # 1/s; recorded, it does not swing after a turn at 195 deg/s: with more it does
 DEAD_TIME = 8  # control periods, from setpoint to thrust
 ROLLED_OUT = 0.03  # m/s
+FLT_EPSILON = 1.1920929e-7  # m/s asked, below which the speed loop is off and forgets its integral
 FREE_ROLLING = 2.0  # s, disarmed. SIH's rolls on for ever, which is its model's and no vehicle's
 
 
@@ -83,12 +84,14 @@ class AckermannDrive:
     def _throttle(self, demand: Demand, estimate: Estimate) -> float:
         values = self._parameters
         self._asked = ramped(self._asked, demand.speed, values)
-        error = self._asked - estimate.forward_speed
+        forward = self._asked / values["RO_MAX_THR_SPEED"]
+        if abs(self._asked) < FLT_EPSILON:
+            self._integral = 0.0
+            return forward
+        is_seen = abs(estimate.forward_speed) > values["RO_SPEED_TH"]
+        error = self._asked - (estimate.forward_speed if is_seen else 0.0)
         self._integral += values["RO_SPEED_I"] * error * CONTROL_PERIOD
         self._integral = max(-1.0, min(1.0, self._integral))
-        if demand.speed == 0.0 and self._asked == 0.0 and abs(self._speed) < ROLLED_OUT:
-            self._integral = 0.0
-        forward = self._asked / values["RO_MAX_THR_SPEED"]
         return max(-1.0, min(1.0, forward + values["RO_SPEED_P"] * error + self._integral))
 
 

@@ -101,6 +101,7 @@ DIFFERENTIAL: tuple[Parameter, ...] = (
     Parameter("RO_SPEED_LIM", 1.8),
     Parameter("RO_SPEED_P", 0.01),
     Parameter("RO_SPEED_RED", 1.0),
+    Parameter("RO_SPEED_TH", 0.1),  # m/s reported; slower counts as standing
     Parameter("RO_YAW_ACCEL_LIM", 400.0),
     Parameter("RO_YAW_DECEL_LIM", 800.0),
     Parameter("RO_YAW_P", 5.0),
@@ -123,6 +124,7 @@ ACKERMANN: tuple[Parameter, ...] = (
     Parameter("RO_SPEED_LIM", 3.0),
     Parameter("RO_SPEED_P", 0.001),
     Parameter("RO_SPEED_RED", 1.0),
+    Parameter("RO_SPEED_TH", 0.1),  # m/s reported; slower counts as standing
     Parameter("RO_YAW_ACCEL_LIM", 400.0),
     Parameter("RO_YAW_DECEL_LIM", 800.0),
     Parameter("RO_YAW_P", 5.0),

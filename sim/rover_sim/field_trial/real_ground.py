@@ -20,7 +20,8 @@ from rover_sim.field_trial.track import Track
 END_WITHIN = 15.0  # s; the server itself waits 3 s at most for the rover to stand
 UP_WITHIN = 10.0  # s
 STICK_PERIOD = 0.1  # s between two RC_CHANNELS_OVERRIDE; they count for 3 s
-UNTOUCHED, RELEASED = 65535, 0
+LET_GO = (1500,) * 5 + (0,)  # µs: it springs back before it is nobody's, or it lingers for 3 s
+UNTOUCHED = 65535
 THROTTLE = 2  # channel 3
 
 
@@ -135,12 +136,15 @@ class RealGround:
         await self.end_server()
 
     async def _push(self) -> None:
+        while self._stick is not None:
+            await self._override(self._stick)
+        for throttle in LET_GO:
+            await self._override(throttle)
+        self._pushing = None
+
+    async def _override(self, throttle: int) -> None:
         assert self._second is not None
-        while True:
-            channels = [UNTOUCHED] * 8
-            channels[THROTTLE] = RELEASED if self._stick is None else self._stick
-            self._second.out.rc_channels_override_send(self._second.system, 1, *channels)
-            await asyncio.sleep(STICK_PERIOD)
-            if self._stick is None:
-                self._pushing = None
-                return
+        channels = [UNTOUCHED] * 8
+        channels[THROTTLE] = throttle
+        self._second.out.rc_channels_override_send(self._second.system, 1, *channels)
+        await asyncio.sleep(STICK_PERIOD)

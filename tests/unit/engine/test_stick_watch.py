@@ -36,6 +36,16 @@ def test_what_they_show_while_it_is_disarmed_is_rest() -> None:
     assert not watch.look(channels(throttle=1900), armed=True)
 
 
+@pytest.mark.parametrize(("throttle", "held"), [(1700, 1), (1300, -1), (1560, 0)])
+def test_it_is_known_which_way_the_throttle_is_held(throttle: int, held: int) -> None:
+    watch = StickWatch()
+    watch.look(channels(), armed=False)
+    watch.look(channels(throttle=throttle), armed=True)
+    assert watch.throttle == held
+    watch.look(channels(), armed=True)
+    assert watch.throttle == 0
+
+
 @pytest.mark.parametrize("absent", [channels(0, 0), channels(65535, 65535), channels(count=0)])
 def test_a_rover_without_a_transmitter_has_no_sticks(absent: RcChannels) -> None:
     watch = StickWatch()

@@ -1,13 +1,13 @@
 """Control of PX4 and generic rovers: the order of the steps, and what STOP is made of."""
 
-from math import cos, pi, sin
+from math import atan2, cos, hypot, pi, sin
 
 import pytest
 
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import SetPositionTargetLocalNed
 from mav_tasks.services.offboard import AWAITED, LEAD_IN, UNSTOPPED, Phase, Refused
-from mav_tasks.services.orders import STANDING, Speeds, moves
+from mav_tasks.services.orders import STANDING, Posture, Speeds, moves
 from mav_tasks.services.persona import GENERIC, PX4, Persona
 from mav_tasks.settings import Watch
 from tests.unit.services.control_rig import PERIOD, Rig
@@ -15,6 +15,7 @@ from tests.unit.services.control_rig import PERIOD, Rig
 HOLD, OFFBOARD = PX4.hold_mode, PX4.control_mode
 MISSION = PX4.mission_mode
 ASK_FOR = Watch().ask_vehicle  # s
+FLT_EPSILON = 1.1920929e-7  # m/s; PX4's speed loop is off below
 
 both = pytest.mark.parametrize("persona", [PX4, GENERIC], ids=str)
 
@@ -52,34 +53,45 @@ def in_control(persona: Persona = PX4) -> Rig:
 
 
 class TestStanding:
-    """Zero velocity is a course to the north for it; 1 mm/s along its heading is to stand."""
+    """Zero velocity is a course to the north for it; next to none along its heading is to stand."""
 
     @pytest.mark.parametrize("yaw", [0.0, 2.5, -pi])
     def test_is_asked_for_along_the_heading(self, yaw: float) -> None:
         rig = in_control()
-        rig.control.face(yaw)
+        rig.control.posture = Posture(yaw)
         rig.control.drive(STANDING)
         [setpoint] = rig.control.take_messages()
         assert isinstance(setpoint, SetPositionTargetLocalNed)
-        assert (setpoint.vx, setpoint.vy) == pytest.approx((1e-3 * cos(yaw), 1e-3 * sin(yaw)))
+        assert atan2(setpoint.vy, setpoint.vx) == pytest.approx(yaw)
+        assert 0.0 < hypot(setpoint.vx, setpoint.vy) < FLT_EPSILON
+
+    def test_is_one_millimetre_a_second_while_it_moves_so_that_its_speed_loop_brakes(self) -> None:
+        rig = in_control()
+        rig.control.posture = Posture(1.0, moves=True)
+        rig.control.drive(STANDING)
+        [setpoint] = rig.control.take_messages()
+        assert isinstance(setpoint, SetPositionTargetLocalNed)
+        assert (setpoint.vx, setpoint.vy) == pytest.approx((1e-3 * cos(1.0), 1e-3 * sin(1.0)))
+        assert not moves(setpoint)
 
     def test_is_plain_zero_for_one_that_is_not_armed_or_whose_heading_is_not_known(self) -> None:
         for rig, yaw in ((Rig(PX4), 1.0), (in_control(), None)):
-            rig.control.face(yaw)
+            rig.control.posture = Posture(yaw)
             setpoint = rig.control.zero_setpoint()
             assert (setpoint.vx, setpoint.vy, setpoint.yaw_rate) == (0.0, 0.0, 0.0)
 
     def test_a_course_without_a_speed_is_a_turn_on_the_spot(self) -> None:
         rig = in_control()
-        rig.control.face(0.0)
+        rig.control.posture = Posture(0.0)
         rig.control.drive(Speeds(0.0, course=pi / 2))
         [setpoint] = rig.control.take_messages()
         assert isinstance(setpoint, SetPositionTargetLocalNed)
-        assert (setpoint.vx, setpoint.vy) == pytest.approx((0.0, 1e-3))
+        assert atan2(setpoint.vy, setpoint.vx) == pytest.approx(pi / 2)
+        assert 0.0 < hypot(setpoint.vx, setpoint.vy) < FLT_EPSILON
 
     def test_it_may_come_late_and_motion_may_not(self) -> None:
         rig = in_control()
-        rig.control.face(1.0)
+        rig.control.posture = Posture(1.0)
         assert not moves(rig.control.zero_setpoint())
 
 
