@@ -17,6 +17,8 @@ from mav_tasks.settings import Watch
 NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
 SWINGS = 1.0  # s in which a car may swing back after its task's own zeros: to 0.15 m/s (ArduPilot)
 RUNS_ON = 0.4  # m/s on those, that are more than a speed loop that has wound up
+ROLLS = 0.05  # m/s; by the time that this is known, a car that brakes has 0.03 m/s less
+BRAKES_WITHIN = 2.0  # s; from 2 m/s at 1 m/s², and what takes longer is HOLD's
 SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
 
 
@@ -47,7 +49,7 @@ class Told(NamedTuple):
     moves: bool  # a velocity other than zero is asked for, and it is in our control
     is_ours: bool  # we drive it, hand it back or stop it
     is_stopping: bool  # STOP, or what is like it
-    swings_back: bool  # asked to stand in our mode, such a vehicle first swings back
+    rolls_out: bool  # in our mode, such a vehicle rolls on or swings back before it stands
     may_drive: bool  # in our control, and STOP is not latched
     goes_on: bool  # it stands for a task that goes on, or begins
     is_released: bool  # we do nothing to it any more
@@ -78,9 +80,18 @@ class MotionGuard:
         motion = self._motion.latest()
         return motion is not None and now - motion.at <= self._watch.motion_fresh
 
-    def moves(self, *, now: float) -> bool:
-        """Return whether it is seen to get anywhere, faster than an estimate wanders at rest."""
-        return (self._speed(now=now) or 0.0) > MOVES
+    def brakes(self, *, now: float) -> bool:
+        """Return whether it was told to stand a moment ago, and rolls on along its heading.
+
+        What an estimate wanders at rest, it wanders to all sides, and for longer; and it is the
+        speed that is reported or the way that was made, not both.
+        """
+        motion = self._motion.latest()
+        if motion is None or self.ladder.lasts(now=now) > BRAKES_WITHIN:
+            return False
+        forward = self._motion.standstill.forward(SPEED_WINDOW, now=now)
+        is_known = forward is not None and self.is_fresh(now=now)
+        return is_known and min(abs(forward or 0.0), abs(motion.forward)) > ROLLS
 
     def look(self, told: Told, *, now: float) -> list[Found]:
         """Return what is to be done now, in order."""
@@ -117,7 +128,7 @@ class MotionGuard:
             return [Found(Measure.HOLD)]
         if step is Step.DISARM and told.armed:
             return [Found(Measure.DISARM, f"moves in HOLD, {speed or 0.0:.1f} m/s: disarmed")]
-        ends = told.is_stopping or (told.swings_back and not told.goes_on)
+        ends = told.is_stopping or (told.rolls_out and not told.goes_on)
         if ends and speed is not None and speed < NEARLY_STANDS:
             return [Found(Measure.HOLD_NOW)]
         return []

@@ -14,7 +14,7 @@ gets nowhere in the long run.
 """
 
 from collections import deque
-from math import hypot
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 from mav_tasks.settings import Watch
@@ -118,6 +118,15 @@ class Standstill:
         last = self._samples[-1]
         took = last.at - first.at
         return hypot(last.north - first.north, last.east - first.east) / took if took > 0 else None
+
+    def forward(self, window: float, *, now: float) -> float | None:
+        """Return m/s along where it points by displacement; None while the window is not covered."""
+        first = self._first_within(window, now=now)
+        if first is None:
+            return None
+        last = self._samples[-1]
+        north, east, took = last.north - first.north, last.east - first.east, last.at - first.at
+        return (north * cos(last.yaw) + east * sin(last.yaw)) / took if took > 0 else None
 
     def _first_within(self, window: float, *, now: float) -> Sample | None:
         """Return the oldest sample of a window; None if the window is older than all samples."""

@@ -906,8 +906,8 @@ class Vehicle:
         motion = self.where.motion.latest()
         is_known = motion is not None and now - motion.at <= self._settings.watch.position_lost
         yaw = motion.pose.yaw if motion is not None and is_known else None
-        moves = not self.where.motion.is_still(now=now) and self._guard.moves(now=now)
-        self.control.posture = Posture(yaw, moves=moves, stick=self._sticks.throttle)
+        rolls = self._guard.brakes(now=now)
+        self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle)
 
     def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         """See that it stands when it is told to, and drives no faster than it is told to."""
@@ -919,7 +919,7 @@ class Vehicle:
             moves=control.in_control and not wanted.is_zero,
             is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
             is_stopping=control.phase is Phase.STOPPING,
-            swings_back=self.persona.swings_back,
+            rolls_out=self.persona.rolls_out,
             may_drive=control.in_control and not self.tasks.is_stopped,
             goes_on=demand.kind in (DemandKind.TAKE, DemandKind.DRIVE),
             is_released=not control.is_engaged,

@@ -36,8 +36,9 @@ STANDING = Speeds(0.0)
 #: Zero has no course, and is taken for north. Below 1.2e-7 (FLT_EPSILON) PX4 1.17 switches its
 #: speed loop off and forgets what that has wound up, so that no error of its estimate moves it.
 STANDING_SPEED = 1e-8
-#: m/s, on which one that moves brakes by its speed loop: PX4's along its heading, and an
-#: ArduPilot's against a throttle stick, which counts only in the direction that is asked for
+#: m/s, on which one that rolls brakes by its speed loop: PX4's along its heading; an ArduPilot's,
+#: which on zero lets go at 0.1 m/s and rolls on for 0.2 m as a car, or which drives on by a
+#: throttle stick: that counts only in the direction that is asked for
 BRAKING_SPEED = 1e-3
 LEAST = 2 * BRAKING_SPEED  # m/s or rad/s; what is slower does not set a vehicle in motion
 
@@ -45,13 +46,13 @@ LEAST = 2 * BRAKING_SPEED  # m/s or rad/s; what is slower does not set a vehicle
 class Posture(NamedTuple):
     """What decides which set-point asks a vehicle to stand.
 
-    ``heading`` is in rad from north, None while nothing fresh is known of it; ``moves`` whether it
-    is seen to get anywhere; ``stick`` is 1 while its own throttle stick is held forward, -1 while
+    ``heading`` is in rad from north, None while nothing fresh is known of it; ``rolls`` whether it
+    still gets on along that; ``stick`` is 1 while its own throttle stick is held forward, -1 while
     it is held back, 0 at rest or where nothing is known of it.
     """
 
     heading: float | None = None
-    moves: bool = False
+    rolls: bool = False
     stick: int = 0
 
 
@@ -60,9 +61,11 @@ def to_stand(persona: Persona, posture: Posture, *, armed: bool) -> Speeds:
     if not armed:
         return STANDING
     if persona.stands_by_course and posture.heading is not None:
-        return Speeds(BRAKING_SPEED if posture.moves else 0.0, course=posture.heading)
+        return Speeds(BRAKING_SPEED if posture.rolls else 0.0, course=posture.heading)
     if persona.heeds_throttle_stick and posture.stick:
         return Speeds(-copysign(BRAKING_SPEED, posture.stick))
+    if persona.rolls_out and posture.rolls:
+        return Speeds(BRAKING_SPEED)
     return STANDING
 
 

@@ -74,10 +74,12 @@ class Persona:
         return self.turning is Turning.STEERED
 
     @property
-    def swings_back(self) -> bool:
-        """Whether its speed loop, asked to stand, takes it back through zero to 0.17 m/s.
+    def rolls_out(self) -> bool:
+        """Whether it lets go before it stands when zero is asked of it, and rolls on.
 
-        An ArduPilot that steers as a car does (4.6.3): HOLD at the last moment prevents it.
+        An ArduPilot that steers as a car does so at 0.1 m/s (ATC_STOP_SPEED, 4.6.3). Asked for
+        next to nothing it brakes on, and then swings back to 0.17 m/s: what makes it stand is the
+        one until it nearly stands, and then the other.
         """
         return self.turning is Turning.STEERED and self.heeds_throttle_stick
 

@@ -38,14 +38,22 @@ LONGEST_LAG = 2.5  # s; 1.7 was measured
 MOST_COAST = 0.12  # m or rad before the end at which zero is asked for at the most
 #: the same of a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot's)
 MOST_COAST_OF_CAR = 1.0  # m
+#: m/s, below which a car that is steered by course is not asked to drive. It sticks and slips where
+#: its speed loop winds up against friction: PX4's went 0.3 m in one leap where 0.15 was asked.
+LEAST_OF_ONE_TRY = 0.3
+TELLING = 0.3  # m/s, from which a car's stops are alike: from 0.05 it rolls on for half as long
+LAG_OF_CAR = 0.6  # s, until it is learnt: 0.5 and 0.7 were measured (ArduPilot's)
 GAIN_BY_LAG = 0.7  # the approach is slower for a rover that rolls on for longer
 
 
 class Creeping:
     """What was learnt of one rover's slowest motion, along or around: kept for all its tasks."""
 
-    def __init__(self, *, least: float, lag: float, most: float = MOST_COAST) -> None:
+    def __init__(
+        self, *, least: float, lag: float, most: float = MOST_COAST, telling: float = CREEP_RATE
+    ) -> None:
         self._least_known, self._most = least, most
+        self._telling = telling  # m/s or rad/s; a stop from less than this tells less of others
         self.least = least  # m/s or rad/s that moves it
         self.lag = lag  # s times the speed: how far it rolls on after zero
 
@@ -64,7 +72,8 @@ class Creeping:
         """Take in how far it rolled on after zero was asked for at a speed."""
         if speed > 0:
             seen = max(0.0, min(LONGEST_LAG, way / speed))
-            self.lag = 0.5 * (self.lag + seen)
+            weight = 0.5 * min(1.0, speed / self._telling)
+            self.lag += weight * (seen - self.lag)
 
     def had_no_effect(self, speed: float) -> None:
         """Ask for more than this speed from now on: at this speed it stands."""
@@ -85,7 +94,10 @@ class Arrival:
     def __init__(self) -> None:
         self.along = Creeping(least=CREEP_SPEED, lag=0.1)
         self.around = Creeping(least=CREEP_RATE, lag=0.05)
-        self.as_car = Creeping(least=CREEP_SPEED, lag=0.1, most=MOST_COAST_OF_CAR)
+        self.as_car = Creeping(
+            least=CREEP_SPEED, lag=LAG_OF_CAR, most=MOST_COAST_OF_CAR, telling=TELLING
+        )
+        self.in_one_try = Creeping(least=LEAST_OF_ONE_TRY, lag=0.1, most=MOST_COAST_OF_CAR)
         self._is_settling = False  # zero is asked for until it stands
         self._gives_up = False  # what it reached is good enough, if it is near
         self._corrections = 0
@@ -100,8 +112,7 @@ class Arrival:
 
     def slowest(self, course: Course) -> Slowest:
         """Return how the last of a leg is to be driven."""
-        along = self.along if course.steering is None else self.as_car
-        around = self.around
+        along, around = self._driven(course), self.around
         return Slowest(along.least, around.least, along.gain(APPROACH_GAIN), around.gain(TURN_GAIN))
 
     def begin_leg(self) -> None:
@@ -112,6 +123,7 @@ class Arrival:
         self.along.begins_again()
         self.around.begins_again()
         self.as_car.begins_again()
+        self.in_one_try.begins_again()
 
     def stands_here(
         self,
@@ -155,7 +167,7 @@ class Arrival:
             self._corrections += 1
             if course.remaining < 0.0:
                 self._creeping(course).overshot()
-        tried = self._gives_up or self._corrections > CORRECTIONS
+        tried = self._gives_up or self._corrections > (0 if course.has_one_try else CORRECTIONS)
         return tried and course.is_settled(driving=driving)
 
     def _watch(self, course: Course, *, driving: Driving, now: float) -> None:
@@ -186,6 +198,11 @@ class Arrival:
     def _creeping(self, course: Course) -> Creeping:
         if isinstance(course.leg, Rotate):
             return self.around
+        return self._driven(course)
+
+    def _driven(self, course: Course) -> Creeping:
+        if course.has_one_try:
+            return self.in_one_try
         return self.along if course.steering is None else self.as_car
 
     def _measured(self, course: Course, motion: Motion) -> float:

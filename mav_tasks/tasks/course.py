@@ -62,6 +62,11 @@ class Course:
         return length_of(self.leg) - self.progress.done
 
     @property
+    def has_one_try(self) -> bool:
+        """Whether what is short of the end, or past it, cannot be corrected: a car by course."""
+        return self.by_course and self.steering is not None
+
+    @property
     def is_passing(self) -> bool:
         """Whether the present leg ends without standing."""
         return self.passing > 0.0 and self.progress.leg == WAY
@@ -70,8 +75,7 @@ class Course:
     def _near_enough(self) -> float:
         """Metres from a place, within which it is reached."""
         radius = self.goal.radius if isinstance(self.goal, GoTo) else None
-        is_loop_away = self.by_course and self.steering is not None
-        return max(radius or 0.0, BESIDE_OF_LOOP if is_loop_away else BESIDE)
+        return max(radius or 0.0, BESIDE_OF_LOOP if self.has_one_try else BESIDE)
 
     def has_passed(self, motion: Motion) -> bool:
         """Whether the place is near enough to go on to the next."""

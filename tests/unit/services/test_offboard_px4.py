@@ -65,9 +65,9 @@ class TestStanding:
         assert atan2(setpoint.vy, setpoint.vx) == pytest.approx(yaw)
         assert 0.0 < hypot(setpoint.vx, setpoint.vy) < FLT_EPSILON
 
-    def test_is_one_millimetre_a_second_while_it_moves_so_that_its_speed_loop_brakes(self) -> None:
+    def test_is_one_millimetre_a_second_while_it_rolls_so_that_its_speed_loop_brakes(self) -> None:
         rig = in_control()
-        rig.control.posture = Posture(1.0, moves=True)
+        rig.control.posture = Posture(1.0, rolls=True)
         rig.control.drive(STANDING)
         [setpoint] = rig.control.take_messages()
         assert isinstance(setpoint, SetPositionTargetLocalNed)
