@@ -17,7 +17,7 @@ from mav_tasks.settings import Watch
 NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
 SWINGS = 1.0  # s in which a car may swing back after its task's own zeros: to 0.15 m/s (ArduPilot)
 RUNS_ON = 0.4  # m/s on those, that are more than a speed loop that has wound up
-ROLLS = 0.05  # m/s; by the time that this is known, a car that brakes has 0.03 m/s less
+ROLLS = 0.03  # m/s, at which one that rolls out still brakes; with 0.05 it went on for 9 cm
 BRAKES_WITHIN = 2.0  # s; from 2 m/s at 1 m/s², and what takes longer is HOLD's
 SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
 
@@ -67,6 +67,7 @@ class MotionGuard:
         self._watch = watch
         self.ladder = StopLadder()
         self._overspeed = Overspeed()
+        self._told_to_move_at = -inf
 
     def __repr__(self) -> str:
         return f"MotionGuard({self.ladder!r}, {self._overspeed!r})"
@@ -80,18 +81,19 @@ class MotionGuard:
         motion = self._motion.latest()
         return motion is not None and now - motion.at <= self._watch.motion_fresh
 
-    def brakes(self, *, now: float) -> bool:
-        """Return whether it was told to stand a moment ago, and rolls on along its heading.
+    def brakes(self, *, rolls_out: bool, now: float) -> bool:
+        """Return whether it was told to move a moment ago, and still rolls on along its heading.
 
-        What an estimate wanders at rest, it wanders to all sides, and for longer; and it is the
-        speed that is reported or the way that was made, not both.
+        At rest an estimate wanders, too, but for longer; and it is the speed that is reported or
+        the way that was made, not both.
         """
         motion = self._motion.latest()
-        if motion is None or self.ladder.lasts(now=now) > BRAKES_WITHIN:
+        if motion is None or now - self._told_to_move_at > BRAKES_WITHIN:
             return False
+        least = ROLLS if rolls_out else MOVES
         forward = self._motion.standstill.forward(SPEED_WINDOW, now=now)
         is_known = forward is not None and self.is_fresh(now=now)
-        return is_known and min(abs(forward or 0.0), abs(motion.forward)) > ROLLS
+        return is_known and min(abs(forward or 0.0), abs(motion.forward)) > least
 
     def look(self, told: Told, *, now: float) -> list[Found]:
         """Return what is to be done now, in order."""
@@ -101,6 +103,7 @@ class MotionGuard:
             if too_fast:
                 found.append(Found(Measure.STOP_TASK, too_fast))
         if told.moves:
+            self._told_to_move_at = now
             self.ladder.end()
         elif told.is_ours and told.armed and not told.still:
             self.ladder.begin(now=now)

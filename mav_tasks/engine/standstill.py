@@ -120,7 +120,7 @@ class Standstill:
         return hypot(last.north - first.north, last.east - first.east) / took if took > 0 else None
 
     def forward(self, window: float, *, now: float) -> float | None:
-        """Return m/s along where it points by displacement; None while the window is not covered."""
+        """Return m/s along its heading by displacement; None while the window is not covered."""
         first = self._first_within(window, now=now)
         if first is None:
             return None

@@ -55,10 +55,6 @@ class StopLadder:
         """Whether it is not known yet that the vehicle stands."""
         return self.step is not Step.OFF
 
-    def lasts(self, *, now: float) -> float:
-        """Return for how many seconds it has been on; 0 for one that is off."""
-        return now - self._began if self.is_on else 0.0
-
     def begin(self, *, now: float) -> None:
         """The vehicle is told to stand from now on; does nothing to a ladder that is on."""
         if self.is_on:

@@ -38,11 +38,12 @@ LONGEST_LAG = 2.5  # s; 1.7 was measured
 MOST_COAST = 0.12  # m or rad before the end at which zero is asked for at the most
 #: the same of a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot's)
 MOST_COAST_OF_CAR = 1.0  # m
-#: m/s, below which a car that is steered by course is not asked to drive. It sticks and slips where
-#: its speed loop winds up against friction: PX4's went 0.3 m in one leap where 0.15 was asked.
-LEAST_OF_ONE_TRY = 0.3
+#: m/s, below which a car that is steered by course is not asked to drive. PX4's speed loop sticks
+#: and slips there: where 0.3 was asked it did 0.1, and went 0.3 m in one leap where 0.15 was asked.
+LEAST_OF_ONE_TRY = 0.5
 TELLING = 0.3  # m/s, from which a car's stops are alike: from 0.05 it rolls on for half as long
 LAG_OF_CAR = 0.6  # s, until it is learnt: 0.5 and 0.7 were measured (ArduPilot's)
+LAG_OF_ONE_TRY = 0.3  # s, until it is learnt: 0.15 (SIH) and 0.4 (at 1 m/s²) were measured
 GAIN_BY_LAG = 0.7  # the approach is slower for a rover that rolls on for longer
 
 
@@ -97,7 +98,9 @@ class Arrival:
         self.as_car = Creeping(
             least=CREEP_SPEED, lag=LAG_OF_CAR, most=MOST_COAST_OF_CAR, telling=TELLING
         )
-        self.in_one_try = Creeping(least=LEAST_OF_ONE_TRY, lag=0.1, most=MOST_COAST_OF_CAR)
+        self.in_one_try = Creeping(
+            least=LEAST_OF_ONE_TRY, lag=LAG_OF_ONE_TRY, most=MOST_COAST_OF_CAR, telling=TELLING
+        )
         self._is_settling = False  # zero is asked for until it stands
         self._gives_up = False  # what it reached is good enough, if it is near
         self._corrections = 0
@@ -167,7 +170,7 @@ class Arrival:
             self._corrections += 1
             if course.remaining < 0.0:
                 self._creeping(course).overshot()
-        tried = self._gives_up or self._corrections > (0 if course.has_one_try else CORRECTIONS)
+        tried = self._gives_up or self._corrections > _corrections(course)
         return tried and course.is_settled(driving=driving)
 
     def _watch(self, course: Course, *, driving: Driving, now: float) -> None:
@@ -211,3 +214,10 @@ class Arrival:
 
     def _asked(self, course: Course, last: Velocity) -> float:
         return abs(last.yaw_rate if isinstance(course.leg, Rotate) else last.forward)
+
+
+def _corrections(course: Course) -> int:
+    """Return how often the end of a leg is corrected from a standstill, at the most."""
+    if course.has_one_try:
+        return 0
+    return CORRECTIONS

@@ -14,6 +14,9 @@ from mav_tasks.tasks.task import Pose
 from mav_tasks.tasks.way_back import OFF_LINE
 
 WRONG_WAY = 0.5  # m, driven in another direction than it points, or reverses, in
+#: m, the same of a car that is steered by course: for seconds its estimate went 0.6 m to the side
+#: while it stood (PX4 1.17 with metre-class GPS)
+WRONG_WAY_OF_ONE_TRY = 1.5
 WENT = 0.5  # of that: what its position must have gone, or its reported speed was no motion
 MOVES = 0.05  # m/s; the direction of what is slower means nothing
 ALONG = 0.5  # cosine of 60 degrees: the part of its speed that goes where it points
@@ -56,10 +59,11 @@ class AstrayWatch:
             return False
         self._last = motion
         elapsed = 0.0 if last is None else max(0.0, motion.at - last.at)
-        goes_wrong = self._goes_wrong(motion, elapsed=elapsed)
+        most = WRONG_WAY_OF_ONE_TRY if course.has_one_try else WRONG_WAY
+        goes_wrong = self._goes_wrong(motion, most=most, elapsed=elapsed)
         return self._has_left(course, motion, last, elapsed=elapsed) or goes_wrong
 
-    def _goes_wrong(self, motion: Motion, *, elapsed: float) -> bool:
+    def _goes_wrong(self, motion: Motion, *, most: float, elapsed: float) -> bool:
         speed = motion.speed
         if speed < MOVES:
             self._rolls_on = False
@@ -71,11 +75,11 @@ class AstrayWatch:
             if self._wrong == 0.0:
                 self._wrong_from = motion.pose
             self._wrong += speed * elapsed
-        if self._wrong > WRONG_WAY and not self._got_there(motion):
+        if self._wrong > most and not self._got_there(motion, most=most):
             self._wrong = 0.0
-        return self._wrong > WRONG_WAY
+        return self._wrong > most
 
-    def _got_there(self, motion: Motion) -> bool:
+    def _got_there(self, motion: Motion, *, most: float) -> bool:
         """Whether its position has gone the wrong way, too.
 
         Reported speeds alone add up to metres where a rover stands, or crawls on: with metre-class
@@ -85,7 +89,7 @@ class AstrayWatch:
         north, east = here.north - begun.north, here.east - begun.east
         way = hypot(north, east)
         along = copysign(1.0, self._asked) * (north * cos(here.yaw) + east * sin(here.yaw))
-        return way > WENT * WRONG_WAY and along < ALONG * way
+        return way > WENT * most and along < ALONG * way
 
     def _has_left(
         self, course: Course, motion: Motion, last: Motion | None, *, elapsed: float

@@ -17,8 +17,7 @@ BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
 #: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
 BESIDE_OF_LOOP = 0.4
 TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: near enough
-ROLLS_OUT = 1.5  # times the settling distance, for a car: 0.17 m from 0.1 m/s (ArduPilot)
-ONE_TRY = 3.0  # the same for one that is steered by course
+ONE_TRY = 3.0  # times the settling distance, for a car that is steered by course
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
 
 
@@ -121,14 +120,13 @@ class Course:
     def is_settled(self, *, driving: Driving) -> bool:
         """Whether the end is as near as a rover must come that can come no nearer.
 
-        A car rolls out by decimetres; one that does not reverse either has one try only.
+        A car that is steered by course has one try only.
         """
         remaining = self.remaining
         if self.by_course and isinstance(self.leg, Move | Follow):
             remaining = max(remaining, 0.0)
-        if self.steering is not None:
-            more = ONE_TRY if self.by_course else ROLLS_OUT
-            driving = replace(driving, settle_distance=more * driving.settle_distance)
+        if self.has_one_try:
+            driving = replace(driving, settle_distance=ONE_TRY * driving.settle_distance)
         return guidance.is_settled(self.leg, remaining, driving=driving)
 
     def advance(self, motion: Motion) -> bool:

@@ -110,6 +110,8 @@ def way_back(
     match leg:
         case Move():
             place = _entry(anchor, pose, leg, progress.done)
+            if steering is not None and not honours_yaw_rate and _is_beside(anchor, pose, leg):
+                return None
             if steering is not None:
                 return _drive_back(
                     place,
@@ -147,6 +149,13 @@ def _entry(anchor: Pose, pose: Pose, leg: Move, done: float) -> LocalPlace | Non
     else:
         at = min(max(done, 0.0), length)
     return _on_line(anchor, leg, at)
+
+
+def _is_beside(anchor: Pose, pose: Pose, leg: Move) -> bool:
+    """Whether a car that does not reverse had better go on from here: it would drive a circle."""
+    along = done_so_far(leg, anchor, pose, before=0.0)
+    is_near = abs(cross_track(anchor, pose)) <= OFF_LINE and -ON_SPOT <= along <= leg.distance
+    return is_near and abs(wrap(anchor.yaw - pose.yaw)) <= TURNED
 
 
 def _on_line(anchor: Pose, leg: Move, along: float) -> LocalPlace:

@@ -24,6 +24,7 @@ class Driven:
     before: Place
     after: Place
     told: Place  # before
+    told_after: Place
 
 
 @dataclass(slots=True)
@@ -74,7 +75,7 @@ async def _drive_one(session: Session, maker: Maker, begun: Place, tally: Tally)
     tally.add_shift(after, session.told_place())
     wrong = ""
     if end.is_completed:
-        driven = Driven(asked, before, after, told)
+        driven = Driven(asked, before, after, told, session.told_place())
         tally.driven.append(driven)
         wrong = _shown(driven, tally.shift)
     session.say(f"  {asked.words}: {end}, {end.seconds:.1f} s{wrong}")
@@ -116,7 +117,12 @@ def _shown(driven: Driven, shift: tuple[float, float]) -> str:
     if driven.asked.end is None:
         return ""
     north, east = _off(driven, shift)
-    return f", {hypot(north, east) * 100:.1f} cm off ({north * 100:+.1f} N, {east * 100:+.1f} E)"
+    end, told = driven.asked.end, driven.told_after
+    by_estimate = hypot(told.north - end.north, told.east - end.east)
+    return (
+        f", {hypot(north, east) * 100:.1f} cm off ({north * 100:+.1f} N, {east * 100:+.1f} E),"
+        f" by its estimate {by_estimate * 100:.1f}"
+    )
 
 
 def _row(session: Session, tally: Tally) -> Row:
