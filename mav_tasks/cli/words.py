@@ -13,6 +13,7 @@ UNTIL_RESUMED = (
     TaskReason.QUEUE_PAUSED,
     TaskReason.OPERATOR,
     TaskReason.TAKEOVER,
+    TaskReason.FAILSAFE,
     TaskReason.RESTARTED,
 )
 

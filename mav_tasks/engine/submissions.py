@@ -28,6 +28,7 @@ PAUSED = {
     R.OPERATOR: "queue paused",
     R.STOPPED: "STOP in force",
     R.TAKEOVER: "taken over",
+    R.FAILSAFE: "failsafe",
     R.RESTARTED: "server restarted",
 }
 NONCE = 3  # where it is among the parameters

@@ -8,7 +8,6 @@ from collections.abc import Hashable
 from dataclasses import replace
 from math import inf
 
-from mav_tasks.engine.arming_texts import ArmingTexts
 from mav_tasks.engine.authority import Authority, Before
 from mav_tasks.engine.components import Components
 from mav_tasks.engine.frame_monitor import Seen
@@ -18,11 +17,13 @@ from mav_tasks.engine.known_profile import KnownProfile
 from mav_tasks.engine.motion_guard import Found, Measure, MotionGuard, Told
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.own_fence import is_breached
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.start_mark import StartMark
 from mav_tasks.engine.stick_watch import StickWatch
 from mav_tasks.engine.vehicle_requests import VehicleRequests
+from mav_tasks.engine.vehicle_texts import VehicleTexts
 from mav_tasks.engine.whereabouts import Whereabouts
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -39,7 +40,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace, ends_at_home
 from mav_tasks.tasks.guidance import ZERO
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
@@ -53,6 +54,8 @@ REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restar
 UNSEEN_STOP = 3.0
 #: a station's buttons for a held task
 BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
+FENCE = "its own fence"
+TOLD_WITHIN = 1.5  # s after a change of mode in which it is told why; SYS_STATUS comes at 1 Hz
 BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
 REFUSALS = {
     None: TaskReason.NONE,
@@ -104,9 +107,11 @@ class Vehicle:
         self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
         self._shows_restart = False  # what the next heartbeat shows anew, a restart has done
-        self._arming_texts = ArmingTexts()
+        self._texts = VehicleTexts()
+        self._is_outside_own_fence = False
         self._is_closing = False
         self._is_back_home = False  # by its last task; it is disarmed also where others wait
+        self._taken_at = -inf  # by a mode that nobody has told of
         self._stops_task = False  # which the end of the server has interrupted
         self.stopped_at = -inf  # the last STOP
         #: a HOLD that a "go to" may undo
@@ -204,7 +209,7 @@ class Vehicle:
 
         If somebody else had taken it over, we do not arm it before a person lets us go on.
         """
-        if self.tasks.paused is TaskReason.TAKEOVER:
+        if self.tasks.paused in TAKEN:
             self._authority.withdraw_arming()
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
@@ -255,7 +260,10 @@ class Vehicle:
             self._receive_own_mission(message.total, now=now)
         elif isinstance(message, m.Statustext):
             sender = Address(self.system_id, component_id)
-            self._arming_texts.receive(sender, message, now=now)
+            if self._texts.receive(sender, message, now=now):
+                self._failsafe_told(self._texts.failsafe(now=now), now=now)
+        elif isinstance(message, m.SysStatus):
+            self._receive_own_fence(is_breached(message), now=now)
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.RcChannels):
@@ -392,7 +400,7 @@ class Vehicle:
         elif not ours and was_mode != booting:
             self._authority.withdraw_arming()
             may_be_lost = self.control.is_streaming and mode == self.persona.hold_mode
-            self._take_over(f"mode is {self.persona.mode_name(mode)}", now=now)
+            self._take_over_by_mode(mode, now=now)
             if may_be_lost and self.persona.has_loss_failsafe:
                 self.control.ask_to_stay(now=now)
                 self.requests.flush(now=now)
@@ -423,7 +431,8 @@ class Vehicle:
         A restart disarms: what was seen since ``booted_at`` was no person's doing.
         """
         self._shows_restart = True
-        self._arming_texts = ArmingTexts()
+        self._texts = VehicleTexts()
+        self._is_outside_own_fence = False
         self.where.forget()
         self.requests.ask_which_again()
         self.requests.intervals.ask_all_again()
@@ -452,7 +461,36 @@ class Vehicle:
             words += f": task {held.id} is on hold. Release it ({BUTTONS}), then continue"
         self._note(words, now=now)
 
-    def _take_over(self, what: str, *, now: float) -> None:
+    def _take_over_by_mode(self, mode: int, *, now: float) -> None:
+        """A mode that we did not ask for: a person's, or that of a failsafe that it tells of."""
+        what, failsafe = f"mode is {self.persona.mode_name(mode)}", self._texts.failsafe(now=now)
+        if self._is_outside_own_fence and not failsafe:
+            failsafe = FENCE
+        if failsafe:
+            self._take_over(f"{what}, by its failsafe: {failsafe}", TaskReason.FAILSAFE, now=now)
+        else:
+            self._take_over(what, now=now)
+            self._taken_at = now
+
+    def _failsafe_told(self, words: str, *, now: float) -> None:
+        """It was told of a moment after the mode that it set: name what has taken over."""
+        if self.tasks.paused is TaskReason.TAKEOVER and now - self._taken_at <= TOLD_WITHIN:
+            self._note(f"that was its failsafe: {words}", now=now)
+            actor = f"vehicle {self.system_id}"
+            self.tasks.pause(TaskReason.FAILSAFE, actor=actor, now=now)
+
+    def _receive_own_fence(self, is_outside: bool, *, now: float) -> None:
+        if is_outside and not self._is_outside_own_fence:
+            self._note("is outside its own fence: no task is driven until it is back", now=now)
+            self._failsafe_told(FENCE, now=now)
+        elif self._is_outside_own_fence and not is_outside:
+            words = "is inside its own fence again"
+            self._book.record(VehicleSeen(self.system_id, words, now))
+        self._is_outside_own_fence = is_outside
+
+    def _take_over(
+        self, what: str, reason: TaskReason = TaskReason.TAKEOVER, *, now: float
+    ) -> None:
         """Somebody else has the vehicle: let go, and let the queue stand if a task has begun."""
         if self.tasks.is_stopped:
             return
@@ -464,9 +502,9 @@ class Vehicle:
         begun = self.tasks.begun
         if begun is None:
             return
-        if begun.state in RUNNING or self.tasks.paused is not TaskReason.TAKEOVER:
+        if begun.state in RUNNING or self.tasks.paused not in TAKEN:
             self._note(f"taken over: {what}", now=now)
-            self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
+            self.tasks.pause(reason, actor=f"vehicle {self.system_id}", now=now)
 
     def _zero_what_is_kept(self) -> None:
         """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
@@ -653,12 +691,16 @@ class Vehicle:
         phase = self.control.phase
         if phase in (Phase.STOPPING, Phase.RELEASING) or self.tasks.is_stopped:
             return
-        if self.tasks.paused is TaskReason.TAKEOVER and self._guard.ladder.is_on:
+        if self.tasks.paused in TAKEN and self._guard.ladder.is_on:
             return  # and is being stopped for that
         self._note("a stick is off its centre: HOLD. Centre it, then continue", now=now)
         self._authority.note_other(now=now)
         self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
-        if self.persona.brakes_by_setpoints and self._sticks.throttle and self._guard.is_fresh(now=now):
+        if (
+            self.persona.brakes_by_setpoints
+            and self._sticks.throttle
+            and self._guard.is_fresh(now=now)
+        ):
             self.step(now=now)
         else:
             self.control.begin_release(now=now)
@@ -810,7 +852,7 @@ class Vehicle:
         self.hold_before.forget()
         self.forget_start()
         begun = self.tasks.begun
-        is_driven = begun is not None and begun.reason is not TaskReason.TAKEOVER
+        is_driven = begun is not None and begun.reason not in TAKEN
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         if not is_driven and self.armed and not self.control.is_engaged:
             self.hold(client=None, actor=actor, now=now)
@@ -906,7 +948,7 @@ class Vehicle:
         motion = self.where.motion.latest()
         is_known = motion is not None and now - motion.at <= self._settings.watch.position_lost
         yaw = motion.pose.yaw if motion is not None and is_known else None
-        rolls = self._guard.brakes(now=now)
+        rolls = self._guard.brakes(rolls_out=self.persona.rolls_out, now=now)
         self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle)
 
     def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
@@ -995,13 +1037,14 @@ class Vehicle:
             in_control=self.control.in_control,
             refusal=REFUSALS[self.control.refused],
             is_not_ready=self.control.is_not_ready,
-            why_not_ready=self._arming_texts.latest(now=now),
+            why_not_ready=self._texts.why_not_ready(now=now),
             motion=self.where.motion.latest(),
             still=self.where.motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,
             frame=self.where.frame.frame(),
             home=self.where.home,
             is_fence_unknown=self.where.is_fence_unknown,
+            is_outside_own_fence=self._is_outside_own_fence,
             honours_yaw_rate=self.persona.honours_yaw_rate,
             turning=self.persona.turning,
             turns_by_course=self.persona.turns_by_course,

@@ -52,6 +52,7 @@ USED = frozenset(
         m.ParamValue.id,
         m.RcChannels.id,
         m.Statustext.id,
+        m.SysStatus.id,
     }
     | SETPOINTS
 )

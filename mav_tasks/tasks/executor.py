@@ -19,7 +19,7 @@ from mav_tasks.tasks.goal import Face, Move, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import distance
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.limits import limited, within_fence
 from mav_tasks.tasks.path import Follow
 from mav_tasks.tasks.scheduler import start_blocker
@@ -193,7 +193,7 @@ class Executor:
             self._finish(S.CANCELLED, reason, actor=actor, now=now)
             return
         self._change(S.CANCELLING, reason, actor=actor, now=now)
-        if task.reason is R.TAKEOVER:
+        if task.reason in TAKEN:
             self.let_go(actor=actor, now=now)
 
     def let_go(self, *, actor: str, now: float) -> None:

@@ -59,6 +59,7 @@ class TaskReason(IntEnum):
     RESTARTED = 12
     NOT_READY = 13
     LOSS_FAILSAFE = 14
+    OUTSIDE_OWN_FENCE = 15
     # paused
     OPERATOR = 30
     PREEMPTED = 31
@@ -66,6 +67,7 @@ class TaskReason(IntEnum):
     LINK_LOST = 33
     POSITION_LOST = 34
     STOPPED = 35
+    FAILSAFE = 36
     # held
     OUTCOME_UNKNOWN = 50
     FENCE = 51
@@ -104,10 +106,15 @@ class TaskReason(IntEnum):
     RATE_LIMITED = 113
 
 
+#: why a task is paused whose vehicle somebody else has, or a failsafe of its own
+TAKEN = frozenset({TaskReason.TAKEOVER, TaskReason.FAILSAFE})
+
 #: where the name of a reason is not what people say
 _WORDS = {
     TaskReason.FRAME_RESET: "position reference changed",
     TaskReason.OFF_LINE: "off track",
+    TaskReason.FAILSAFE: "failsafe of the rover",
+    TaskReason.OUTSIDE_OWN_FENCE: "outside the rover's own fence",
 }
 
 

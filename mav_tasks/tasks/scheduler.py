@@ -29,6 +29,8 @@ def start_blocker(
         return TaskReason.NO_POSITION
     if not view.armed and not view.may_arm:
         return TaskReason.DISARMED
+    if view.is_outside_own_fence:
+        return TaskReason.OUTSIDE_OWN_FENCE
     if view.drives_on:
         return TaskReason.LOSS_FAILSAFE
     return TaskReason.NONE

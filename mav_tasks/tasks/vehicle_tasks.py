@@ -29,7 +29,7 @@ from mav_tasks.tasks.goal import GlobalPlace, Plan, Rotate, SingleGoal
 from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, skipped_to
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
-from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.limits import safe_braking
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
@@ -370,8 +370,8 @@ class VehicleTasks:
 
     def _is_of_another_driver(self, task: Task) -> bool:
         """Whether a begun task stands because somebody else has the vehicle, who keeps it."""
-        was_taken = self._paused is R.TAKEOVER and task.reason is R.FRAME_RESET
-        return task.reason is R.TAKEOVER or was_taken
+        was_taken = self._paused in TAKEN and task.reason is R.FRAME_RESET
+        return task.reason in TAKEN or was_taken
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change a task's terms; Rejection when it would wait for itself, or for nothing."""
@@ -520,7 +520,7 @@ class VehicleTasks:
         if self._urgent is not None and self._urgent in self._queue:
             self._urgent = None
         begun = self.begun
-        if reason is R.TAKEOVER:
+        if reason in TAKEN:
             last = self._jumps.last
             self._led_away.taken_over(None if last is None else last.pose)
             if begun is not None and begun.state is S.CANCELLING:
@@ -749,7 +749,7 @@ class VehicleTasks:
     def _pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
         if self._paused in (reason, R.STOPPED):
             return
-        if self._paused is R.TAKEOVER and reason is R.OPERATOR:
+        if self._paused in TAKEN and reason is R.OPERATOR:
             return  # a pause does not say that all is well with the vehicle again
         self._paused = reason
         self._book.record(QueuePaused(self.vehicle, reason, actor, now))

@@ -39,6 +39,7 @@ class VehicleView:
     frame: Frame | None = None  # that positions are in, where it is known
     home: GlobalPlace | None = None  # where it returns to
     is_fence_unknown: bool = False  # there is one, and it cannot be said where in this frame
+    is_outside_own_fence: bool = False  # by what it says itself
     honours_yaw_rate: bool = True  # and reverses; else it is steered by course
     turning: Turning = Turning.ON_SPOT
     turns_by_course: bool = False  # it turns on the spot to the course that it is told

@@ -111,6 +111,10 @@ class ArduPilotRules:
         self._outbox.say(MavSeverity.CRITICAL, "EKF failsafe")
         return Intervention(Mode.HOLD)
 
+    def fence_breached(self) -> Intervention:
+        """HOLD: FENCE_ACTION is 2 here, for 1 drives home. No text (4.6.3): SYS_STATUS tells."""
+        return Intervention(Mode.HOLD)
+
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Note a heartbeat of any system."""
         self._failsafe.hear_heartbeat(system_id, now=now)

@@ -169,7 +169,10 @@ class Autopilot:
 
     def set_faults(self, faults: Faults) -> None:
         """Break something, or with ``Faults()`` mend it all."""
+        was_inside = not self._faults.outside_fence
         self._faults = self._outbox.faults = self._flight.faults = faults
+        if faults.outside_fence and was_inside:
+            self._flight.leave_fence()
 
     def operator_mode(self, mode: Mode, *, now: float) -> None:
         """Change the mode at the vehicle, as an RC switch would; not to one that it lacks."""

@@ -111,6 +111,7 @@ ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
     "block-wheel": ("block-wheel left|right|all", _block_wheel),
     "freeze-output": ("freeze-output left|right (ackermann: throttle|steering)", _freeze_output),
     "lose-gps": ("lose-gps", _plain(Lasting(Faults(gps_lost=True)))),
+    "breach-fence": ("breach-fence", _plain(Lasting(Faults(outside_fence=True)))),
     "freeze-position": ("freeze-position", _plain(Lasting(Faults(position_frozen=True)))),
     "cut-link": ("cut-link", _plain(Lasting(Faults(silent=True, deaf=True)))),
     "push": ("push 0.5 m forward|back|left|right", _push),

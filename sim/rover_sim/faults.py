@@ -20,6 +20,7 @@ class Faults:
     clock_frozen: bool = False  # time_boot_ms stays as it is
     outputs_frozen: frozenset[Actuator] = frozenset()  # stay as they were, while it is armed
     gps_lost: bool = False  # no satellites; the position holds for some seconds
+    outside_fence: bool = False  # of its own, which is switched on as long as that lasts
     refuse_arm: bool = False  # even a forced one
     refuse_mode: bool = False  # of clients; the operator's switch works
     withheld: frozenset[int] = frozenset()  # ids of messages that are not sent

@@ -215,6 +215,11 @@ class FlightControl:
         if self.armed and self.mode in NEEDS_POSITION:
             self._intervene(self._rules.position_lost())
 
+    def leave_fence(self) -> None:
+        """Note that the rover is outside its own fence."""
+        if self.armed:
+            self._intervene(self._rules.fence_breached())
+
     def take_local(self, message: Local, estimate: Estimate, *, now: float) -> None:
         """Take SET_POSITION_TARGET_LOCAL_NED."""
         self._rules.take_local(message, estimate, mode=self.mode, now=now)

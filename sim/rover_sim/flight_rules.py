@@ -110,6 +110,10 @@ class FlightRules(Protocol):
         """Say what it does, armed in a mode that needs a position, when that is gone."""
         ...
 
+    def fence_breached(self) -> Intervention:
+        """Say what it does, armed, when it has left its own fence."""
+        ...
+
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Note a heartbeat of any system."""
         ...

@@ -44,7 +44,7 @@ from rover_sim.realism import (
 )
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
-FENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot's is healthy unless it is breached
+GEOFENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot's is healthy unless it is breached
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ ARDUPILOT = Persona(
     firmware_hash=b"3fc7011a",
     announces_changes=False,  # observed: 1 Hz
     heeds_component=False,
-    also_healthy=FENCE,
+    also_healthy=GEOFENCE,
     landed_state_armed=MavLandedState.ON_GROUND,
     no_mission_total=0,
     lacks=frozenset(

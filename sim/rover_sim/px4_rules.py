@@ -165,6 +165,12 @@ class Px4Rules:
         self._intended = Mode.LAND  # it does not go back to OFFBOARD by itself
         return Intervention(Mode.LAND)
 
+    def fence_breached(self) -> Intervention:
+        """HOLD: GF_ACTION is 2."""
+        self._say("Failsafe activated")
+        self._intended = Mode.HOLD
+        return Intervention(Mode.HOLD)
+
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
         """Nothing hangs on a ground station (NAV_DLL_ACT is 0)."""
 

@@ -15,7 +15,7 @@ from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
 from rover_sim.mission_conventions import FENCE, MISSION, RALLY
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
-from rover_sim.personas import Persona
+from rover_sim.personas import GEOFENCE, Persona
 from rover_sim.realism import Realism, Wire
 from rover_sim.setpoints import Destination, Heading, TurnRate
 from rover_sim.sticks import Sticks
@@ -121,8 +121,11 @@ class Telemetry:
         healthy = present | self._persona.also_healthy | PREARM
         if not self._boot.is_healthy(now=self._time(boot_ms)):
             healthy &= ~PREARM
+        enabled = present
+        if self._flight.faults.outside_fence and self._persona.also_healthy & GEOFENCE:
+            enabled, healthy = enabled | GEOFENCE, healthy & ~GEOFENCE
         return m.SysStatus(
-            present, present, healthy, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
+            present, enabled, healthy, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
         )  # load 10 %, 12.6 V, 5 A, 100 %
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:

@@ -90,7 +90,7 @@ def test_once_a_takeover_is_told_it_does_not_drive_on(
     world.run(0.4)
     end = world.now + lost + 0.15  # just long enough for the failsafe
     world.watched.loses = lambda source, target, data: target == "rover1" and world.now < end
-    world.until(lambda: world.paused() is R.TAKEOVER, within=lost + 4)
+    world.until(lambda: world.paused() is R.FAILSAFE, within=lost + 4)
     told = world.truth.north
     world.run(lost + 4)
     assert world.stands()

@@ -1,0 +1,16 @@
+"""Whether a vehicle says that it is outside its own fence: SYS_STATUS, at 1 Hz.
+
+ArduPilot's fence is healthy unless it is breached (4.6.3), and stays breached until the rover is
+back inside or the fence is switched off. No text tells of it. PX4 1.17 has no such bit: its mode
+alone tells.
+"""
+
+from mav_tasks.mavlink.messages import SysStatus
+
+GEOFENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE
+
+
+def is_breached(status: SysStatus) -> bool:
+    """Return whether a fence that is switched on says that something is wrong."""
+    is_on = status.onboard_control_sensors_enabled & GEOFENCE
+    return bool(is_on) and not status.onboard_control_sensors_health & GEOFENCE

@@ -1,0 +1,75 @@
+"""Failsafes of the rover's own: they are called so, and its own fence keeps tasks waiting."""
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.modes import Mode
+from rover_sim.personas import ARDUPILOT, PX4, Persona
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+OUTSIDE = Faults(outside_fence=True)
+
+
+def driving_world(make_world: MakeWorld, persona: Persona) -> World:
+    """A world in which a task drives."""
+    world = make_world(persona=persona)
+    world.client.move(6)
+    world.until_state(1, S.EXECUTING, within=20)
+    world.run(2)
+    return world
+
+
+@pytest.fixture(params=[ARDUPILOT, PX4], ids=["ardupilot", "px4"])
+def driving(request: pytest.FixtureRequest, make_world: MakeWorld) -> World:
+    """A world in which a task drives."""
+    return driving_world(make_world, request.param)
+
+
+def test_a_mode_that_a_failsafe_sets_is_no_person_s_takeover(driving: World) -> None:
+    world = driving
+    world.fault(Faults(gps_lost=True))
+    world.until(lambda: world.paused() is R.FAILSAFE, within=10)
+    assert world.state(1)[0] is S.PAUSED
+    assert any("by its failsafe: " in text for text in world.client.texts())
+
+
+def test_a_person_s_mode_is_a_takeover(driving: World) -> None:
+    world = driving
+    world.operator_mode(Mode.MANUAL)
+    world.until(lambda: world.paused() is R.TAKEOVER, within=3)
+    world.run(3)
+    assert world.paused() is R.TAKEOVER
+
+
+class TestOwnFence:
+    """Of an ArduPilot: no text tells of a breach, SYS_STATUS does a moment later."""
+
+    @pytest.fixture
+    def outside(self, make_world: MakeWorld) -> World:
+        """A world whose rover has left its own fence in mid-task."""
+        world = driving_world(make_world, ARDUPILOT)
+        world.fault(OUTSIDE)
+        world.until(lambda: world.paused() is R.FAILSAFE, within=3)
+        return world
+
+    def test_nothing_drives_on_outside_though_it_is_continued(self, outside: World) -> None:
+        world = outside
+        world.run(3)
+        before = world.truth
+        world.client.proceed()
+        world.run(10)
+        assert (world.truth.north, world.truth.east) == pytest.approx(
+            (before.north, before.east), abs=0.02
+        )
+        assert any("is outside its own fence" in text for text in world.client.texts())
+
+    def test_back_inside_the_task_is_driven_to_its_end(self, outside: World) -> None:
+        world = outside
+        world.run(3)
+        world.fault(Faults())
+        world.run(2)
+        world.client.proceed()
+        world.until_state(1, S.COMPLETED, within=40)
