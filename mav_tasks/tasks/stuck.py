@@ -90,7 +90,7 @@ class StuckWatch:
         """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
         leg = course.leg
         forward, turned = self._last
-        lives = self._lives(seen)
+        lives = self._lives(seen, has_one_try=course.has_one_try)
         if self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS:
             self._progressed(now)
         if isinstance(leg, Move | Rotate | Follow):
@@ -107,17 +107,18 @@ class StuckWatch:
             self._commanded += max(forward, turned)
         return now - self._progress_at > limit or self._commanded > BLIND
 
-    def _lives(self, seen: VehicleView) -> bool:
+    def _lives(self, seen: VehicleView, *, has_one_try: bool) -> bool:
         """Whether a rover hardly moves by an estimate that is never twice the same.
 
         One that stands for seconds before its speed loop overcomes friction (PX4) is only slow; of
-        one whose estimate stands nobody knows what it does, and it soon counts as stuck.
+        one whose estimate stands nobody knows what it does, and it soon counts as stuck. The
+        estimate of a car that is steered by course may go anywhere meanwhile, and holds it up.
         """
         before, self._pose = self._pose, None if seen.motion is None else seen.motion.pose
         if before is None or self._pose is None:
             return False
         moved = hypot(self._pose.north - before.north, self._pose.east - before.east)
-        return LIVES < moved < SLOW * self._last[0]
+        return LIVES < moved and (has_one_try or moved < SLOW * self._last[0])
 
     def _turns_by_itself(self, seen: VehicleView) -> bool:
         """Whether it was told to drive where it does not point yet."""
