@@ -118,7 +118,7 @@ class StuckWatch:
         if before is None or self._pose is None:
             return False
         moved = hypot(self._pose.north - before.north, self._pose.east - before.east)
-        return LIVES < moved and (has_one_try or moved < SLOW * self._last[0])
+        return moved > LIVES and (has_one_try or moved < SLOW * self._last[0])
 
     def _turns_by_itself(self, seen: VehicleView) -> bool:
         """Whether it was told to drive where it does not point yet."""

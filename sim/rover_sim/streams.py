@@ -71,7 +71,6 @@ PX4_STREAMS = StreamTable(
         m.LocalPositionNed.id: 0.05,
         m.GlobalPositionInt.id: 0.1,
         m.VfrHud.id: 0.1,
-        m.PositionTargetLocalNed.id: 0.1,
         m.PositionTargetGlobalInt.id: 0.1,
         m.GpsRawInt.id: 0.2,
         m.SysStatus.id: 0.2,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavFrame, MavLandedState, MavModeFlag, MavType
+from mav_tasks.mavlink.enums import MavLandedState, MavModeFlag, MavType
 from mav_tasks.mavlink.messages import Message
 from rover_sim.available_modes import standard_mode_of
 from rover_sim.boot import Boot
@@ -17,7 +17,6 @@ from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
 from rover_sim.personas import GEOFENCE, Persona
 from rover_sim.realism import Realism, Wire
-from rover_sim.setpoints import Destination, Heading, TurnRate
 from rover_sim.sticks import Sticks
 
 MAVLINK_VERSION = 3
@@ -79,7 +78,6 @@ class Telemetry:
             m.AutopilotVersion.id: self._autopilot_version,
             m.HomePosition.id: self._home_position,
             m.ExtendedSysState.id: self._extended_sys_state,
-            m.PositionTargetLocalNed.id: self._position_target_local_ned,
             m.ProtocolVersion.id: self._protocol_version,
             m.CurrentMode.id: self._current_mode,
         }
@@ -283,24 +281,6 @@ class Telemetry:
         nothing = (0.0,) * 8
         return m.PositionTargetGlobalInt(
             boot_ms, 5, TARGET_POSITION_ONLY, latitude, longitude, self._origin.altitude, *nothing
-        )
-
-    def _position_target_local_ned(self, estimate: Estimate, boot_ms: int) -> Message | None:
-        """What it tries to do, as PX4 shows it: a place or a velocity, the rest left out."""
-        frame, zero = MavFrame.LOCAL_NED, (0.0,) * 5
-        match self._flight.destination or self._flight.target:
-            case Destination(north, east):
-                return m.PositionTargetLocalNed(
-                    boot_ms, frame, TARGET_POSITION_ONLY, north, east, 0.0, *zero, 0.0, 0.0, 0.0
-                )
-            case Heading(yaw, speed):
-                vn, ve = speed * math.cos(yaw), speed * math.sin(yaw)
-            case TurnRate(_, speed):
-                vn, ve = speed * math.cos(estimate.yaw), speed * math.sin(estimate.yaw)
-            case None:
-                return None
-        return m.PositionTargetLocalNed(
-            boot_ms, frame, TARGET_VELOCITY_ONLY, 0.0, 0.0, 0.0, vn, ve, 0.0, *zero
         )
 
     def _protocol_version(self, _estimate: Estimate, _boot_ms: int) -> Message:

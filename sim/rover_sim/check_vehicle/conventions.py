@@ -47,7 +47,6 @@ class Conventions:
     at_connect: frozenset[str]  # parameters that QGroundControl misses when it connects
     in_setup: frozenset[str]  # and when Vehicle Setup is opened
     needs_mode_list: bool  # AVAILABLE_MODES
-    shows_local_target: bool  # POSITION_TARGET_LOCAL_NED; else only the global one
     honours_yaw_rate: bool
     stops_within: float  # s from the last setpoint until it stands
     home_is_item_0: bool  # of a mission
@@ -68,7 +67,6 @@ ARDUPILOT_WAY = Conventions(
     at_connect=APM_AT_CONNECT,
     in_setup=APM_IN_SETUP,
     needs_mode_list=False,
-    shows_local_target=False,
     honours_yaw_rate=True,
     stops_within=3.0 + 4.0,  # its time-out, and braking
     home_is_item_0=True,
@@ -88,7 +86,6 @@ PX4_WAY = Conventions(
     at_connect=PX4_AT_CONNECT,
     in_setup=PX4_IN_SETUP,
     needs_mode_list=True,
-    shows_local_target=True,
     honours_yaw_rate=False,
     stops_within=1.0 + 4.0,  # COM_OF_LOSS_T's default, and braking
     home_is_item_0=False,
@@ -109,7 +106,6 @@ GENERIC_WAY = Conventions(
     at_connect=frozenset(),
     in_setup=frozenset(),
     needs_mode_list=False,
-    shows_local_target=True,
     honours_yaw_rate=False,
     stops_within=PX4_WAY.stops_within,
     home_is_item_0=False,

@@ -12,7 +12,6 @@ from rover_sim.check_vehicle.telemetry import (
     GLOBAL_POSITION_INT,
     LOCAL_POSITION_NED,
     METRES_A_DEGREE,
-    POSITION_TARGET_LOCAL_NED,
 )
 from rover_sim.check_vehicle.wheel import (
     ARM_DISARM,
@@ -105,7 +104,7 @@ def _drive(context: Context) -> None:
 
 def _check_velocity(context: Context, wheel: Wheel, frame: int) -> None:
     report, name = context.report, "LOCAL_NED" if frame == LOCAL_NED else "BODY_NED"
-    before, mark = wheel.position, context.probe.mark()
+    before = wheel.position
     both_before = _both_positions(context)
     heading = before.yaw if frame == LOCAL_NED else 0.0
     wheel.velocity(SPEED * math.cos(heading), SPEED * math.sin(heading), LEG, frame=frame)
@@ -118,7 +117,6 @@ def _check_velocity(context: Context, wheel: Wheel, frame: int) -> None:
     )
     if frame == LOCAL_NED:
         _check_places_agree(context, both_before, _both_positions(context))
-        _check_target(context, mark)
     stood = wheel.wait_standing(STOP_LIMIT)
     report.expect(
         f"zero in {name}",
@@ -154,18 +152,6 @@ def _check_places_agree(context: Context, before: Any, after: Any) -> None:
 def _both_positions(context: Context) -> tuple[Any, Any]:
     probe = context.probe
     return probe.last(LOCAL_POSITION_NED), probe.last(GLOBAL_POSITION_INT)
-
-
-def _check_target(context: Context, mark: int) -> None:
-    if not context.way.shows_local_target:
-        return
-    found = context.probe.since(mark, POSITION_TARGET_LOCAL_NED)
-    context.report.expect(
-        "POSITION_TARGET_LOCAL_NED",
-        bool(found),
-        expected="streamed while it follows setpoints",
-        seen=f"{len(found)} messages",
-    )
 
 
 def _check_yaw_rate(context: Context, wheel: Wheel) -> None:

@@ -20,6 +20,7 @@ MAVLINK_2 = 0xFD  # the first byte of a packet
 COMMAND_LIMIT = 1.0  # s for an answer to a command
 AFTERMATH = 0.2  # s in which a second answer would come
 PATIENCE = 0.05  # s between two looks at the clock
+REORDERED = 8  # packets that another one overtakes; PX4 1.17 lets two change places at times
 
 COMMAND_ACK, HEARTBEAT, STATUSTEXT = 77, 0, 253
 
@@ -269,10 +270,13 @@ class Probe:
 
     def _count(self, component: int, sequence: int) -> None:
         before = self._sequence.get(component)
-        self._sequence[component] = sequence
         self.packets[component] += 1
-        if before is not None:
-            self.lost[component] += (sequence - before - 1) % 256
+        ahead = 1 if before is None else (sequence - before) % 256
+        if ahead > 256 - REORDERED:  # counted as missing when it was overtaken
+            self.lost[component] -= 1
+            return
+        self._sequence[component] = sequence
+        self.lost[component] += ahead - 1
 
 
 def _is_text(heard: Heard) -> bool:

@@ -115,14 +115,6 @@ def test_a_global_position_is_driven_to() -> None:
     assert (rig.truth.north, rig.truth.east) == pytest.approx((3.0, 1.0), abs=0.15)
 
 
-def test_what_it_is_asked_for_is_shown() -> None:
-    shown = driven(velocity(0.6, 0.8)).last(m.PositionTargetLocalNed)
-    assert (shown.vx, shown.vy) == pytest.approx((0.6, 0.8))
-    rig = driven(local_target(POSITION, position=(3.0, 2.0)), seconds=1.0)
-    shown = rig.last(m.PositionTargetLocalNed)
-    assert (shown.x, shown.y, shown.type_mask) == (3.0, 2.0, 0x0DF8)
-
-
 @pytest.mark.parametrize(
     "stream",
     [
