@@ -141,7 +141,6 @@ ARDUPILOT = Persona(
     lacks=frozenset(
         {
             messages.ProtocolVersion.id,
-            messages.PositionTargetLocalNed.id,
             messages.CurrentMode.id,
         }
     ),
