@@ -324,6 +324,7 @@ class OffboardControl:
         elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._in_hold:
             self._lead_in(now=now)
         elif self.phase is Phase.LEADING_IN and self._in_hold and self._armed:
+            self._withdraw(MavCmd.DO_REPOSITION)
             self._begin_asking(Phase.ASKING_MODE, now=now)
             self._send_setpoint(STANDING)
             self._ask_mode(now=now)
@@ -332,7 +333,14 @@ class OffboardControl:
             self._ask_hold(now=now)
 
     def _lead_in(self, *, now: float) -> None:
-        """Begin the zeros that our mode is entered from."""
+        """Begin the zeros that our mode is entered from.
+
+        A PX4 keeps the place that it holds while it is disarmed, and drives there once it is armed:
+        by then its estimate may have wandered off by more than it puts up with.
+        """
+        if self._persona.drives_in_hold:
+            staying = self._orders.staying(changes_mode=False)
+            self._request(staying, until=now + LEAD_IN, now=now)
         self._begin_asking(Phase.LEADING_IN, now=now)
         self._lead_until, self._led_at = now + LEAD_IN, now
         self._was_heard_leading_in = False
@@ -538,7 +546,8 @@ class OffboardControl:
         until = now + self._watch.ask_vehicle
         self._request(self.hold_request(), until=until, now=now, urgent=True)
         if self._persona.drives_in_hold and self._mode == self._persona.hold_mode:
-            self._request(self._orders.staying(), until=until, now=now, urgent=True)
+            staying = self._orders.staying(changes_mode=True)
+            self._request(staying, until=until, now=now, urgent=True)
 
     def _request_disarming(self, *, now: float) -> None:
         self._disarm_at = now

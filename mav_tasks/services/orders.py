@@ -121,8 +121,11 @@ class Orders:
         """Give the command to arm or disarm."""
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
 
-    def staying(self) -> CommandInt:
-        """Give the "go to" without a place: what was being driven to in HOLD is so no more."""
+    def staying(self, *, changes_mode: bool) -> CommandInt:
+        """Give the "go to" without a place: what was being driven to in HOLD is so no more.
+
+        One that ``changes_mode`` also asks for HOLD.
+        """
         return CommandInt(
             *self._target,
             frame=MavFrame.GLOBAL,
@@ -130,7 +133,7 @@ class Orders:
             current=0,
             autocontinue=0,
             param1=DEFAULT_SPEED,
-            param2=CHANGE_MODE,
+            param2=CHANGE_MODE if changes_mode else 0.0,
             param3=0.0,
             param4=0.0,
             x=NOT_GIVEN,

@@ -53,7 +53,7 @@ class TestDriving:
         assert [task.state for task in world.tasks()] == [S.COMPLETED] * 3
         story = [what for what in world.observer.sent_since(begun) if what not in ("511", "512")]
         order = list(dict.fromkeys(story))
-        assert order == ["HOLD", "zero", "arm", "GUIDED", "move", "disarm"]
+        assert order == ["HOLD", "zero", "arm", "stay", "GUIDED", "move", "disarm"]
         assert not world.rover.autopilot.armed
         assert world.rover.autopilot.mode is Mode.HOLD
 

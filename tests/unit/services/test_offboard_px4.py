@@ -27,6 +27,8 @@ def ticks(rig: Rig, seconds: float) -> None:
             rig.hear()
         rig.take()
         rig.tick()
+        if rig.sent[-1:] == ["stay"]:
+            rig.answer(MavCmd.DO_REPOSITION, MavResult.ACCEPTED)
 
 
 def armed_in_hold(persona: Persona = PX4) -> Rig:
@@ -105,6 +107,9 @@ class TestTakingControl:
         ticks(rig, 0.2)
         assert rig.story() == ["zero", "arm", "zero"]
         rig.hear(armed=True)
+        rig.take()
+        rig.answer(MavCmd.DO_REPOSITION, MavResult.ACCEPTED)
+        assert rig.story() == ["zero", "stay"], "or it drives to where it was held before"
         ticks(rig, LEAD_IN)
         assert rig.story() == ["zero"], "not in our mode before the stream has lasted"
         ticks(rig, 2 * PERIOD)
@@ -182,7 +187,7 @@ class TestTakingControl:
         rig.take()
         rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
         ticks(rig, LEAD_IN + 3 * PERIOD)
-        assert rig.story() == ["HOLD", "zero", "our mode", "zero"]
+        assert rig.story() == ["HOLD", "zero", "stay", "zero", "our mode", "zero"]
         assert not rig.control.we_armed
 
     @pytest.mark.parametrize("mode", [HOLD, MISSION])
@@ -212,10 +217,10 @@ class TestTakingControl:
         rig.story()
         rig.now += 0.4  # the server stood still
         ticks(rig, LEAD_IN - PERIOD)
-        assert rig.story() == ["zero", "HOLD"], "what was asked for may come yet"
+        assert rig.story() == ["zero", "stay", "HOLD"], "what was asked for may come yet"
         rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
         ticks(rig, LEAD_IN - PERIOD)
-        assert rig.story() == ["zero"]
+        assert rig.story() == ["zero", "stay", "zero"]
         ticks(rig, 4 * PERIOD)
         assert rig.story() == ["zero", "our mode", "zero"]
 
