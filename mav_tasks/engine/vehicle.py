@@ -677,13 +677,19 @@ class Vehicle:
         return self._authority.driver(within=self._settings.watch.other_controller, now=now)
 
     def sticks_moved(self, *, now: float) -> None:
-        """A person drives by hand: one last zero if the vehicle still follows us, then nothing."""
+        """A person drives by hand: one last zero if the vehicle still follows us, then nothing.
+
+        One that takes a stick for a speed in our mode gets HOLD: there nobody can steer it.
+        """
+        if self.persona.heeds_throttle_stick and self.control.is_engaged:
+            self._stick_moved(now=now)
+            return
         self._authority.note_other(now=now)
         self._zero_what_is_kept()
         self._take_over("driven by hand", now=now)
 
     def _stick_moved(self, *, now: float) -> None:
-        """A person holds a stick of the vehicle's own transmitter, and it may drive by that.
+        """A person holds a stick, of a transmitter or a station, and the vehicle may drive by it.
 
         In our mode nobody can steer by sticks, and zeros do not stop it. HOLD does; but one that
         rolls on in HOLD first brakes by set-points against the stick.
@@ -693,7 +699,7 @@ class Vehicle:
             return
         if self.tasks.paused in TAKEN and self._guard.ladder.is_on:
             return  # and is being stopped for that
-        self._note("a stick is off its centre: HOLD. Centre it, then continue", now=now)
+        self._note("has a stick off centre: HOLD. Centre it", now=now)
         self._authority.note_other(now=now)
         self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
         if (

@@ -9,8 +9,9 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.modes import Mode
 from rover_sim.realism import EXACT, Drive, Wire
-from tests.kit.client import ACCEPTED
+from tests.kit.client import ACCEPTED, rc_override, sticks
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
@@ -70,7 +71,7 @@ def test_a_stick_held_forward_ends_in_hold(
     assert stands_after(world) <= within
     assert world.paused() is R.TAKEOVER
     assert world.state(1)[0] is (S.CANCELLED if when == "cancelled" else S.PAUSED)
-    said = [text for text in world.client.texts() if "a stick is off its centre" in text]
+    said = [text for text in world.client.texts() if "has a stick off centre" in text]
     assert len(said) == 1
 
 
@@ -105,3 +106,19 @@ def test_the_task_goes_on_when_the_stick_is_centred_and_somebody_says_continue(
     assert sent.answer is not None
     assert sent.answer[0] == ACCEPTED
     assert abs(world.truth.north - 4.0) < 0.1
+
+
+@pytest.mark.parametrize("message", [rc_override(1500, 1500, 1700, 1500), sticks(z=300)])
+def test_sticks_of_a_ground_station_leave_no_speed_behind(
+    make_world: MakeWorld, message: object
+) -> None:
+    """In GUIDED the rover would drive on by stick and setpoint, and nobody could steer it."""
+    world = with_transmitter(make_world, Frame.SKID)
+    world.client.move(20.0, speed=1.2)
+    world.run(5.0)
+    north = world.truth.north
+    world.client.stream(message, rate=5)
+    assert stands_after(world) <= 1.5
+    assert world.truth.north - north < 1.0
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.paused() is R.TAKEOVER

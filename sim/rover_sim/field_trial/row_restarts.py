@@ -101,7 +101,8 @@ async def _interrupted(
     wrong = _wrong(begun, after)
     holds = end.is_completed and not note
     holds = holds and (not event.is_exact or abs(wrong) <= session.limits.remainder)
-    figure = f"{wrong * 100:+.1f} cm"
+    # a simulated rover restarts where it began: how far that is from anything says nothing
+    figure = f"{wrong * 100:+.1f} cm" if event.is_exact else ""
     return judged(
         event.name, event.words, result=f"{note}{end}", figure=figure, limit=limit, holds=holds
     )

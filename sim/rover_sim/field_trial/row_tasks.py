@@ -117,12 +117,17 @@ def _shown(driven: Driven, shift: tuple[float, float]) -> str:
     if driven.asked.end is None:
         return ""
     north, east = _off(driven, shift)
-    end, told = driven.asked.end, driven.told_after
-    by_estimate = hypot(told.north - end.north, told.east - end.east)
     return (
         f", {hypot(north, east) * 100:.1f} cm off ({north * 100:+.1f} N, {east * 100:+.1f} E),"
-        f" by its estimate {by_estimate * 100:.1f}"
+        f" by its estimate {_off_by_estimate(driven) * 100:.1f}"
     )
+
+
+def _off_by_estimate(driven: Driven) -> float:
+    """Return how far from where it should be the rover believes to be, m: the server's part."""
+    end, told = driven.asked.end, driven.told_after
+    assert end is not None
+    return hypot(told.north - end.north, told.east - end.east)
 
 
 def _row(session: Session, tally: Tally) -> Row:
@@ -134,7 +139,8 @@ def _row(session: Session, tally: Tally) -> Row:
     moved = [each for each in tally.driven if each.asked.end is not None]
     metres = [hypot(*_off(each, tally.shift)) for each in moved]
     angles = [_turned_wrong(each) for each in tally.driven if each.asked.turn is not None]
-    figure = f"end p50/p95/max {_three(metres, 100)} cm"
+    believed = [_off_by_estimate(each) for each in moved]
+    figure = f"end p50/p95/max {_three(metres, 100)} cm, by its estimate {_three(believed, 100)}"
     limit = f"p95 {limits.end * 100:g} cm"
     if angles:
         figure += f", turns {_three(angles, 1)} deg"
