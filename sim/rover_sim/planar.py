@@ -1,0 +1,82 @@
+"""A body on level ground without a physics engine: what those of all frames have in common.
+
+It has no mass, no tyres and always stands level: what depends on those is tested on ``bullet``.
+"""
+
+import math
+from random import Random
+
+from rover_sim.body import BodyState, Pose, wrap_angle
+
+MAX_ACCELERATION = 6.0  # m/s², what tyres on dry ground can pass on
+SNAP = 1e-3  # m/s, rad/s; nearer than this it is there
+LONGEST_STEP = 0.05  # s; a longer advance is cut into equal parts
+
+
+class PlanarBody:
+    """Where it is and how it moves; implements ``Body`` but for ``drive``.
+
+    ``lag`` in s, from what is demanded to motion; ``variation`` moves it a little, None: not.
+    """
+
+    def __init__(self, *, start: Pose, lag: float, variation: Random | None) -> None:
+        self.lag = lag * variation.uniform(0.8, 1.2) if variation else lag
+        self._time = 0.0
+        self._north, self._east, self._yaw = start.north, start.east, wrap_angle(start.yaw)
+        self._speed = self._yaw_rate = 0.0
+        self._demanded_speed = 0.0
+
+    def __repr__(self) -> str:
+        place = f"{self._north:.2f} N, {self._east:.2f} E"
+        return f"{type(self).__name__}({place}, {self._speed:.2f} m/s)"
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last ``advance``."""
+        return BodyState(
+            time=self._time,
+            north=self._north,
+            east=self._east,
+            down=0.0,
+            yaw=self._yaw,
+            pitch=0.0,
+            roll=0.0,
+            forward_speed=self._speed,
+            lateral_speed=0.0,
+            yaw_rate=self._yaw_rate,
+        )
+
+    def advance(self, duration: float) -> None:
+        """Move on by ``duration`` seconds."""
+        parts = max(1, math.ceil(duration / LONGEST_STEP - 1e-9))
+        for _ in range(parts):
+            self._step(duration / parts)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+    def _next_yaw_rate(self, speed: float, dt: float) -> float:
+        """Return the turn rate in ``dt`` seconds, at which it will drive at ``speed``."""
+        raise NotImplementedError
+
+    def _step(self, dt: float) -> None:
+        speed = approach(self._speed, self._demanded_speed, self.lag, MAX_ACCELERATION, dt)
+        yaw_rate = self._next_yaw_rate(speed, dt)
+        # The mean of both ends, along the heading in the middle: second order on arcs.
+        distance = 0.5 * (self._speed + speed) * dt
+        turned = 0.5 * (self._yaw_rate + yaw_rate) * dt
+        heading = self._yaw + 0.5 * turned
+        self._north += distance * math.cos(heading)
+        self._east += distance * math.sin(heading)
+        self._yaw = wrap_angle(self._yaw + turned)
+        self._speed, self._yaw_rate = speed, yaw_rate
+        self._time += dt
+
+
+def approach(value: float, target: float, lag: float, limit: float, dt: float) -> float:
+    """One step of a rate-limited first-order lag; lands on the target, so that a stop is one."""
+    error = target - value
+    if abs(error) < SNAP:
+        return target
+    change = error * (1.0 - math.exp(-dt / lag))
+    return value + max(-limit * dt, min(limit * dt, change))
