@@ -30,7 +30,7 @@ def what_of(status: TaskStatus) -> str:
 
 
 def why_of(status: TaskStatus) -> str:
-    """Give the reason of its state, with the rover's own words; nothing if there is none."""
+    """Return why a task is in its state, with the rover's own words; "" if there is no reason."""
     if not status.reason:
         return ""
     why = words_of(status.reason)

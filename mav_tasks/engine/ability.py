@@ -69,7 +69,7 @@ def left_out(wish: SingleGoal, ability: Ability) -> str:
     """Return in words what of a goal a car leaves out; "": nothing."""
     if ability.turning is not Turning.STEERED or not isinstance(wish, GoTo) or wish.yaw is None:
         return ""
-    return f"{ability.rover} steers as a car: its heading at the place is as it comes"
+    return f"{ability.rover} steers as a car: it cannot choose its heading at the place"
 
 
 def _check_rolls(goal: SingleGoal, ability: Ability) -> None:

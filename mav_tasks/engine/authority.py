@@ -113,7 +113,7 @@ class Authority:
         return self._mode_is_ours
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
-        """Give what the present mode means for taking control.
+        """Return what the present mode means for taking control.
 
         A PX4 that has driven home by its failsafe disarms itself and shows our mode, or the return:
         nothing drives it, and it is put to HOLD before it is armed.

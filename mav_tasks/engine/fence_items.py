@@ -2,7 +2,7 @@
 
 MAVLink common.xml, MAV_CMD_NAV_FENCE_*: the corners of a polygon are as many items one after the
 other as param1 of each says. A return point is kept for the vehicle and not used here. A circle of
-radius 0 is none: MAVSDK's programs say "no circle" so.
+radius 0 means "no circle": MAVSDK's programs send it so.
 """
 
 from collections.abc import Sequence

@@ -12,7 +12,7 @@ server's end. Its steps, and what leads from one to the next:
    rover in circles in HOLD. A setting switches this step off.
 
 The ladder only says which step it is; it goes by displacement, for the reported speed of a standing
-vehicle may be anything. It ends when the vehicle stands, or when somebody else has it.
+vehicle is off by up to 0.6 m/s. It ends when the vehicle stands, or when somebody else has it.
 """
 
 from collections import deque
@@ -82,7 +82,7 @@ class StopLadder:
         patience: float = NO_EFFECT,
         moves: float = MOVES,
     ) -> Step | None:
-        """Return the step that is due now and was not before; None if there is none.
+        """Return the step to which the ladder climbs now; None: it stays where it is.
 
         ``speed`` is m/s by displacement, None where nothing fresh is known of it; ``is_held``
         whether the vehicle shows HOLD. ``disarm_after`` is in s after HOLD was seen, ``patience``

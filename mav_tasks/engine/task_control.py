@@ -73,7 +73,8 @@ class TaskControl:
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
         if first is not None:
-            raise Rejection(R(first.result_param2), "refused a moment ago; send it anew if meant")
+            words = "refused a moment ago; if you still want it, send it again"
+            raise Rejection(R(first.result_param2), words)
         task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
         kill = flag(asked.command, 2, "kill")
         begun = asked.vehicle.tasks.begun

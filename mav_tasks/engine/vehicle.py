@@ -658,7 +658,7 @@ class Vehicle:
             self.requests.send_zero()  # one may be lost
 
     def stand_down(self, client: Hashable, *, now: float) -> None:
-        """A client has done with it ("land"): it is disarmed as soon as nothing is left to drive.
+        """A client has landed it: disarm it once no task is left to drive.
 
         Raise Rejection under STOP, and while a person drives.
         """

@@ -59,10 +59,8 @@ def test_who_logs_does_not_wait_for_a_pipe_that_nobody_reads(
     monkeypatch.setattr(writing, "MOST", 100)
     read, write = pipe
     handler = ThreadedHandler(write, Lines(words_only))
-    began = time.monotonic()
-    for number in range(2_000):
+    for number in range(2_000):  # more than the pipe takes: who waited would wait for ever
         say(handler, f"line {number}")
-    assert time.monotonic() - began < 1.0
     # read at last: what waited comes, and how many lines did not
     lost = int(repr(handler).split(", ")[1].split(" ")[0])
     said = read_until(read, "lost: ")
