@@ -6,7 +6,7 @@ from typing import NamedTuple
 from mav_tasks.errors import Rejection
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, Move, Rotate, SingleGoal
+from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, Move, MoveTurned, Rotate, SingleGoal
 from mav_tasks.tasks.lifecycle import TaskReason
 
 
@@ -58,6 +58,9 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     if isinstance(goal, GoTo):
         turns = ability.honours_yaw_rate and ability.turning is Turning.ON_SPOT
         return goal if turns or goal.yaw is None else replace(goal, yaw=None)
+    if _turns_round(goal, ability):
+        assert isinstance(goal, Move)
+        return MoveTurned(-goal.distance, goal.speed)
     if ability.turning is Turning.STEERED:
         _check_rolls(goal, ability)
     if not ability.honours_yaw_rate:
@@ -65,8 +68,16 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     return goal
 
 
-def left_out(wish: SingleGoal, ability: Ability) -> str:
-    """Return in words what of a goal a car leaves out; "": nothing."""
+def _turns_round(goal: SingleGoal, ability: Ability) -> bool:
+    """Whether it drives a way backwards forwards, between two turns on the spot."""
+    is_backwards = isinstance(goal, Move) and goal.distance < 0
+    return is_backwards and not ability.honours_yaw_rate and ability.turns_on_spot
+
+
+def driven_otherwise(wish: SingleGoal, ability: Ability) -> str:
+    """Return in words how a goal is driven otherwise than it was asked for; "": it is not."""
+    if _turns_round(wish, ability):
+        return f"{ability.why_no_reverse}: it turns round, drives and turns back"
     if ability.turning is not Turning.STEERED or not isinstance(wish, GoTo) or wish.yaw is None:
         return ""
     return f"{ability.rover} steers as a car: it cannot choose its heading at the place"

@@ -17,6 +17,7 @@ from mav_tasks.tasks.goal import (
     GoTo,
     Head,
     Move,
+    MoveTurned,
     Nothing,
     Perform,
     Plan,
@@ -141,7 +142,7 @@ def _has_home(plan: Plan) -> bool:
 
 def _kind_of(goal: SingleGoal) -> str:
     match goal:
-        case Move():
+        case Move() | MoveTurned():
             return "move"
         case Rotate() | Face():
             return "rotate"
@@ -167,7 +168,9 @@ def _fastest(goal: Goal) -> float:
 
 def _speed_of(step: Step) -> float:
     match step:
-        case Move(speed=speed) | GoTo(speed=speed) | SetSpeed(speed=speed):
+        case Move(speed=speed) | MoveTurned(speed=speed) | GoTo(speed=speed):
+            return speed or 0.0
+        case SetSpeed(speed=speed):
             return speed or 0.0
         case Drive(forward=forward) | Head(forward=forward):
             return abs(forward)

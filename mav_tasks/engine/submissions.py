@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
-from mav_tasks.engine.ability import Ability, as_driven, left_out
+from mav_tasks.engine.ability import Ability, as_driven, driven_otherwise
 from mav_tasks.engine.asked import Asked
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.gcs_client import GcsClient
@@ -113,7 +113,7 @@ class Submissions:
         else:
             task = vehicle.tasks.submit(draft, now=now)
         self._await_commit(asked, task, now=now)
-        words = left_out(wish.goal, ability)
+        words = driven_otherwise(wish.goal, ability)
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
 

@@ -14,10 +14,11 @@ from mav_tasks.tasks.goal import (
     Jump,
     LocalPlace,
     Move,
+    MoveTurned,
     SingleGoal,
     Step,
 )
-from mav_tasks.tasks.legs import distance
+from mav_tasks.tasks.legs import WAY, distance
 from mav_tasks.tasks.path import pose_on, rest_of
 from mav_tasks.tasks.planner import is_allowed
 from mav_tasks.tasks.task import Frame, Pose, Progress, same_frame
@@ -106,12 +107,12 @@ def _end_of(goal: SingleGoal, progress: Progress) -> LocalPlace | None:
     if isinstance(goal, GoTo):
         return progress.target
     anchor = progress.anchor
-    if isinstance(goal, Move) and anchor is not None:
-        return LocalPlace(
-            anchor.north + goal.distance * cos(anchor.yaw),
-            anchor.east + goal.distance * sin(anchor.yaw),
-        )
-    return None
+    if anchor is None or not isinstance(goal, Move | MoveTurned):
+        return None
+    way = goal.distance
+    if isinstance(goal, MoveTurned) and progress.leg != WAY:
+        way = -way if progress.leg < WAY else 0.0  # not turned round yet, or there
+    return LocalPlace(anchor.north + way * cos(anchor.yaw), anchor.east + way * sin(anchor.yaw))
 
 
 def _place_of(step: Step, origin: GlobalPlace | None) -> LocalPlace | None:
@@ -131,7 +132,7 @@ def _next_places(steps: Sequence[Step], number: int) -> list[int]:
         match steps[step]:
             case GoTo():
                 found.append(step)
-            case Move() | Drive() | Head():
+            case Move() | MoveTurned() | Drive() | Head():
                 pass  # where that ends is not known
             case Jump(to=to):
                 waiting += [step + 1, to]

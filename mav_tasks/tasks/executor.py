@@ -15,7 +15,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.bounds import Bounds
 from mav_tasks.tasks.course import Course
 from mav_tasks.tasks.events import SERVER, TaskWaits, VehicleNoted
-from mav_tasks.tasks.goal import Face, Move, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
 from mav_tasks.tasks.legs import distance
@@ -328,7 +328,9 @@ class Executor:
     ) -> Progress | None:
         """Set the course of a stage that begins here; None: it cannot, the task is interrupted."""
         steering = steering_of(seen, self._bounds)
-        if steering is not None and isinstance(present_goal(task.goal, progress), Rotate | Face):
+        if steering is not None and isinstance(
+            present_goal(task.goal, progress), Rotate | Face | MoveTurned
+        ):
             self._finish(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE, actor=SERVER, now=now)
             return None
         here = set_out(task.goal, progress, seen, motion, steering=steering)

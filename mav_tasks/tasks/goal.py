@@ -16,6 +16,17 @@ class Move:
 
 
 @dataclass(frozen=True, slots=True)
+class MoveTurned:
+    """Move backwards as one that does not reverse: turn round, drive, turn back.
+
+    ``distance`` in metres, positive; ``speed`` as of Move.
+    """
+
+    distance: float
+    speed: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Rotate:
     """Turn on the spot: ``angle`` in radians, clockwise positive, may exceed a full turn.
 
@@ -106,7 +117,7 @@ class Wait:
 
 
 #: what is driven by itself: a task's goal, or a step of a plan
-SingleGoal = Move | Rotate | Drive | GoTo | Face | Head | Wait
+SingleGoal = Move | MoveTurned | Rotate | Drive | GoTo | Face | Head | Wait
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +161,7 @@ class Near:
 
 Step = (
     Move
+    | MoveTurned
     | Rotate
     | Drive
     | GoTo
@@ -192,6 +204,8 @@ def describe(goal: Goal) -> str:
     match goal:
         case Move(distance=distance):
             return f"move {distance:g} m"
+        case MoveTurned(distance=distance):
+            return f"move {-distance:g} m"
         case Rotate(angle=angle):
             return f"rotate {degrees(angle):.6g} deg"
         case Drive(forward=forward, duration=duration):

@@ -8,7 +8,18 @@ that a resumed task drives the very same ones.
 from dataclasses import replace
 from math import atan2, copysign, cos, hypot, pi, sin, tau
 
-from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, LocalPlace, Move, Rotate, SingleGoal, Wait
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    GoTo,
+    Head,
+    LocalPlace,
+    Move,
+    MoveTurned,
+    Rotate,
+    SingleGoal,
+    Wait,
+)
 from mav_tasks.tasks.guidance import Leg, wrap
 from mav_tasks.tasks.path import Follow, path_length
 from mav_tasks.tasks.task import Pose, Progress
@@ -22,7 +33,7 @@ def leg_count(goal: SingleGoal) -> int:
     """Give the number of a goal's legs."""
     if isinstance(goal, GoTo):
         return 2 + (goal.yaw is not None) + (goal.wait > 0)
-    return 1
+    return 3 if isinstance(goal, MoveTurned) else 1
 
 
 def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
@@ -40,6 +51,8 @@ def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
     match goal:
         case Move() | Rotate() | Drive() | Wait():
             return goal
+        case MoveTurned(distance=distance, speed=speed):
+            return Move(distance, speed) if progress.leg == WAY else Rotate(pi)
         case Head():
             return (
                 replace(goal, yaw=wrap(anchor.yaw + goal.yaw), is_relative=False)

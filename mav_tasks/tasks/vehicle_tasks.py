@@ -25,10 +25,11 @@ from mav_tasks.tasks.events import (
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor, has_moved
-from mav_tasks.tasks.goal import GlobalPlace, Plan, Rotate, SingleGoal
+from mav_tasks.tasks.goal import GlobalPlace, MoveTurned, Plan, Rotate, SingleGoal
 from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, skipped_to
 from mav_tasks.tasks.jump import JumpWatch
 from mav_tasks.tasks.led_away import LedAway
+from mav_tasks.tasks.legs import leg_of
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.limits import safe_braking
 from mav_tasks.tasks.queue import Rank, TaskQueue
@@ -481,7 +482,8 @@ class VehicleTasks:
         if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
             return
         goal = goal_of(task)
-        turned = isinstance(goal, Rotate) and abs(goal.angle) > 3.0
+        leg = leg_of(goal, progress) if isinstance(goal, Rotate | MoveTurned) else None
+        turned = isinstance(leg, Rotate) and abs(leg.angle) > 3.0
         if turned or not same_frame(progress.frame, seen.frame):
             words = f"what task {task.id} had done is not known: run it again, or skip it"
             raise Rejection(R.WRONG_STATE, words)

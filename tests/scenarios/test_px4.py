@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import degrees, nan, remainder, tau
+from math import cos, degrees, nan, radians, remainder, sin, tau
 from struct import pack, unpack
 
 import pytest
@@ -158,6 +158,58 @@ class TestTurning:
         assert near_pose(world.pose(), (0.0, 0.0, yaw), metres=0.02, angle=1)
 
 
+class TestMovingBackwards:
+    """It does not reverse: a differential one turns round, drives, and turns back."""
+
+    @pytest.mark.parametrize("heading", [0.0, 120.0])
+    def test_it_ends_behind_with_the_heading_that_it_had(
+        self, make_world: MakeWorld, heading: float
+    ) -> None:
+        world = make_world(persona=PX4, heading=heading)
+        world.run(2.0)
+        world.client.move(-1.0)
+        world.until_idle(tasks=1, within=60)
+        assert world.state(1)[0] is S.COMPLETED
+        north, east = -cos(radians(heading)), -sin(radians(heading))
+        assert near_pose(world.pose(), (north, east, heading), metres=0.05, angle=2)
+        assert "Task 1 queued: move -1 m" in world.client.texts()
+        assert any("it turns round, drives and turns back" in t for t in world.client.texts())
+
+    @pytest.mark.parametrize("after", [1.5, 4.0, 7.0])
+    def test_paused_in_each_part_it_goes_on_where_it_was(
+        self, make_world: MakeWorld, after: float
+    ) -> None:
+        world = make_world(persona=PX4)
+        world.run(2.0)
+        world.client.move(-1.0)
+        world.until_state(1, S.EXECUTING, within=10)
+        world.run(after)
+        world.client.pause()
+        world.run(3.0)
+        world.client.proceed()
+        world.until_idle(tasks=1, within=60)
+        assert world.state(1)[0] is S.COMPLETED
+        assert near_pose(world.pose(), (-1.0, 0.0, 0.0), metres=0.06, angle=3)
+
+    def test_in_a_plan_too(self, world: World) -> None:
+        world.run(2.0)
+        items = [Item(MOVE, param1=-1.0, frame=2, param4=0.0), Item(WAYPOINT, **at(1, 0))]
+        upload = Upload(world.client, items)
+        world.until(lambda: upload.result is not None, within=5)
+        assert upload.result == 0
+
+    def test_what_lies_behind_the_fence_is_not_driven_to(self, world: World) -> None:
+        world.run(2.0)
+        corners = [(-0.5, -3.0), (3.0, -3.0), (3.0, 3.0), (-0.5, 3.0)]
+        fence = [Item(5001, **at(*corner), param1=4, param4=0, frame=0) for corner in corners]
+        upload = Upload(world.client, fence, kind=1)
+        world.until(lambda: upload.result is not None, within=5)
+        world.client.move(-1.0)
+        world.run(6.0)
+        assert world.state(1)[1] in (R.OUTSIDE_FENCE, R.FENCE)
+        assert near_pose(world.pose(), (0.0, 0.0, 0.0), metres=0.05, angle=5)
+
+
 class TestStanding:
     """A real PX4 takes zero velocity for "to the north or south" (1.17, SITL)."""
 
@@ -186,7 +238,6 @@ class TestWhatItCannotDo:
     @pytest.mark.parametrize(
         ("command", "params", "words"),
         [
-            (MOVE, (-1.0,), "reverse"),
             (DRIVE, (-0.5, 0.0, 2.0), "reverse"),
             (DRIVE, (0.5, 10.0, 2.0), "yaw rate"),
             (YAW_SPEED, (90.0, -0.5), "reverse"),
@@ -204,7 +255,7 @@ class TestWhatItCannotDo:
     @pytest.mark.parametrize(
         ("item", "result"),
         [
-            (Item(MOVE, param1=-1.0, frame=2, param4=0.0), 6),  # INVALID_PARAM1
+            (Item(DRIVE, param1=-0.5, param3=2.0, frame=2, param4=0.0), 6),  # INVALID_PARAM1
         ],
     )
     def test_is_refused_in_a_plan_at_its_item(self, world: World, item: Item, result: int) -> None:
@@ -217,6 +268,7 @@ class TestWhatItCannotDo:
     @pytest.mark.parametrize(
         ("command", "params", "words"),
         [
+            (MOVE, (-1.0,), "reverse"),
             (ROTATE, (90.0,), "turn on the spot"),
             (YAW, (90.0,), "turn on the spot"),
             (YAW, (90.0, 0.0, 1.0, 1.0), "turn on the spot"),
