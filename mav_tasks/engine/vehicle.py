@@ -475,13 +475,13 @@ class Vehicle:
     def _failsafe_told(self, words: str, *, now: float) -> None:
         """It was told of a moment after the mode that it set: name what has taken over."""
         if self.tasks.paused is TaskReason.TAKEOVER and now - self._taken_at <= TOLD_WITHIN:
-            self._note(f"that was its failsafe: {words}", now=now)
+            self._note(f"was taken by its failsafe: {words}", now=now)
             actor = f"vehicle {self.system_id}"
             self.tasks.pause(TaskReason.FAILSAFE, actor=actor, now=now)
 
     def _receive_own_fence(self, is_outside: bool, *, now: float) -> None:
         if is_outside and not self._is_outside_own_fence:
-            self._note("is outside its own fence: no task is driven until it is back", now=now)
+            self._note("is outside its own fence: tasks wait", now=now)
             self._failsafe_told(FENCE, now=now)
         elif self._is_outside_own_fence and not is_outside:
             words = "is inside its own fence again"
