@@ -8,7 +8,7 @@ from random import Random
 
 from rover_sim.body import Pose
 from rover_sim.frames import SERVO_RATE, TURN_RADIUS, WHEEL_BASE
-from rover_sim.planar import PlanarBody
+from rover_sim.planar import LAG_SPREAD, PlanarBody
 
 MAX_STEERING = math.atan(WHEEL_BASE / TURN_RADIUS)  # rad, 24 degrees
 LAG = 0.02  # s, from the wheels to the body: what is slow is in the drive train
@@ -23,7 +23,8 @@ class AckermannBody(PlanarBody):
 
     def __init__(self, *, start: Pose, seed: int | None) -> None:
         variation = Random(seed) if seed is not None else None
-        super().__init__(start=start, lag=LAG, variation=variation)
+        lag = LAG * variation.uniform(*LAG_SPREAD) if variation else LAG
+        super().__init__(start=start, lag=lag)
         # rad; a linkage that is off by half a degree bends 10 m of way by 1 m
         self._off_centre = math.radians(variation.uniform(-0.3, 0.3)) if variation else 0.0
         self._steering = self._demanded_steering = 0.0

@@ -4,23 +4,23 @@ It has no mass, no tyres and always stands level: what depends on those is teste
 """
 
 import math
-from random import Random
 
 from rover_sim.body import BodyState, Pose, wrap_angle
 
 MAX_ACCELERATION = 6.0  # m/s², what tyres on dry ground can pass on
 SNAP = 1e-3  # m/s, rad/s; nearer than this it is there
+LAG_SPREAD = 0.8, 1.2  # times the lag; how far a seed can move it either way
 LONGEST_STEP = 0.05  # s; a longer advance is cut into equal parts
 
 
 class PlanarBody:
     """Where it is and how it moves; implements ``Body`` but for ``drive``.
 
-    ``lag`` in s, from what is demanded to motion; ``variation`` moves it a little, None: not.
+    ``lag`` in s, from what is demanded to motion.
     """
 
-    def __init__(self, *, start: Pose, lag: float, variation: Random | None) -> None:
-        self.lag = lag * variation.uniform(0.8, 1.2) if variation else lag
+    def __init__(self, *, start: Pose, lag: float) -> None:
+        self.lag = lag
         self._time = 0.0
         self._north, self._east, self._yaw = start.north, start.east, wrap_angle(start.yaw)
         self._speed = self._yaw_rate = 0.0
