@@ -17,13 +17,12 @@ from mav_tasks.engine.known_profile import KnownProfile
 from mav_tasks.engine.motion_guard import Found, Measure, MotionGuard, Told
 from mav_tasks.engine.motion_monitor import is_finite
 from mav_tasks.engine.outlet import Outlet
-from mav_tasks.engine.own_fence import is_breached
+from mav_tasks.engine.own_failsafes import News, OwnFailsafes
 from mav_tasks.engine.setpoint_clock import SetpointClock
 from mav_tasks.engine.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.start_mark import StartMark
 from mav_tasks.engine.stick_watch import StickWatch
 from mav_tasks.engine.vehicle_requests import VehicleRequests
-from mav_tasks.engine.vehicle_texts import VehicleTexts
 from mav_tasks.engine.whereabouts import Whereabouts
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -54,8 +53,6 @@ REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restar
 UNSEEN_STOP = 3.0
 #: a station's buttons for a held task
 BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
-FENCE = "its own fence"
-TOLD_WITHIN = 1.5  # s after a change of mode in which it is told why; SYS_STATUS comes at 1 Hz
 BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
 REFUSALS = {
     None: TaskReason.NONE,
@@ -107,11 +104,9 @@ class Vehicle:
         self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
         self._shows_restart = False  # what the next heartbeat shows anew, a restart has done
-        self._texts = VehicleTexts()
-        self._is_outside_own_fence = False
+        self._failsafes = OwnFailsafes()
         self._is_closing = False
         self._is_back_home = False  # by its last task; it is disarmed also where others wait
-        self._taken_at = -inf  # by a mode that nobody has told of
         self._stops_task = False  # which the end of the server has interrupted
         self.stopped_at = -inf  # the last STOP
         #: a HOLD that a "go to" may undo
@@ -260,10 +255,10 @@ class Vehicle:
             self._receive_own_mission(message.total, now=now)
         elif isinstance(message, m.Statustext):
             sender = Address(self.system_id, component_id)
-            if self._texts.receive(sender, message, now=now):
-                self._failsafe_told(self._texts.failsafe(now=now), now=now)
+            news = self._failsafes.receive_text(sender, message, now=now)
+            self._learn_of_failsafe(news, now=now)
         elif isinstance(message, m.SysStatus):
-            self._receive_own_fence(is_breached(message), now=now)
+            self._learn_of_failsafe(self._failsafes.receive_status(message, now=now), now=now)
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.RcChannels):
@@ -431,8 +426,7 @@ class Vehicle:
         A restart disarms: what was seen since ``booted_at`` was no person's doing.
         """
         self._shows_restart = True
-        self._texts = VehicleTexts()
-        self._is_outside_own_fence = False
+        self._failsafes = OwnFailsafes()
         self.where.forget()
         self.requests.ask_which_again()
         self.requests.intervals.ask_all_again()
@@ -463,30 +457,26 @@ class Vehicle:
 
     def _take_over_by_mode(self, mode: int, *, now: float) -> None:
         """A mode that we did not ask for: a person's, or that of a failsafe that it tells of."""
-        what, failsafe = f"mode is {self.persona.mode_name(mode)}", self._texts.failsafe(now=now)
-        if self._is_outside_own_fence and not failsafe:
-            failsafe = FENCE
-        if failsafe:
-            self._take_over(f"{what}, by its failsafe: {failsafe}", TaskReason.FAILSAFE, now=now)
+        what, cause = (
+            f"mode is {self.persona.mode_name(mode)}",
+            self._failsafes.mode_changed(now=now),
+        )
+        if cause:
+            self._take_over(f"{what}, by its failsafe: {cause}", TaskReason.FAILSAFE, now=now)
         else:
             self._take_over(what, now=now)
-            self._taken_at = now
 
-    def _failsafe_told(self, words: str, *, now: float) -> None:
-        """It was told of a moment after the mode that it set: name what has taken over."""
-        if self.tasks.paused is TaskReason.TAKEOVER and now - self._taken_at <= TOLD_WITHIN:
-            self._note(f"was taken by its failsafe: {words}", now=now)
-            actor = f"vehicle {self.system_id}"
-            self.tasks.pause(TaskReason.FAILSAFE, actor=actor, now=now)
-
-    def _receive_own_fence(self, is_outside: bool, *, now: float) -> None:
-        if is_outside and not self._is_outside_own_fence:
+    def _learn_of_failsafe(self, news: News, *, now: float) -> None:
+        """Tell where it is, and, if that was a takeover so far, what has taken it."""
+        if news.is_outside:
             self._note("is outside its own fence: tasks wait", now=now)
-            self._failsafe_told(FENCE, now=now)
-        elif self._is_outside_own_fence and not is_outside:
+        elif news.is_outside is not None:
             words = "is inside its own fence again"
             self._book.record(VehicleSeen(self.system_id, words, now))
-        self._is_outside_own_fence = is_outside
+        if news.cause and self.tasks.paused is TaskReason.TAKEOVER:
+            self._note(f"was taken by its failsafe: {news.cause}", now=now)
+            actor = f"vehicle {self.system_id}"
+            self.tasks.pause(TaskReason.FAILSAFE, actor=actor, now=now)
 
     def _take_over(
         self, what: str, reason: TaskReason = TaskReason.TAKEOVER, *, now: float
@@ -1043,14 +1033,14 @@ class Vehicle:
             in_control=self.control.in_control,
             refusal=REFUSALS[self.control.refused],
             is_not_ready=self.control.is_not_ready,
-            why_not_ready=self._texts.why_not_ready(now=now),
+            why_not_ready=self._failsafes.why_not_ready(now=now),
             motion=self.where.motion.latest(),
             still=self.where.motion.is_still(now=now),
             other_controller=self._authority.since_other(now=now) < watch.other_controller,
             frame=self.where.frame.frame(),
             home=self.where.home,
             is_fence_unknown=self.where.is_fence_unknown,
-            is_outside_own_fence=self._is_outside_own_fence,
+            is_outside_own_fence=self._failsafes.is_outside_fence,
             honours_yaw_rate=self.persona.honours_yaw_rate,
             turning=self.persona.turning,
             turns_by_course=self.persona.turns_by_course,
