@@ -60,7 +60,7 @@ def rotate(world: World, angle: float = 90.0) -> tuple[int, int] | None:
 
 def reverse(world: World) -> tuple[int, int] | None:
     """Ask for what only one does that honours a yaw rate."""
-    sent = world.client.move(-0.5)
+    sent = world.client.command(DRIVE, -0.5, 0.0, 1.0)
     world.run(0.3)
     return sent.answer
 
