@@ -459,10 +459,8 @@ class Vehicle:
 
     def _take_over_by_mode(self, mode: int, *, now: float) -> None:
         """A mode that we did not ask for: a person's, or that of a failsafe that it tells of."""
-        what, cause = (
-            f"mode is {self.persona.mode_name(mode)}",
-            self._failsafes.mode_changed(now=now),
-        )
+        what = f"mode is {self.persona.mode_name(mode)}"
+        cause = self._failsafes.mode_changed(now=now)
         if cause:
             self._take_over(f"{what}, by its failsafe: {cause}", TaskReason.FAILSAFE, now=now)
         else:
@@ -673,10 +671,10 @@ class Vehicle:
 
         One that takes a stick for a speed in our mode gets HOLD: there nobody can steer it.
         """
+        self._authority.note_other(now=now)
         if self.persona.heeds_throttle_stick and self.control.is_engaged:
             self._stick_moved(now=now)
             return
-        self._authority.note_other(now=now)
         self._zero_what_is_kept()
         self._take_over("driven by hand", now=now)
 
