@@ -9,10 +9,6 @@ from mav_tasks.tasks.guidance import Motion
 from mav_tasks.tasks.task import Pose
 
 REBOOT = 1000  # ms that a vehicle's clock must go back to mean a restart, not reordering
-#: ms from one message of a restarted vehicle to the next; one alone may be an old packet, late
-GOES_ON = 2000
-OVERFLOW = 1 << 32  # ms: the clock begins anew after 49.7 days
-NEAR = 60_000  # ms before and after that, in which a smaller number is a later one
 
 
 class MotionMonitor:
@@ -27,7 +23,6 @@ class MotionMonitor:
         self._moved_at: float | None = None
         self._latest: Motion | None = None  # made of what came last, when it is asked for
         self._last_boot_ms: dict[int, int] = {}
-        self._stepped_back: dict[int, int] = {}  # to when, by the last message of its kind
         #: where it was lately, and what it does at rest
         self.standstill = Standstill()
         self._doubted_until = -inf
@@ -53,11 +48,6 @@ class MotionMonitor:
         motion = self.latest()
         if motion is not None and isinstance(message, LocalPositionNed):
             self.standstill.receive(motion, now=now)
-
-    @property
-    def may_have_rebooted(self) -> bool:
-        """Whether its clock has just gone back: by a restart, or in a packet that came late."""
-        return bool(self._stepped_back)
 
     def latest(self) -> Motion | None:
         """Give the last measured motion, or None before both messages have come."""
@@ -107,7 +97,6 @@ class MotionMonitor:
         self._moved_at = None
         self.standstill.forget()
         self._last_boot_ms.clear()
-        self._stepped_back.clear()
         self.rebooted = False
 
     def _is_newer(self, message: Attitude | LocalPositionNed) -> bool:
@@ -117,14 +106,9 @@ class MotionMonitor:
             return True
         if last == message.time_boot_ms:
             return False  # the same again, by a net or an estimator that repeats it
-        before = self._stepped_back.pop(message.id, None)
-        back = -_ahead(last, message.time_boot_ms)
-        if 0 < back < REBOOT:
-            return False
-        if back > 0:
-            goes_on = before is not None and 0 < _ahead(before, message.time_boot_ms) < GOES_ON
-            if not goes_on:
-                self._stepped_back[message.id] = message.time_boot_ms
+        back = (last - message.time_boot_ms) & 0xFFFFFFFF  # the field overflows after 49 days
+        if 0 < back < 0x80000000:
+            if back < REBOOT:
                 return False
             self.rebooted = True
         self._last_boot_ms[message.id] = message.time_boot_ms
@@ -151,15 +135,6 @@ class MotionMonitor:
             and hypot(position.vx, position.vy) < watch.still_speed
             and abs(attitude.yawspeed) < watch.still_turn_rate
         )
-
-
-def _ahead(before: int, after: int) -> int:
-    """Return the ms by which a vehicle's clock has gone on; negative: it has gone back."""
-    if before > OVERFLOW - NEAR and after < NEAR:
-        return after + OVERFLOW - before
-    if before < NEAR and after > OVERFLOW - NEAR:
-        return after - OVERFLOW - before
-    return after - before
 
 
 def is_finite(message: Attitude | LocalPositionNed) -> bool:

@@ -242,8 +242,6 @@ class Vehicle:
                 return
             # read after a delay, it may have come at any time since
             self.where.motion.receive(message, now=min(now, self._clock.next_at))
-            if self.where.motion.may_have_rebooted:
-                return  # the next one tells
             if self.where.motion.rebooted:
                 self._rebooted(booted_at=now - message.time_boot_ms / 1000, now=now)
             self._receive_of_frame(message, now=now)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import pytest
-from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -288,14 +287,3 @@ def test_another_origin_holds_no_task_of_which_nothing_was_driven(
     world.run(2.0)
     world.fault(Faults(position_jump=(5.0, 3.0)))
     world.until_state(1, S.COMPLETED, within=60)
-
-
-def test_a_position_that_comes_again_a_second_late_interrupts_nothing(driving: World) -> None:
-    world = driving
-    world.run(1.0)
-    old = common.MAVLink_local_position_ned_message(
-        round(1000 * (world.now - 1.2)), 0.1, 0.0, 0.0, 0.5, 0.0, 0.0
-    )
-    world.from_vehicle_side(old.pack(common.MAVLink(None, 1, 1)), peer="rover1")
-    world.until_state(1, S.COMPLETED, within=30)
-    assert S.HELD not in [state for state, _ in world.history(1)]

@@ -87,33 +87,12 @@ def test_the_same_again_is_not_news() -> None:
     assert motion.at == 1.0
 
 
-@pytest.mark.parametrize("days", [0.0007, 24.0, 25.0, 49.0])
-def test_a_clock_that_goes_far_back_and_on_from_there_is_a_restart(days: float) -> None:
-    up = round(days * 86_400_000)
-    made = monitor((0.0, position(ms=up)), (0.0, attitude(ms=up)))
+def test_a_clock_that_goes_far_back_is_a_restart() -> None:
+    made = monitor((0.0, position(ms=60_000)), (0.0, attitude(ms=60_000)))
     made.receive(position(ms=500), now=1.0)
-    made.receive(position(ms=540), now=1.04)
     assert made.rebooted
     made.forget()
     assert (made.rebooted, made.latest()) == (False, None)
-
-
-def test_one_old_message_that_comes_late_is_no_restart() -> None:
-    made = monitor((0.0, position(ms=60_000, x=5.0)), (0.0, attitude(ms=60_000)))
-    made.receive(position(ms=58_900, x=4.0), now=0.02)
-    made.receive(position(ms=60_040, x=5.0), now=0.04)
-    made.receive(position(ms=58_940, x=4.0), now=0.06)
-    motion = made.latest()
-    assert motion is not None
-    assert (motion.pose.north, made.rebooted) == (5.0, False)
-
-
-def test_what_was_overtaken_where_the_clock_overflows_is_dropped() -> None:
-    made = monitor((0.0, position(ms=16, x=5.0)), (0.0, attitude(ms=16)))
-    made.receive(position(ms=0xFFFFFFF0, x=4.0), now=0.1)
-    motion = made.latest()
-    assert motion is not None
-    assert (motion.pose.north, made.rebooted) == (5.0, False)
 
 
 def test_a_clock_that_overflows_is_no_restart() -> None:
