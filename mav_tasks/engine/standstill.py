@@ -133,11 +133,12 @@ class Standstill:
         if window > KEPT:
             return None
         since = now - window
-        for sample in self._samples:
-            if sample.at >= since - 1e-9:
-                is_covered = sample.at <= since + COVERED or sample is not self._samples[0]
-                return sample if is_covered else None
-        return None
+        first = None
+        for sample in reversed(self._samples):  # most windows are much shorter than what is kept
+            if sample.at < since - 1e-9:
+                return first
+            first = sample
+        return first if first is not None and first.at <= since + COVERED else None
 
     def _is_within(self, window: float, *, way: float, turn: float, now: float) -> bool:
         first = self._first_within(window, now=now)

@@ -12,7 +12,8 @@ server's end. Its steps, and what leads from one to the next:
    rover in circles in HOLD. A setting switches this step off.
 
 The ladder only says which step it is; it goes by displacement, for the reported speed of a standing
-vehicle is off by up to 0.6 m/s. It ends when the vehicle stands, or when somebody else has it.
+vehicle is off by up to 0.6 m/s. It ends when the vehicle stands, or when
+somebody else drives it.
 """
 
 from collections import deque

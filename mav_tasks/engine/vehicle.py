@@ -103,7 +103,7 @@ class Vehicle:
         self._authority = Authority(persona, may_arm=may_arm)
         self._clock = SetpointClock(system_id, period=settings.watch.setpoint_period)
         self._was_heard = True
-        self._shows_restart = False  # what the next heartbeat shows anew, a restart has done
+        self._shows_restart = False  # until the heartbeat comes that does, too
         self._failsafes = OwnFailsafes()
         self._is_closing = False
         self._is_back_home = False  # by its last task; it is disarmed also where others wait
@@ -942,7 +942,10 @@ class Vehicle:
         motion = self.where.motion.latest()
         is_known = motion is not None and now - motion.at <= self._settings.watch.position_lost
         yaw = motion.pose.yaw if motion is not None and is_known else None
-        rolls = self._guard.brakes(rolls_out=self.persona.rolls_out, now=now)
+        persona = self.persona
+        rolls = persona.brakes_by_speed_loop and self._guard.brakes(
+            rolls_out=persona.rolls_out, now=now
+        )
         self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle)
 
     def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:

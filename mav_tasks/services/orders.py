@@ -122,9 +122,9 @@ class Orders:
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
 
     def staying(self, *, changes_mode: bool) -> CommandInt:
-        """Give the "go to" without a place: what was being driven to in HOLD is so no more.
+        """Return the "go to" without a place: a vehicle that drives to one in HOLD stays here.
 
-        One that ``changes_mode`` also asks for HOLD.
+        With ``changes_mode`` it asks for HOLD, too.
         """
         return CommandInt(
             *self._target,

@@ -106,7 +106,7 @@ class TaskReason(IntEnum):
     RATE_LIMITED = 113
 
 
-#: why a task is paused whose vehicle somebody else has, or a failsafe of its own
+#: a task is paused because a person, another program or the rover's own failsafe drives the rover
 TAKEN = frozenset({TaskReason.TAKEOVER, TaskReason.FAILSAFE})
 
 #: where the name of a reason is not what people say
