@@ -89,8 +89,8 @@ class Rejection(MavTasksError):
     """A client's request refused.
 
     ``reason`` is a TASK_REASON number of the dialect (100 and above); the MAV_RESULT that goes on
-    the wire follows from it by the table in ``engine/translate.py``, so that the task domain can
-    refuse without knowing MAVLink. ``param`` is the parameter that is wrong, 1 to 7, 0 for none.
+    the wire follows from it by a table (``engine/commands/translate.py``), so that the task domain
+    can refuse without knowing MAVLink. ``param`` is the parameter that is wrong, 1 to 7, 0: none.
     """
 
     def __init__(self, reason: int, text: str, *, param: int = 0) -> None:

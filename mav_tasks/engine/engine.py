@@ -8,11 +8,25 @@ monotonic seconds, never going back.
 from math import inf
 from typing import assert_never
 
-from mav_tasks.engine.broadcasts import Broadcasts
-from mav_tasks.engine.commands import Commands
-from mav_tasks.engine.displays import Displays
-from mav_tasks.engine.flood_gate import FloodGates
-from mav_tasks.engine.gcs_side import GcsSide, Received
+from mav_tasks.engine.clients.broadcasts import Broadcasts
+from mav_tasks.engine.clients.displays import Displays
+from mav_tasks.engine.clients.flood_gate import FloodGates
+from mav_tasks.engine.clients.gcs_side import GcsSide, Received
+from mav_tasks.engine.clients.operator_watch import OperatorWatch
+from mav_tasks.engine.clients.parameters import MESSAGES as PARAMETER_MESSAGES
+from mav_tasks.engine.clients.parameters import ParameterDesk
+from mav_tasks.engine.clients.publisher import Publisher
+from mav_tasks.engine.clients.refusals import Refusals
+from mav_tasks.engine.clients.request_limit import RequestLimit
+from mav_tasks.engine.clients.restart_watch import RestartWatch
+from mav_tasks.engine.clients.rights import OPERATOR
+from mav_tasks.engine.clients.setup_signing import SetupSigning
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.commands.dispatch import Commands
+from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.passing import Passing
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.inputs import (
     Committed,
     Congestion,
@@ -29,25 +43,11 @@ from mav_tasks.engine.inputs import (
     WallClock,
 )
 from mav_tasks.engine.intake import Intake
-from mav_tasks.engine.mission_desk import MESSAGES, MissionDesks
-from mav_tasks.engine.mission_reports import MissionReports
-from mav_tasks.engine.mode_requests import ModeRequests
-from mav_tasks.engine.operator_watch import OperatorWatch
-from mav_tasks.engine.parameters import MESSAGES as PARAMETER_MESSAGES
-from mav_tasks.engine.parameters import ParameterDesk
-from mav_tasks.engine.passing import Passing
-from mav_tasks.engine.plans import Plans
-from mav_tasks.engine.publisher import Publisher
-from mav_tasks.engine.refusals import Refusals
-from mav_tasks.engine.request_limit import RequestLimit
-from mav_tasks.engine.restart_watch import RestartWatch
-from mav_tasks.engine.rights import OPERATOR
-from mav_tasks.engine.setup_signing import SetupSigning
-from mav_tasks.engine.signatures import Signatures
+from mav_tasks.engine.missions.mission_desk import MESSAGES, MissionDesks
+from mav_tasks.engine.missions.mission_reports import MissionReports
+from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
-from mav_tasks.engine.submissions import Submissions
-from mav_tasks.engine.task_control import TaskControl
-from mav_tasks.engine.vehicle_side import VehicleSide
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.services.command_receiver import command_of

@@ -2,8 +2,8 @@
 
 from math import inf
 
+from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer
-from mav_tasks.engine.signatures import Signatures
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.messages import Message

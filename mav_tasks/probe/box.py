@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import cos, hypot, inf, sin
 
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.guidance import Motion
+from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.task import Pose
 
 HALF = 1.0  # m, from the middle to each side: the box measures 2 m

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from mav_tasks.engine.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder

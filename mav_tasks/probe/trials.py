@@ -10,7 +10,7 @@ from mav_tasks.probe.steps import Steps
 from mav_tasks.probe.wheel import DriveEnded, Wheel
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import ARDUPILOT, PX4, Persona
-from mav_tasks.tasks.guidance import wrap
+from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.task import Pose
 
 TRIAL_SPEED = 0.2  # m/s

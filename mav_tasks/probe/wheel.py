@@ -6,7 +6,7 @@ the driving, zeros and HOLD follow, and it is disarmed if it was us who armed it
 
 from math import inf
 
-from mav_tasks.engine.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.probe.box import Box
 from mav_tasks.probe.conversation import Conversation
@@ -15,7 +15,7 @@ from mav_tasks.probe.steps import Steps, pause
 from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import Persona
-from mav_tasks.tasks.guidance import Motion
+from mav_tasks.tasks.driving.guidance import Motion
 
 TAKE_WITHIN = 12.0  # s; PX4 takes four heartbeats
 REST_WITHIN = 10.0  # s, for zeros, HOLD and disarming

@@ -9,32 +9,32 @@ from math import copysign
 
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.arrival import Arrival
-from mav_tasks.tasks.astray import AstrayWatch
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.bounds import Bounds
-from mav_tasks.tasks.course import Course
-from mav_tasks.tasks.events import SERVER, TaskWaits, VehicleNoted
-from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
-from mav_tasks.tasks.guidance import ZERO, Motion, Velocity
-from mav_tasks.tasks.itinerary import following, goal_of, is_over, present_goal, skipped_to
-from mav_tasks.tasks.legs import distance
-from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState
-from mav_tasks.tasks.limits import limited, within_fence
-from mav_tasks.tasks.path import Follow
-from mav_tasks.tasks.scheduler import start_blocker
-from mav_tasks.tasks.stage import (
+from mav_tasks.tasks.driving.arrival import Arrival
+from mav_tasks.tasks.driving.astray import AstrayWatch
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.course import Course
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
+from mav_tasks.tasks.driving.itinerary import following, goal_of, is_over, present_goal, skipped_to
+from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.driving.limits import limited, within_fence
+from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.stage import (
     course_of,
     look_on_the_way,
     may_go_on_rolling,
     set_out,
     steering_of,
 )
-from mav_tasks.tasks.stuck import Follows, StuckWatch
+from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
+from mav_tasks.tasks.driving.way_back import is_off_line, way_back
+from mav_tasks.tasks.events import SERVER, TaskWaits, VehicleNoted
+from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.timing import Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, DemandKind, ModeKind, VehicleView
-from mav_tasks.tasks.way_back import is_off_line, way_back
 
 S, R = TaskState, TaskReason
 

@@ -3,7 +3,7 @@
 from math import nan
 
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.estimate import duration_of, time_left
+from mav_tasks.tasks.driving.estimate import duration_of, time_left
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks

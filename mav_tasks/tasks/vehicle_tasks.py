@@ -13,7 +13,13 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import SET_FAILSAFE, Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.bounds import Bounds
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.itinerary import goal_of, has_local_place, present_goal, skipped_to
+from mav_tasks.tasks.driving.jump import JumpWatch
+from mav_tasks.tasks.driving.led_away import LedAway
+from mav_tasks.tasks.driving.legs import leg_of
+from mav_tasks.tasks.driving.limits import safe_braking
+from mav_tasks.tasks.driving.way_back import is_off_line
 from mav_tasks.tasks.events import (
     SERVER,
     QueueContinued,
@@ -26,19 +32,13 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.executor import Executor, has_moved
 from mav_tasks.tasks.goal import GlobalPlace, MoveTurned, Plan, Rotate, SingleGoal
-from mav_tasks.tasks.itinerary import goal_of, has_local_place, present_goal, skipped_to
-from mav_tasks.tasks.jump import JumpWatch
-from mav_tasks.tasks.led_away import LedAway
-from mav_tasks.tasks.legs import leg_of
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
-from mav_tasks.tasks.limits import safe_braking
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
 from mav_tasks.tasks.task import Draft, Frame, Progress, Submitter, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.view import Demand, VehicleView
 from mav_tasks.tasks.waiting_room import WaitingRoom
-from mav_tasks.tasks.way_back import is_off_line
 
 R, S = TaskReason, TaskState
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import cos, exp, sin
 
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.guidance import ZERO, Motion, Velocity, wrap
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
 from mav_tasks.tasks.task import Frame
 from mav_tasks.tasks.task import Pose as TaskPose
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView

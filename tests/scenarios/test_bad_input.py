@@ -9,7 +9,7 @@ from random import Random
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.flood_gate import STRANGERS
+from mav_tasks.engine.clients.flood_gate import STRANGERS
 from mav_tasks.engine.snapshot import Snapshot
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.settings import Clients, Settings

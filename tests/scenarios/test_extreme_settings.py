@@ -4,8 +4,8 @@ from random import Random
 
 import pytest
 
-from mav_tasks.engine.components import Components
 from mav_tasks.engine.inputs import Shutdown
+from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.setting_keys.shapes import HIGHEST_ID, Number
 from mav_tasks.setting_keys.table import BOUNDED, KEYS
 from mav_tasks.settings import ServerSettings, Settings

@@ -1,6 +1,6 @@
 """Who has asked about a task is told how it goes on, whoever submitted it."""
 
-from mav_tasks.engine.gcs_client import MAX_FOLLOWED
+from mav_tasks.engine.clients.gcs_client import MAX_FOLLOWED
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import FakeClient
 from tests.kit.world import World

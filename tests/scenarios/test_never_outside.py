@@ -6,11 +6,11 @@ from random import Random
 
 import pytest
 
-from mav_tasks.engine.fence_items import fence_of
+from mav_tasks.engine.missions.fence_items import fence_of
 from mav_tasks.links.memory import Conditions
 from mav_tasks.services.mission_item import Item as StoredItem
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.fence import LocalFence
+from mav_tasks.tasks.driving.fence import LocalFence
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Persona

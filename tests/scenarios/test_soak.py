@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.publisher import Publisher
+from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.links.memory import Conditions
 from mav_tasks.mavlink.address import Address
 from mav_tasks.tasks.events import Event, SubmissionRefused, TaskChanged, TaskSubmitted

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mav_tasks.engine import translate
+from mav_tasks.engine.commands import translate
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R

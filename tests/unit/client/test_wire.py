@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from mav_tasks.client import wire
 from mav_tasks.client.wire import Goal, WishedTerms
-from mav_tasks.engine import goals as engine_goals
-from mav_tasks.engine.ability import Ability
-from mav_tasks.engine.plan_items import Manner, plan_of, steps_of
+from mav_tasks.engine.commands import goals as engine_goals
+from mav_tasks.engine.commands.ability import Ability
+from mav_tasks.engine.missions.plan_items import Manner, plan_of, steps_of
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.enums import MavCmd

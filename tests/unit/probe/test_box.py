@@ -3,7 +3,7 @@ from math import pi
 import pytest
 
 from mav_tasks.probe.box import Box
-from mav_tasks.tasks.guidance import Motion
+from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.task import Pose
 
 EAST = Box(Pose(10.0, 20.0, pi / 2))  # ahead is east, right is south

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.links.memory import Conditions
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address

@@ -119,7 +119,7 @@ def test_json_is_one_object_a_line(whole: Path) -> None:
 def test_a_changed_engine_is_found_out_at_its_first_decision(
     whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mav_tasks.engine.vehicle_side.VehicleSeen", wrong_words)
+    monkeypatch.setattr("mav_tasks.engine.vehicles.vehicle_side.VehicleSeen", wrong_words)
     code, words = said(whole)
     assert code == 1
     shown = words.splitlines()

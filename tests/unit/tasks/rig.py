@@ -6,10 +6,10 @@ from math import cos, sin
 
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
 from mav_tasks.tasks.events import Event, TaskChanged
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import GlobalPlace, Goal
-from mav_tasks.tasks.guidance import ZERO, Motion, Velocity, wrap
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Draft, Frame, Pose, Task, TaskId, Terms

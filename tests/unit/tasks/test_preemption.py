@@ -6,8 +6,8 @@ from math import cos, hypot, pi, radians, sin
 import pytest
 
 from mav_tasks.settings import Queueing
+from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.goal import Drive, Goal, Move, Rotate, Wait
-from mav_tasks.tasks.guidance import wrap
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import wait_reason
 from mav_tasks.tasks.task import Pose, Terms

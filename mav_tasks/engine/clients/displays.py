@@ -1,0 +1,165 @@
+"""What a client is shown because it asks: messages on request, and the rates of streams."""
+
+from functools import partial
+from math import isfinite
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.commands import translate
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.services.interval_requester import WANTED
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import TaskReason
+
+R = TaskReason
+
+PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
+EVERYBODY = Address(0, 0)
+NO_INTERVAL = -1  # of MESSAGE_INTERVAL: it is not sent
+PAGE = 16  # waiting tasks that one request shows
+MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
+
+
+class Displays:
+    """Answers to REQUEST_MESSAGE and to the commands about intervals."""
+
+    def __init__(self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+
+    def set_interval(self, asked: Asked, *, now: float) -> None:
+        """SET_MESSAGE_INTERVAL: thin for this client, and see that enough comes."""
+        client, vehicle, command = asked.client, asked.vehicle, asked.command
+        message_id, interval_us = translate.message_id_of(command), command.params[1]
+        if message_id < 0:
+            raise Rejection(R.BAD_PARAMETER, f"param1 message id {command.params[0]:g} is none")
+        if not isfinite(interval_us):
+            raise Rejection(R.BAD_PARAMETER, f"param2 interval {interval_us:g} is not a number")
+        if message_id == m.TaskStatus.id:
+            client.uses_dialect = True
+            interval = interval_us / 1e6 if interval_us > 0 else None
+            client.statuses.set_interval(vehicle.system_id, interval, now=now)
+            return
+        client.thinner.set_interval(vehicle.system_id, message_id, interval_us)
+        for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
+            vehicle.requests.intervals.wish(wished_id, interval)
+
+    def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
+        """REQUEST_DATA_STREAM: as SET_MESSAGE_INTERVAL for each message of the group.
+
+        The vehicle is asked only for what it is known to have: it says no aloud to anything else.
+        """
+        rate = message.req_message_rate if message.start_stop else 0
+        for vehicle in self._vehicles.addressed_by(message.target_system):
+            client.thinner.set_group(vehicle.system_id, message.req_stream_id, rate)
+            for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
+                if wished_id in WANTED:
+                    vehicle.requests.intervals.wish(wished_id, interval)
+
+    def show_interval(self, asked: Asked) -> None:
+        """GET_MESSAGE_INTERVAL: what this client gets."""
+        message_id = translate.message_id_of(asked.command)
+        if not 0 <= message_id <= MAX_INTERVAL_ID:
+            words = f"param1 message id {asked.command.params[0]:g} not in 0..{MAX_INTERVAL_ID}"
+            raise Rejection(R.BAD_PARAMETER, words)
+        system_id = asked.vehicle.system_id
+        if message_id == m.TaskStatus.id:
+            seconds = asked.client.statuses.interval(system_id)
+            interval = NO_INTERVAL if seconds is None else round(seconds * 1e6)
+        else:
+            interval = asked.client.thinner.interval_us(system_id, message_id)
+        asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
+
+    def show(self, asked: Asked, *, now: float) -> bool:
+        """REQUEST_MESSAGE for what the server itself can show; whether it can."""
+        client, vehicle = asked.client, asked.vehicle
+        match translate.message_id_of(asked.command):
+            case m.TaskStatus.id:
+                client.uses_dialect = True
+                self._show_tasks(asked, now=now)
+            case m.TaskTiming.id:
+                client.uses_dialect = True
+                self._show_timing(asked, now=now)
+            case m.TaskQueueStatus.id:
+                client.uses_dialect = True
+                counts = self._book.counts(vehicle.system_id)
+                status = translate.queue_status(
+                    vehicle.tasks, counts, version=self._book.recorded, now=now
+                )
+                client.outlet.send(status, vehicle.server_address)
+            case m.ProtocolVersion.id:
+                client.outlet.send(PROTOCOL_VERSION, asked.answering)
+            case _:
+                return False
+        return True
+
+    def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
+        """Send a task's TASK_STATUS to a client that listens, without the cost of its position."""
+        task = self._book.get(task_id)
+        if task is not None:
+            to = task.submitter.system_id, task.submitter.component_id
+            reader = Address(*to) if client.submitted(task) else EVERYBODY
+            self._send_status(client, task_id, reader=reader, with_position=False, now=now)
+
+    def _send_status(
+        self,
+        client: GcsClient,
+        task_id: int,
+        *,
+        reader: Address,
+        with_position: bool,
+        now: float,
+    ) -> None:
+        """Send a task's TASK_STATUS, from the task server of its vehicle."""
+        task = self._book.get(task_id)
+        vehicle = None if task is None else self._vehicles.get(task.vehicle)
+        if task is None or vehicle is None:
+            return
+        status = translate.task_status(
+            task,
+            vehicle.tasks,
+            self._book,
+            reader=reader,
+            link_number=self._gcs.link_number(task.submitter.link),
+            with_position=with_position,
+            now=now,
+        )
+        client.outlet.send(status, vehicle.server_address)
+
+    def _show_tasks(self, asked: Asked, *, now: float) -> None:
+        task_id = translate.task_id_of(asked.command)
+        send = partial(
+            self._send_status, asked.client, reader=asked.packet.source, with_position=True, now=now
+        )
+        if task_id == 0:
+            first = max(0, translate.first_index_of(asked.command))
+            for waiting in asked.vehicle.tasks.page(first, PAGE):
+                send(waiting)
+        elif self._book.get(task_id) is None:
+            raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
+        else:
+            asked.client.follow(task_id)
+            send(task_id)
+
+    def _show_timing(self, asked: Asked, *, now: float) -> None:
+        task_id = translate.task_id_of(asked.command)
+        task = self._book.get(task_id) if task_id else asked.vehicle.tasks.begun
+        if task is None:
+            words = f"no task {asked.command.params[1]:g}" if task_id else "no task runs"
+            raise Rejection(R.NOT_FOUND, words)
+        vehicle = self._vehicles.look_at(task.vehicle)
+        if vehicle is None:  # of an earlier run, not heard yet: as for TASK_STATUS
+            return
+        message = translate.task_timing(
+            task,
+            vehicle.tasks.timing_of(task),
+            period=vehicle.setpoint_period,
+            reader=asked.packet.source,
+            now=now,
+        )
+        asked.client.outlet.send(message, vehicle.server_address)

@@ -1,0 +1,249 @@
+"""One client: an endpoint on a client link. What it has been shown, and what it asked for."""
+
+from collections import OrderedDict
+from math import inf
+
+from mav_tasks.engine.clients.rights import NOTHING, Rights
+from mav_tasks.engine.clients.signatures import UNSIGNED
+from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import statustext
+from mav_tasks.services.command_receiver import Answer, CommandReceiver, Pending
+from mav_tasks.services.message_interval import Thinner
+from mav_tasks.services.task_status import TaskStatusSender
+from mav_tasks.services.token_bucket import TokenBucket
+from mav_tasks.settings import Clients
+from mav_tasks.tasks.task import Submitter, Task
+
+AT_ONCE = 5.0  # s, of which the requests may come in a moment: a script queues a day's work
+REFUSALS = 20.0  # a second
+#: s in which one refusal is said once: QGroundControl asks three times for a mode, 1.3 s apart, and
+#: sends one "go to" in two messages
+REFUSAL_EACH = 5.0
+MAX_REFUSALS_TOLD = 64
+BACK_AFTER = 3.5  # s of silence, after which a ground station may be another run of it
+MAX_FOLLOWED = 1000  # tasks of others that one client is told about
+MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
+
+Nonces = dict[Address, OrderedDict[int, Pending]]
+
+
+class GcsClient:
+    """One endpoint that listens, and perhaps commands."""
+
+    def __init__(
+        self,
+        outlet: Outlet,
+        *,
+        settings: Clients,
+        is_configured: bool,
+        is_connected: bool,
+        now: float,
+    ) -> None:
+        self.outlet = outlet
+        self.heard_at = now
+        #: spoken to before it was heard: gets heartbeats until it answers
+        self.is_configured = is_configured
+        #: on a stream, whose link tells when it is gone: may be silent for as long as it likes
+        self.is_connected = is_connected
+        self.is_heard = False
+        #: heard once, and perhaps never again
+        self.is_passing = True
+        #: one of many who came at about the same time: gets heartbeats only until it says more
+        self.is_one_of_many = False
+        #: with which the packet in hand was signed, or the last one
+        self.signed_by = UNSIGNED
+        self.last_source = Address(0, 0)
+        #: of who sent that packet
+        self.rights = NOTHING
+        self._addresses: dict[Address, None] = {}  # seen here, the latest last
+        #: has used our dialect: gets TASK_STATUS
+        self.uses_dialect = False
+        self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
+        self.thinner = Thinner(default_interval=settings.stream_interval)
+        self.statuses = TaskStatusSender(rate=settings.status_rate, now=now)
+        self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
+        self._text_id = 0
+        self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it
+        self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
+        self._introduced: set[int] = set()
+        self._informed: set[int] = set()  # of which vehicles' tasks it was told since it came
+        self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
+        self._submitters: dict[
+            tuple[Address, str], Submitter
+        ] = {}  # made once: each command asks for it
+        #: what of its requests is taken in, and what of its refusals is told
+        self._requests = TokenBucket(rate=0.0, burst=0.0, now=now)
+        self._requests_of: dict[str, TokenBucket] = {}  # by role: who signs otherwise has another
+        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS, now=now)
+        self._receivers: dict[Address, CommandReceiver] = {}
+
+    def __repr__(self) -> str:
+        names = " ".join(map(str, self._addresses)) or "unheard"
+        return f"GcsClient({names} at {self.endpoint})"
+
+    def apply(self, settings: Clients) -> None:
+        """Take new settings."""
+        self.thinner.default_interval = settings.stream_interval
+        self.statuses.apply(rate=settings.status_rate)
+        self._texts.apply(rate=settings.text_rate)
+
+    @property
+    def key(self) -> tuple[str, Peer]:
+        """What tells clients apart: link and endpoint."""
+        return (self.outlet.link, self.outlet.peer)
+
+    @property
+    def endpoint(self) -> str:
+        """The endpoint in words."""
+        peer = self.outlet.peer
+        return ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
+
+    def submitter(self, source: Address) -> Submitter:
+        """Give who submits when a packet of ``source`` comes from here."""
+        submitter = self._submitters.get((source, self.signed_by.name))
+        if submitter is None:
+            if len(self._submitters) >= MAX_ADDRESSES:
+                self._submitters.clear()
+            submitter = Submitter(self.outlet.link, self.endpoint, *source, self.signed_by.name)
+            self._submitters[source, self.signed_by.name] = submitter
+        return submitter
+
+    def take_rights(self, rights: Rights, *, now: float) -> None:
+        """From here on it may do this."""
+        self.rights, rate = rights, rights.limits.rate
+        bucket = self._requests_of.get(rights.role)
+        if bucket is None or bucket.rate != rate:
+            bucket = TokenBucket(rate=rate, burst=rate * AT_ONCE, now=now)
+            self._requests_of[rights.role] = bucket
+        self._requests = bucket
+
+    def may_ask(self, *, now: float) -> bool:
+        """Whether one more request of it is taken in now."""
+        return self._requests.take(now=now)
+
+    def may_be_refused(self, *, now: float) -> bool:
+        """Whether one more refusal is told to it, and kept, now: a flood of them is not."""
+        return self._refusals.take(now=now)
+
+    def submitted(self, task: Task) -> bool:
+        """Whether a task was submitted from this endpoint."""
+        submitter = task.submitter
+        return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
+
+    def follow(self, task_id: int) -> None:
+        """It has asked about a task: have it told of each change from now on."""
+        self._followed.pop(task_id, None)
+        self._followed[task_id] = None
+        if len(self._followed) > MAX_FOLLOWED:
+            del self._followed[next(iter(self._followed))]
+
+    def follows(self, task_id: int) -> bool:
+        """Whether it has asked about a task."""
+        return task_id in self._followed
+
+    def receiver(self, source: Address) -> CommandReceiver:
+        """Give the memory of the commands of one address at this endpoint."""
+        receiver = self._receivers.get(source)
+        if receiver is None:
+            if len(self._receivers) >= MAX_ADDRESSES:
+                del self._receivers[next(iter(self._receivers))]
+            receiver = self._receivers[source] = CommandReceiver()
+        return receiver
+
+    def heard(self, source: Address, *, now: float) -> None:
+        """Note that a packet of this address came from here."""
+        self.is_passing = not self.is_heard
+        if now - self.heard_at > BACK_AFTER:
+            self._informed.clear()
+        self.is_one_of_many = self.is_one_of_many and self.is_passing
+        self.heard_at = now
+        self.last_source = source
+        self.is_heard = True
+        if source not in self._addresses:
+            if len(self._addresses) >= MAX_ADDRESSES:
+                del self._addresses[next(iter(self._addresses))]
+            self._addresses[source] = None
+
+    def is_reached_by(self, target: Address) -> bool:
+        """Whether a message for this target is for somebody here."""
+        return any(target.reaches(address) for address in self._addresses)
+
+    def answer(self, answer: Answer, to: Address) -> None:
+        """Send the COMMAND_ACK of a command that ``to`` at this endpoint sent."""
+        self.outlet.send(answer.ack(to), answer.source)
+
+    def knows(self, system_id: int) -> bool:
+        """Whether the client has seen a heartbeat of this vehicle's autopilot."""
+        return system_id in self._introduced
+
+    def is_to_be_informed(self, system_id: int) -> bool:
+        """Whether it is new, or back, and knows a vehicle; asked once, it is informed."""
+        if not self.is_heard or not self.knows(system_id) or system_id in self._informed:
+            return False
+        self._informed.add(system_id)
+        return True
+
+    def knows_all(self, count: int) -> bool:
+        """Whether the client has seen as many vehicles as there are."""
+        return len(self._introduced) >= count
+
+    def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
+        """Show a vehicle by its latest heartbeat, before anything else of its system.
+
+        ``last_seq`` is the number of the autopilot's last packet: the one after it follows on.
+        """
+        self._introduced.add(heartbeat.system_id)
+        self.outlet.forward(heartbeat._replace(seq=last_seq))
+
+    def forward(self, packet: Packet, *, now: float) -> None:
+        """Pass a vehicle's packet on, unless it is one too many of its stream."""
+        system_id = packet.system_id
+        if system_id not in self._introduced:
+            if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
+                return
+            self._introduced.add(system_id)
+        is_silent = not self.is_heard or self.is_one_of_many
+        if is_silent and packet.message_id != m.Heartbeat.id:
+            self.outlet.withhold(packet.source)
+        elif self.thinner.passes(system_id, packet.component_id, packet.message_id, now=now):
+            self.outlet.forward(packet)
+        else:
+            self.outlet.withhold(packet.source)
+
+    def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
+        """Send a STATUSTEXT of a vehicle's task server, unless there were too many."""
+        if not self.is_heard or not self.knows(source.system_id):
+            return
+        if severity > MavSeverity.WARNING and not self._texts.take(now=now):
+            self._left_out[source] = self._left_out.get(source, 0) + 1
+            return
+        self._say(text, severity, source)
+
+    def tell_refusal(self, text: str, source: Address, *, now: float) -> None:
+        """Say why something was refused; to a ground station that tries again and again, once."""
+        if self.uses_dialect:  # a script has its words with each refusal
+            self.tell(text, MavSeverity.WARNING, source, now=now)
+            return
+        said_at = self._refusals_told.get((source, text), -inf)
+        if now - said_at < REFUSAL_EACH:
+            return
+        if len(self._refusals_told) >= MAX_REFUSALS_TOLD:
+            self._refusals_told.clear()
+        self._refusals_told[source, text] = now
+        self.tell(text, MavSeverity.WARNING, source, now=now)
+
+    def tell_what_was_left_out(self, *, now: float) -> None:
+        """Say how many texts were too many, in one for each who said them."""
+        while self._left_out and self._texts.take(now=now):
+            source, count = self._left_out.popitem()
+            self._say(f"{count} more messages: see the queue", MavSeverity.INFO, source)
+
+    def _say(self, text: str, severity: MavSeverity, source: Address) -> None:
+        self._text_id = self._text_id % 0xFFFF + 1
+        for chunk in statustext.chunks(severity, text, text_id=self._text_id):
+            self.outlet.send(chunk, source)

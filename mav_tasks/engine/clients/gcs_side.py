@@ -1,0 +1,279 @@
+"""All clients and the links to them: who is there, what they are shown and told.
+
+Any bytes may come in here; only a packet with a good CRC makes its sender a client. What a client
+wants is given back as a value; the engine sees to it.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.rights import RightsBook
+from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
+from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer, target_of
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import is_stop
+from mav_tasks.services.heartbeat import HeartbeatSender
+from mav_tasks.services.token_bucket import TokenBucket
+from mav_tasks.settings import Settings
+
+MAX_LINK_NUMBER = 255  # of its field in TASK_STATUS
+NEWCOMERS = 2.0  # a second in the long run, as many at once as there may be
+CROWDED = 2  # this part of all places being taken, who was heard once only is not waited for
+SILENT = 3.0  # s, after which a client may be forgotten for another; heartbeats come each second
+
+
+class Received(NamedTuple):
+    """A packet of a client. ``message`` is None when its id is not in the dialect."""
+
+    client: GcsClient
+    packet: Packet
+    message: m.Message | None
+
+
+class GcsSide:
+    """The clients by link and endpoint."""
+
+    def __init__(
+        self,
+        *,
+        queue: list[Outgoing],
+        packer: Packer,
+        signatures: Signatures,
+        settings: Settings,
+        now: float,
+    ) -> None:
+        self._queue = queue
+        self._packer = packer
+        self._signatures = signatures
+        self._settings = settings
+        self._rights = RightsBook(settings.roles)
+        self._decoder = Decoder()
+        self._links: set[str] = set()
+        self._newcomers: TokenBucket | None = None
+        #: packets of strangers for whom there was no room
+        self.turned_away = 0
+        self._link_numbers: dict[str, int] = {}  # from 1, in the order in which links came
+        self._clients: dict[tuple[str, Peer], GcsClient] = {}
+        self.heartbeat = HeartbeatSender(now=now)
+
+    def __iter__(self) -> Iterator[GcsClient]:
+        return iter(self._clients.values())
+
+    @property
+    def counts(self) -> DecodeCounts:
+        """What came in on these links."""
+        return self._decoder.counts
+
+    def change_link(self, change: LinkChanged, *, now: float) -> None:
+        """Take a link into use, or out of it."""
+        if not change.up:
+            self._links.discard(change.link)
+            for key in [key for key in self._clients if key[0] == change.link]:
+                del self._clients[key]
+            return
+        self._links.add(change.link)
+        self._link_numbers.setdefault(change.link, len(self._link_numbers) + 1)
+        for peer in change.peers:
+            self._add(change.link, peer, is_configured=True, now=now)
+
+    def change_peer(self, change: PeerChanged, *, now: float) -> None:
+        """Speak to who has come, forget who is gone."""
+        self._clients.pop((change.link, change.peer), None)
+        self._signatures.forget(change.link, change.peer)
+        if change.up and change.link in self._links:
+            self._add(change.link, change.peer, is_configured=True, is_connected=True, now=now)
+
+    def note_congestion(self, change: Congestion, *, now: float) -> None:
+        """Keep telemetry from a way out that does not take it."""
+        client = self._clients.get((change.link, change.peer))
+        if client is not None:
+            client.thinner.stretch.note(change.is_congested, now=now)
+
+    def link_number(self, link: str) -> int:
+        """Give a client link's number, from 1; 0 for one that is not there in this run."""
+        return min(self._link_numbers.get(link, 0), MAX_LINK_NUMBER)
+
+    def owns(self, link: str) -> bool:
+        """Whether a link of this name is a client link."""
+        return link in self._links
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        self._rights = RightsBook(settings.roles)
+        self._newcomers = None
+        for client in self._clients.values():
+            client.apply(settings.clients)
+            submitter = client.submitter(client.last_source)
+            client.take_rights(self._rights.of(client.signed_by, submitter), now=client.heard_at)
+
+    def forget_unknown(self) -> list[tuple[str, Peer]]:
+        """Forget who has signed with a key that counts no more; who is spoken to is unheard.
+
+        Gives where they were.
+        """
+        unknown = [
+            (key, client)
+            for key, client in self._clients.items()
+            if not self._signatures.knows(client.signed_by)
+        ]
+        for key, client in unknown:
+            self._drop(key, client)
+        return [key for key, _ in unknown]
+
+    def has(self, link: str, peer: Peer) -> bool:
+        """Whether an endpoint is a client's."""
+        return (link, peer) in self._clients
+
+    def client(self, key: tuple[str, Peer]) -> GcsClient | None:
+        """Give a client by its key, if it is still there."""
+        return self._clients.get(key)
+
+    def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Received | None:
+        """Take a packet in; None if it means nothing."""
+        message = None
+        if packet.message_id in m.ALL:
+            message = self._decoder.decode(packet)
+            if message is None:
+                return None
+        else:
+            self.counts.unknown += 1
+        key = self._signatures.admit(link, peer, packet)
+        if key is None:
+            return None
+        client = self._clients.get((link, peer))
+        if client is None:
+            if message is None:  # unverified bytes make nobody a client
+                return None
+            is_signed = key is not UNSIGNED
+            client = self._admit(link, peer, message, is_signed=is_signed, now=now)
+            if client is None:
+                return None
+        client.signed_by = key
+        client.take_rights(self._rights.of(key, client.submitter(packet.source)), now=now)
+        if message is not None:
+            client.heard(packet.source, now=now)
+        return Received(client, packet, message)
+
+    def forward(self, packet: Packet, *, now: float) -> None:
+        """Show a vehicle's packet to every client that is to have it.
+
+        One that names whom it is for goes to nobody else: clients take an answer to another's
+        question for their own.
+        """
+        if packet.message_id not in m.TARGETED:
+            for client in self._clients.values():
+                client.forward(packet, now=now)
+            return
+        message = self._decoder.decode(packet)
+        if message is None:
+            return
+        target = target_of(message)
+        for client in self._clients.values():
+            if client.is_reached_by(target):
+                client.forward(packet, now=now)
+            else:
+                client.outlet.withhold(packet.source)
+
+    def continue_numbers(self, packet: Packet) -> None:
+        """Let this packet follow on the last one of its source towards every client."""
+        for client in self._clients.values():
+            client.outlet.continue_numbers(packet)
+
+    def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
+        """Send a STATUSTEXT to every client."""
+        for client in self._clients.values():
+            client.tell(text, severity, source, now=now)
+
+    def forget_silent(self, *, awaits: Callable[[GcsClient], bool], now: float) -> None:
+        """Drop clients that have been silent for long; configured ones become unheard again.
+
+        Who awaits the end of a task is told of it, however long it takes.
+        """
+        limits = self._settings.clients
+        is_crowded = self._is_crowded
+        for key, client in list(self._clients.items()):
+            silence = now - client.heard_at
+            if client.is_configured and not client.is_connected:
+                if silence > limits.push_lost:
+                    client.is_heard = False
+                continue
+            passes = is_crowded and client.is_passing and not client.is_connected
+            if silence > (SILENT if passes else limits.forget_after) and not awaits(client):
+                self._drop(key, client)
+
+    def _drop(self, key: tuple[str, Peer], client: GcsClient) -> None:
+        if client.is_configured:
+            client.is_heard = False
+        else:
+            del self._clients[key]
+            self._signatures.forget(*key)
+
+    def _add(
+        self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
+    ) -> GcsClient:
+        self._has_room(now=now)  # who is configured, or has dialled, always has
+        client = self._new(
+            link, peer, is_configured=is_configured, is_connected=is_connected, now=now
+        )
+        self._clients[link, peer] = client
+        return client
+
+    def _new(
+        self, link: str, peer: Peer, *, is_configured: bool, is_connected: bool, now: float
+    ) -> GcsClient:
+        return GcsClient(
+            Outlet(link, peer, self._queue, self._packer, self._signatures),
+            settings=self._settings.clients,
+            is_configured=is_configured,
+            is_connected=is_connected,
+            now=now,
+        )
+
+    def _admit(
+        self, link: str, peer: Peer, message: m.Message, *, is_signed: bool, now: float
+    ) -> GcsClient | None:
+        """Make somebody a client, unless there are many who are not silent; STOP alone needs none.
+
+        Or else whoever sends from ever other places would drive everybody out, and have telemetry
+        sent to all those places. Who signs comes before who does not: anybody can be many of those.
+        """
+        if self._newcomers is None:
+            most = float(self._settings.clients.max_clients)
+            self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=now)
+        may_come = is_signed or self._newcomers.take(now=now)
+        if may_come and self._has_room(is_signed=is_signed, now=now):
+            is_one_of_many = self._is_crowded and not is_signed
+            client = self._add(link, peer, is_configured=False, now=now)
+            client.is_one_of_many = is_one_of_many
+            return client
+        if is_stop(message):
+            return self._new(link, peer, is_configured=False, is_connected=False, now=now)
+        self.turned_away += 1
+        return None
+
+    @property
+    def _is_crowded(self) -> bool:
+        return len(self._clients) > self._settings.clients.max_clients // CROWDED
+
+    def _has_room(self, *, is_signed: bool = False, now: float) -> bool:
+        """Whether one more may be remembered; forgets who has been silent the longest for that."""
+        if len(self._clients) < self._settings.clients.max_clients:
+            return True
+        others = [
+            client
+            for client in self._clients.values()
+            if not client.is_configured
+            and (now - client.heard_at >= SILENT or (is_signed and client.signed_by is UNSIGNED))
+        ]
+        silent = min(others, key=lambda client: client.heard_at, default=None)
+        if silent is None:
+            return False
+        self._drop(silent.key, silent)
+        return True

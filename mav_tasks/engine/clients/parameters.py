@@ -1,0 +1,209 @@
+"""The server's own settings as parameters of its component inside each vehicle's system.
+
+They are the same for all vehicles, kept over a restart, and have effect at once. The vehicle's own
+parameters are its affair: messages about those go on to it.
+"""
+
+from collections.abc import Mapping
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import SAFETY
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection, SettingError
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST
+from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import param_receiver
+from mav_tasks.services.param_receiver import HASH_CHECK, name_in
+from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import ParameterSet
+
+MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
+LIST_EACH = 0.2  # s: one packet asks for many, and no client asks again so soon
+ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
+
+
+class ParameterDesk:
+    """Answers about the server's parameters, and the settings that follow from them."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        *,
+        settings: Settings,
+        kept: Mapping[str, float],
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._configured = settings
+        self._kept = dict(kept)
+        #: the latest wish for each that is not durable yet, and the number of its event
+        self._pending: dict[str, tuple[float, int]] = {}
+        self._settings, self._why_not = with_all(settings, self._kept)
+        self._is_changed = False
+
+    @property
+    def in_force(self) -> dict[str, float]:
+        """What clients have set, by name, and is not left out for what is configured since."""
+        return {name: value for name, value in self._kept.items() if name not in self._why_not}
+
+    @property
+    def not_in_force(self) -> tuple[str, ...]:
+        """Why the others are left out."""
+        return tuple(why for _, why in sorted(self._why_not.items()))
+
+    def configured(self, settings: Settings) -> Settings:
+        """Take settings as configured anew; gives them with what was set by parameter."""
+        before = self._values()
+        self._configured = settings
+        self._settings, self._why_not = with_all(settings, self._kept)
+        for name, value in self._values().items():
+            if value != before[name]:
+                self._tell(name)
+        return self._settings
+
+    def take_change(self) -> Settings | None:
+        """Give the settings once after each change that is in force now."""
+        is_changed, self._is_changed = self._is_changed, False
+        return self._settings if is_changed else None
+
+    def receive(
+        self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
+    ) -> None:
+        """Answer what is, or is also, for the task servers inside the vehicles addressed."""
+        vehicles = [v for v in self._vehicles if message.target_system in (BROADCAST, v.system_id)]
+        for vehicle in vehicles:
+            component = message.target_component
+            if component in (BROADCAST, vehicle.server_component):
+                self._answer(client, vehicle, packet, message, now=now)
+            elif component == AUTOPILOT and _begins(message):
+                self._list(client, vehicle, now=now)
+
+    def _answer(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        packet: Packet,
+        message: ParamMessage,
+        *,
+        now: float,
+    ) -> None:
+        is_meant = message.target_component != BROADCAST
+        match message:
+            case m.ParamRequestList():
+                self._list(client, vehicle, now=now)
+            case m.ParamRequestRead() if _begins(message):
+                self._list(client, vehicle, now=now)
+            case m.ParamRequestRead() if is_meant or name_in(message) in PARAMETERS:
+                answer = param_receiver.read(self._values(), message, to=packet.source)
+                client.outlet.send(answer, vehicle.server_address)
+            case m.ParamSet() if is_meant or name_in(message) in PARAMETERS:
+                self._set(client, vehicle, packet, message, now=now)
+
+    def _values(self) -> dict[str, float]:
+        return {name: each.value(self._settings) for name, each in PARAMETERS.items()}
+
+    def _list(self, client: GcsClient, vehicle: Vehicle, *, now: float) -> None:
+        listed_at = client.listed_at.get(vehicle.system_id)
+        if listed_at is not None and now - listed_at < LIST_EACH:
+            return
+        client.listed_at[vehicle.system_id] = now
+        for value in param_receiver.all_values(self._values()):
+            client.outlet.send(value, vehicle.server_address)
+
+    def _set(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        packet: Packet,
+        message: m.ParamSet,
+        *,
+        now: float,
+    ) -> None:
+        """It has effect, and is told to everybody, once it is durable."""
+        name, value = name_in(message), as_sent(message.param_value)
+        actor = str(client.submitter(packet.source))
+
+        def refuse(text: str, why: int, *, now: float) -> None:
+            error = param_receiver.error(message, why, to=packet.source)
+            client.outlet.send(error, vehicle.server_address)
+            if name in PARAMETERS:  # to clients that do not know the error, the old value says it
+                told = param_receiver.value_of(self._values(), name)
+                client.outlet.send(told, vehicle.server_address)
+            client.tell(text, MavSeverity.WARNING, vehicle.server_address, now=now)
+
+        if name not in PARAMETERS:
+            refuse(f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
+            return
+        try:
+            if message.param_type != MavParamType.REAL32:
+                raise SettingError(f"{name}: its type is REAL32")
+            pending = {each: wish for each, (wish, _) in self._pending.items()}
+            expected, _ = with_all(self._configured, self._kept | pending)
+            changed(expected, name, value)
+            client.rights.require(SAFETY, "set parameters")
+            self._submissions.check_open()
+        except SettingError as error:
+            refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            return
+        except Rejection as refusal:
+            refuse(refusal.text, MavParamError.PERMISSION_DENIED, now=now)
+            return
+
+        def accept(*, now: float) -> None:
+            is_latest = self._settled(name, mine)
+            try:
+                changed(self._settings, name, value)
+            except SettingError as error:  # what it was checked against was not stored
+                if is_latest:
+                    self._book.record(ParameterSet(name, self._kept.get(name), actor, now))
+                refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            else:
+                self._take(name, value)
+
+        def give_up(*, now: float) -> None:
+            if self._settled(name, mine):  # or else a later wish is on its way to the store
+                self._book.record(ParameterSet(name, self._kept.get(name), actor, now))
+            words = f"{name} was not stored in time: not set"
+            refuse(words, MavParamError.PERMISSION_DENIED, now=now)
+
+        self._book.record(ParameterSet(name, value, actor, now))
+        mine = self._pending[name] = value, self._book.recorded
+        self._submissions.when_durable(accept, give_up, now=now)
+
+    def _settled(self, name: str, wish: tuple[float, int]) -> bool:
+        """Whether a wish that waits no more was the latest for this parameter."""
+        is_latest = self._pending.get(name) == wish
+        if is_latest:
+            del self._pending[name]
+        return is_latest
+
+    def _take(self, name: str, value: float) -> None:
+        self._kept[name] = value
+        self._settings, self._why_not = with_all(self._configured, self._kept)
+        self._is_changed = True
+        self._tell(name)
+
+    def _tell(self, name: str) -> None:
+        """Tell every client that is there of a value."""
+        told = param_receiver.value_of(self._values(), name)
+        for vehicle in self._vehicles:
+            for client in self._gcs:
+                if client.is_heard and client.knows(vehicle.system_id):
+                    client.outlet.send(told, vehicle.server_address)
+
+
+def _begins(message: ParamMessage) -> bool:
+    """Whether a client with a cache begins so; it may leave the list of all out, then."""
+    return isinstance(message, m.ParamRequestRead) and name_in(message) == HASH_CHECK

@@ -1,0 +1,161 @@
+"""Tells clients what happened, and keeps them supplied: heartbeats, statuses, introductions.
+
+A TASK_STATUS that a task is over waits until that is durable: it is never taken back. Where the
+store is too slow it is told all the same; a state that is shown on request waits for nothing.
+"""
+
+from functools import partial
+
+from mav_tasks.engine.clients.displays import Displays
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.summary import summary_of
+from mav_tasks.engine.commands import translate
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink.enums import MavSeverity, MavState
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.heartbeat import component_heartbeat
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskWaits
+from mav_tasks.tasks.lifecycle import TERMINAL
+from mav_tasks.tasks.task import TaskId
+
+
+class Publisher:
+    """What goes to clients without their asking each time."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        displays: Displays,
+        submissions: Submissions,
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._displays = displays
+        self._submissions = submissions
+        self._ended: set[TaskId] = set()  # not durably yet
+
+    def welcome(self, client: GcsClient, *, now: float) -> None:
+        """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
+        if client.knows_all(len(self._vehicles)):
+            return
+        for vehicle in self._vehicles:
+            if client.knows(vehicle.system_id) or not vehicle.is_heard(now=now):
+                continue  # a silent one must not look alive
+            if vehicle.last_heartbeat is not None:
+                heartbeat = vehicle.shown.applied(vehicle.last_heartbeat, now=now)
+                client.introduce(heartbeat, last_seq=vehicle.last_seq)
+
+    def withhold(self, packet: Packet) -> None:
+        """Note for every client that a packet of a vehicle is not passed on."""
+        for client in self._gcs:
+            client.outlet.withhold(packet.source)
+
+    def publish(self, events: list[Event], *, now: float) -> None:
+        """Tell of events: in words to all who listen, as TASK_STATUS to who submitted."""
+        ended = {e.task_id for e in events if isinstance(e, TaskChanged) and e.new in TERMINAL}
+        if ended:
+            self._ended |= ended
+            tell = partial(self._tell_ends, ended)
+            self._submissions.when_durable(tell, tell, now=now)
+        for event in events:
+            spoken = translate.text_of(event)
+            if spoken is not None:
+                system_id, severity, text = spoken
+                vehicle = self._vehicles.get(system_id)
+                if vehicle is not None:
+                    self._gcs.tell(text, severity, vehicle.server_address, now=now)
+            if isinstance(event, TaskChanged | TaskModified | TaskAdvanced | TaskWaits):
+                self.note_change(event.task_id)
+
+    def _tell_ends(self, ended: set[TaskId], *, now: float) -> None:
+        self._ended -= ended
+        for task_id in sorted(ended):
+            self.note_change(task_id)
+        self.send_statuses(now=now)
+
+    def _is_told_later(self, task_id: int) -> bool:
+        """Whether a task is over, and that is not durable yet."""
+        return task_id in self._ended
+
+    def note_change(self, task_id: TaskId) -> None:
+        """Have the submitter of a task told of its state, and who has asked about it."""
+        task = self._book.get(task_id)
+        if task is None or self._is_told_later(task_id):
+            return
+        for client in self._gcs:
+            # a nonce says it for good: after a restart, or a long silence, the client is another
+            reads = client.uses_dialect or task.marks.nonce
+            if (reads and client.submitted(task)) or client.follows(task.id):
+                client.statuses.changed(task.id)
+
+    def _awaits(self, client: GcsClient) -> bool:
+        return self._book.is_awaited_at(client.outlet.link, client.endpoint)
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do."""
+        deadline = self._gcs.heartbeat.next_deadline()
+        for client in self._gcs:
+            due = client.statuses.next_deadline()
+            if due is not None:
+                deadline = min(deadline, due)
+        return deadline
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Send the task servers' heartbeats and the statuses that are due."""
+        if self._gcs.heartbeat.is_due(now=now):
+            self._gcs.forget_silent(awaits=self._awaits, now=now)
+            self._send_heartbeats(now=now)
+            for client in self._gcs:
+                client.tell_what_was_left_out(now=now)
+        self.send_statuses(now=now)
+
+    def send_statuses(self, *, now: float) -> None:
+        """Send each client the statuses that are due."""
+        for client in self._gcs:
+            due = client.statuses.next_deadline()
+            if due is None or now < due:
+                continue
+            active: dict[int, int] = {
+                vehicle.system_id: vehicle.tasks.begun.id
+                for vehicle in self._vehicles
+                if vehicle.tasks.begun is not None
+            }
+            for task_id in client.statuses.due(active, now=now):
+                if not self._is_told_later(task_id):
+                    self._displays.push_status(client, task_id, now=now)
+
+    def _send_heartbeats(self, *, now: float) -> None:
+        """One from inside each vehicle that is heard, to each client that is.
+
+        To an address that is only pushed to, nobody may be listening yet; and whoever begins to
+        must hear the autopilot first, because an older MAVSDK otherwise never connects.
+
+        DEVIATION: the task server's component falls silent with its vehicle; its heartbeats would
+        otherwise hide from a ground station that the vehicle is lost.
+        """
+        for vehicle in self._vehicles:
+            if not vehicle.is_heard(now=now):
+                continue
+            begun = vehicle.tasks.begun is not None
+            heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
+            for client in self._gcs:
+                if client.is_heard and client.knows(vehicle.system_id):
+                    client.outlet.send(heartbeat, vehicle.server_address)
+            self._inform(vehicle, now=now)
+
+    def _inform(self, vehicle: Vehicle, *, now: float) -> None:
+        """Tell clients that are new, or back, what is held or paused, up to a second later.
+
+        A ground station takes no text of a vehicle that it has only just heard of.
+        """
+        new = [client for client in self._gcs if client.is_to_be_informed(vehicle.system_id)]
+        words = summary_of(vehicle.tasks) if new else ""
+        for client in new if words else ():
+            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)

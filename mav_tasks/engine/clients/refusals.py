@@ -1,0 +1,59 @@
+"""What clients are refused, for the journal and the log: who, what and why.
+
+A command is refused with its acknowledgement (``CommandRequest``). Here is what has none: messages
+of the mission protocol, SET_MODE, and what comes as a stream, of which one line in STREAM_EACH
+seconds is kept.
+"""
+
+from collections.abc import Hashable
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason
+
+STREAM_EACH = 30.0  # s, the log's own window for words that repeat themselves
+REMEMBERED = 256  # streams of clients
+
+
+class Refusals:
+    """Records refusals; of a flood of them only so many."""
+
+    def __init__(self, book: TaskBook) -> None:
+        self._book = book
+        self._streams: dict[Hashable, float] = {}  # when each was recorded last
+
+    def message(
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, refusal: Rejection, *, now: float
+    ) -> bool:
+        """Record that a message was refused; False: it is one of a flood, to be passed over."""
+        if not client.may_be_refused(now=now):
+            return False
+        self._record(client, vehicle.system_id, packet, refusal, now=now)
+        return True
+
+    def stream(
+        self, client: GcsClient, system_id: int, packet: Packet, refusal: Rejection, *, now: float
+    ) -> None:
+        """Record that a message of a stream went no further, once in a while."""
+        key = (client.key, packet.source, system_id, packet.message_id, refusal.text)
+        if now - self._streams.get(key, -STREAM_EACH) < STREAM_EACH:
+            return
+        if not client.may_be_refused(now=now):
+            return
+        self._streams.pop(key, None)
+        if len(self._streams) >= REMEMBERED:
+            del self._streams[next(iter(self._streams))]
+        self._streams[key] = now
+        self._record(client, system_id, packet, refusal, now=now)
+
+    def _record(
+        self, client: GcsClient, system_id: int, packet: Packet, refusal: Rejection, *, now: float
+    ) -> None:
+        reason, actor = TaskReason(refusal.reason), str(client.submitter(packet.source))
+        self._book.record(
+            SubmissionRefused(system_id, -packet.message_id, reason, refusal.text, actor, now)
+        )

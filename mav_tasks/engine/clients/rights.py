@@ -1,0 +1,178 @@
+"""What a client may do: by its key or its address it has a role, and the role has limits.
+
+What only stops a rover, everybody may: STOP, pause, HOLD, disarming. A refusal names its rule.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from mav_tasks.engine.clients.signatures import UNSIGNED
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.settings import ROLES, Limits, Roles
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    Goal,
+    GoTo,
+    Head,
+    Move,
+    MoveTurned,
+    Nothing,
+    Perform,
+    Plan,
+    Rotate,
+    SetSpeed,
+    SingleGoal,
+    Step,
+    Wait,
+)
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
+
+R = TaskReason
+
+OBSERVER, SUBMITTER, OPERATOR, SAFETY = ROLES
+NO_LIMIT = Limits()
+SAME = 1 + 1e-6  # a float32 of a limit is that limit
+
+
+class Rights(NamedTuple):
+    """What one client may do."""
+
+    role: str
+    limits: Limits
+
+    def reach(self, role: str) -> bool:
+        """Whether they are at least those of a role."""
+        return ROLES.index(self.role) >= ROLES.index(role)
+
+    def require(self, role: str, what: str) -> None:
+        """Raise Rejection unless they are at least those of a role."""
+        if not self.reach(role):
+            raise self.refusal(f"may not {what}, {role} may")
+
+    def require_own(self, task: Task, submitter: Submitter, what: str) -> None:
+        """Raise Rejection unless it is the client's own task, or it may do that to any."""
+        self.require(SUBMITTER, what)
+        if not self.reach(OPERATOR) and task.submitter.owner != submitter.owner:
+            words = f"may not {what}: task {task.id} is of {task.submitter}"
+            raise self.refusal(words)
+
+    def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
+        """Give what is said when it may not."""
+        return Rejection(reason, f"role {self.role} {words}")
+
+    def check_priority(self, priority: int) -> None:
+        """Raise Rejection for a task that would be too urgent."""
+        most = self.limits.max_priority
+        if priority > most:
+            raise self.refusal(f"may not have priority {priority}, {most} at the most")
+
+    def check_preemptive(self) -> None:
+        """Raise Rejection unless a task of its may interrupt those of others at once."""
+        self.require(OPERATOR, "make a task pre-emptive")
+
+    def checked(self, draft: Draft, *, waiting: int) -> Draft:
+        """Give a task as it may be submitted by somebody of whom so many wait; Rejection."""
+        self.require(SUBMITTER, "submit tasks")
+        self.check_priority(draft.terms.priority)
+        for kind in _kinds_of(draft.goal):
+            if kind not in self.limits.tasks:
+                raise self.refusal(f"may not submit a {kind}, only {', '.join(self.limits.tasks)}")
+        if not self.reach(OPERATOR) and _performs(draft.goal):
+            raise self.refusal("may not send a plan with commands to the rover")
+        if draft.terms.is_preemptive:
+            self.check_preemptive()
+        if waiting >= self.limits.quota:
+            raise self.refusal(f"may have {self.limits.quota} tasks waiting", R.QUOTA)
+        top = self.limits.max_speed
+        if top >= NO_LIMIT.max_speed:
+            return draft
+        fastest = _fastest(draft.goal)
+        if fastest > top * SAME:
+            raise self.refusal(f"may not drive {fastest:g} m/s, {top:g} at the most")
+        return replace(draft, terms=self.bounded(draft.terms))
+
+    def bounded(self, terms: Terms) -> Terms:
+        """Give terms that keep a task to the speed, whatever speed is set for it."""
+        if self.limits.max_speed >= NO_LIMIT.max_speed:
+            return terms
+        return replace(terms, top_speed=self.limits.max_speed)
+
+
+#: before it is known who somebody is
+NOTHING = Rights(OBSERVER, NO_LIMIT)
+
+
+class RightsBook:
+    """The rights of everybody."""
+
+    def __init__(self, roles: Roles) -> None:
+        self._roles = roles
+        self._by_role = {role: Rights(role, getattr(roles, role)) for role in ROLES}
+
+    def __repr__(self) -> str:
+        return f"RightsBook(unsigned: {self._roles.unsigned})"
+
+    def of(self, key: Key, submitter: Submitter) -> Rights:
+        """Give the rights of who sent a packet that was signed with this key."""
+        if key is not UNSIGNED:
+            return self._by_role[key.role]
+        addresses = self._roles.addresses
+        if not addresses:
+            return self._by_role[self._roles.unsigned]
+        by_address = addresses.get(submitter.address, self._roles.unsigned)
+        return self._by_role[addresses.get(submitter.place, by_address)]
+
+
+def _kinds_of(goal: Goal) -> list[str]:
+    """Give the kinds of tasks that a goal is, a plan of one step being as that step."""
+    if not isinstance(goal, Plan):
+        return [_kind_of(goal)]
+    kinds = [_kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
+    if len(kinds) == 1 and not _has_home(goal):
+        return kinds
+    return ["plan", *sorted(set(kinds))]
+
+
+def _has_home(plan: Plan) -> bool:
+    return plan.steps[:1] == (Nothing(),)
+
+
+def _kind_of(goal: SingleGoal) -> str:
+    match goal:
+        case Move() | MoveTurned():
+            return "move"
+        case Rotate() | Face():
+            return "rotate"
+        case Drive() | Head():
+            return "drive"
+        case GoTo(place=None):
+            return "return"
+        case GoTo():
+            return "goto"
+        case Wait():
+            return "wait"
+
+
+def _performs(goal: Goal) -> bool:
+    return isinstance(goal, Plan) and any(isinstance(step, Perform) for step in goal.steps)
+
+
+def _fastest(goal: Goal) -> float:
+    """Give the highest speed that a goal names, m/s."""
+    steps = goal.steps if isinstance(goal, Plan) else (goal,)
+    return max((_speed_of(step) for step in steps), default=0.0)
+
+
+def _speed_of(step: Step) -> float:
+    match step:
+        case Move(speed=speed) | MoveTurned(speed=speed) | GoTo(speed=speed):
+            return speed or 0.0
+        case SetSpeed(speed=speed):
+            return speed or 0.0
+        case Drive(forward=forward) | Head(forward=forward):
+            return abs(forward)
+        case _:
+            return 0.0

@@ -1,0 +1,50 @@
+"""SETUP_SIGNING of a client: from then on the server signs to it, if it knows the key.
+
+It gives nobody more rights, brings no new key into the ring, and is never passed on: a rover whose
+key changes under the server would take no STOP from it any more.
+"""
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.settings import Settings
+
+
+class SetupSigning:
+    """Answers by signed packets; a text says why not. QGroundControl looks for both."""
+
+    def __init__(self, signatures: Signatures, vehicles: VehicleSide, settings: Settings) -> None:
+        self._signatures = signatures
+        self._vehicles = vehicles
+        self._policy = settings.signing.setup
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._policy = settings.signing.setup
+
+    def receive(self, client: GcsClient, message: m.SetupSigning, *, now: float) -> None:
+        """See to a client's wish."""
+        targets = self._vehicles.addressed_by(message.target_system)
+        if not targets:
+            return
+        why_not = self._set_up(client, bytes(message.secret_key))
+        if why_not:
+            words = f"signing refused: {why_not}"
+            client.tell(words, MavSeverity.ERROR, targets[0].server_address, now=now)
+
+    def _set_up(self, client: GcsClient, secret: bytes) -> str:
+        link, peer = client.key
+        if self._policy != "known":
+            return "signing.setup says so"
+        if not any(secret):
+            if not self._signatures.takes_unsigned(link):
+                return "only signed packets are taken on this link"
+            self._signatures.sign_to(link, peer, None)
+            return ""
+        key = self._signatures.key_of_secret(secret)
+        if key is None or not key.role:
+            return "the key is none of this server's"
+        self._signatures.sign_to(link, peer, key)
+        return ""

@@ -1,0 +1,36 @@
+"""What a ground station that is new, or back, is told of a rover: why its tasks do not go on.
+
+The texts that told of it were sent before that station listened. The important words come first,
+because some clients show the first 50 characters only.
+"""
+
+from mav_tasks.engine.commands.submissions import PAUSED
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+
+BUTTONS = "Held: rest, again or skip"  # of the actions file for QGroundControl
+
+
+def summary_of(tasks: VehicleTasks) -> str:
+    """Return why the tasks of a rover stand and what to press; "" if they do not stand."""
+    waiting = len(tasks.waiting)
+    wait = f"; {waiting} wait" if waiting else ""
+    held = _in_state(tasks, TaskState.HELD)
+    if tasks.paused is TaskReason.STOPPED:
+        return f"STOP in force, press Continue{wait}"
+    if held is not None:
+        return f"Task {held.id} held: {words_of(held.reason)}. Press {BUTTONS}{wait}"
+    begun = _in_state(tasks, TaskState.PAUSED)
+    why = PAUSED.get(tasks.paused, words_of(tasks.paused))
+    if tasks.paused and begun is not None:
+        return f"Task {begun.id} paused, press Continue: {why}{wait}"
+    if tasks.paused and waiting:
+        return f"{waiting} tasks wait, press Continue: {why}"
+    return ""
+
+
+def _in_state(tasks: VehicleTasks, state: TaskState) -> Task | None:
+    """Return the first task of this state that has begun."""
+    begun = [] if tasks.begun is None else [tasks.begun]
+    return next((task for task in (*begun, *tasks.aside) if task.state is state), None)

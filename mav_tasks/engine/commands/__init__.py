@@ -1,0 +1,1 @@
+"""What clients ask for by a command, and what becomes of it."""

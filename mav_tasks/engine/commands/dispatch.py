@@ -1,0 +1,410 @@
+"""Where each command of a client goes: to the queue, to a vehicle, or to what the client is shown.
+
+Every command is answered exactly once, from the component that was addressed, to the endpoint that
+asked. What is not ours is forwarded to the vehicle, whose answer comes back through ``deliver``.
+"""
+
+from math import isfinite
+from typing import NamedTuple
+
+from mav_tasks.engine.clients.broadcasts import EVERYBODY
+from mav_tasks.engine.clients.displays import Displays
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import OPERATOR, SAFETY
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.goals import (
+    CHANGE_MODE,
+    OUR_COMMANDS,
+    bad,
+    becomes_task,
+    place_in,
+    reposition_flags,
+    whole,
+)
+from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.task_control import TaskControl
+from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.missions.plans import Plans, begins_with
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import Answer, Command
+from mav_tasks.services.command_sender import Answered
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import TaskId
+
+R = TaskReason
+
+#: commands that a vehicle follows in the mode in which we drive it: a second source
+MOVING = frozenset(
+    {
+        MavCmd.NAV_WAYPOINT,
+        MavCmd.NAV_LOITER_UNLIM,
+        18,  # NAV_LOITER_TURNS
+        MavCmd.NAV_LOITER_TIME,
+        MavCmd.NAV_TAKEOFF,
+        32,  # DO_FOLLOW
+        33,  # DO_FOLLOW_REPOSITION
+        34,  # DO_ORBIT
+        MavCmd.CONDITION_YAW,
+        MavCmd.DO_REPOSITION,
+        MavCmd.NAV_SET_YAW_SPEED,
+        MavCmd.DO_MOTOR_TEST,
+        43000,  # GUIDED_CHANGE_SPEED
+        43002,  # GUIDED_CHANGE_HEADING
+    }
+)
+#: all that passes while STOP is latched, besides disarming: what only asks. Of the others nobody
+#: can list all that arm, change the mode or move (DO_AUX_FUNCTION alone does each).
+ASKING = frozenset(
+    {
+        MavCmd.REQUEST_MESSAGE,
+        MavCmd.REQUEST_PROTOCOL_VERSION,
+        MavCmd.REQUEST_AUTOPILOT_CAPABILITIES,
+        MavCmd.GET_HOME_POSITION,
+        521,  # REQUEST_CAMERA_INFORMATION
+        522,  # REQUEST_CAMERA_SETTINGS
+        525,  # REQUEST_STORAGE_INFORMATION
+        527,  # REQUEST_CAMERA_CAPTURE_STATUS
+        528,  # REQUEST_FLIGHT_INFORMATION
+    }
+)
+
+
+#: that change what bounds a rover
+BOUNDING = frozenset(
+    {
+        180,  # DO_SET_PARAMETER
+        207,  # DO_FENCE_ENABLE
+        218,  # DO_AUX_FUNCTION: the fence is one of them
+        245,  # PREFLIGHT_STORAGE
+        5300,  # DO_SET_SAFETY_SWITCH_STATE
+    }
+)
+
+
+MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
+
+
+class _Asker(NamedTuple):
+    """Whose command was forwarded: the endpoint, the address there, and whom it addressed."""
+
+    client: tuple[str, Peer]
+    source: Address
+    answering: Address
+
+
+class Commands:
+    """The answers to commands, and their effects."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        modes: ModeRequests,
+        control: TaskControl,
+        displays: Displays,
+        settings: Settings,
+    ) -> None:
+        self._settings = settings
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._plans = plans
+        self._modes = modes
+        self._control = control
+        self._displays = displays
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        self._submissions.apply(settings)
+        self._modes.apply(settings)
+        self._control.apply(settings)
+
+    def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
+        """See to a client's command."""
+        if command.command == MavCmd.TASK_STOP:
+            self._stop(client, packet, command, now=now)
+            return
+        addressed = self._vehicles.addressed_by(command.target.system_id)
+        if not addressed:
+            return  # clients send everything to everyone: it is for somebody else
+        vehicle = addressed[0]
+        receiver = client.receiver(packet.source)
+        known = receiver.same_packet(packet.raw, now=now)
+        if known is not None:
+            if known.answer is not None:
+                client.answer(known.answer, packet.source)
+            return
+        pending = receiver.remember(command, packet.raw, now=now)
+        asked = Asked(client, vehicle, packet, pending)
+        try:
+            self._dispatch(asked, now=now)
+        except Rejection as refusal:
+            if self._is_tried_again(asked, now=now):
+                asked.answer(MavResult.CANCELLED, refusal.reason)
+            elif client.may_be_refused(now=now):
+                self._book.record(asked.refuse(refusal, now=now))
+            else:  # a flood of them fills neither disk nor net
+                asked.answer(result_of(refusal.reason), refusal.reason)
+
+    def _is_tried_again(self, asked: Asked, *, now: float) -> bool:
+        """Whether a mode that has just been refused is asked for, and refused, once more.
+
+        QGroundControl asks three times, and shows a box for each refusal that is called so.
+        """
+        is_mode = asked.command.command == MavCmd.DO_SET_MODE
+        return is_mode and asked.receiver.is_refused_again(
+            asked.command, within=MODE_TRIED_AGAIN, now=now
+        )
+
+    def _dispatch(self, asked: Asked, *, now: float) -> None:
+        if asked.command.target.system_id == EVERYBODY:  # what is not ours came once for each rover
+            number = asked.command.command
+            raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
+        component = asked.command.target.component_id
+        at_server = component == asked.vehicle.server_component
+        # an autopilot answers for components that are not there: also about what it sends
+        is_interval = asked.command.command in (
+            MavCmd.SET_MESSAGE_INTERVAL,
+            MavCmd.GET_MESSAGE_INTERVAL,
+        )
+        at_nobody = is_interval and component not in asked.vehicle.components
+        if component in (0, AUTOPILOT) or at_server or at_nobody:
+            match asked.command.command:
+                case number if becomes_task(number) and (at_server or self._claims(number)):
+                    self._take_in(asked, now=now)
+                    return
+                case number if self._control.handles(number):
+                    asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
+                    return
+                case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
+                    number
+                ):  # in examples for every kind of vehicle: nothing to do
+                    asked.answer(MavResult.ACCEPTED)
+                    return
+                case MavCmd.NAV_LAND as number if at_server or self._claims(number):
+                    asked.vehicle.stand_down(asked.client.key, now=now)
+                    asked.answer(MavResult.ACCEPTED)
+                    return
+                case MavCmd.MISSION_START as number if at_server or self._claims(number):
+                    first = whole(asked.command, 1, "first item", high=0xFFFF)
+                    _check_last_item(asked)
+                    self._modes.start_plan(asked, first=first, now=now)
+                    return
+                case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
+                    self._plans.check_start(asked.rights, asked.vehicle, asked.submitter)
+                    seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
+                    task = self._plans.go_on_with(asked.vehicle, seq, now=now)
+                    asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
+                    if task is None and seq is not None:
+                        asked.tell(begins_with(seq), MavSeverity.INFO, now=now)
+                    return
+                case MavCmd.DO_PAUSE_CONTINUE:
+                    asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
+                    return
+                case MavCmd.SET_MESSAGE_INTERVAL:
+                    self._displays.set_interval(asked, now=now)
+                    asked.answer(MavResult.ACCEPTED)
+                    return
+                case MavCmd.GET_MESSAGE_INTERVAL:
+                    self._displays.show_interval(asked)
+                    asked.answer(MavResult.ACCEPTED)
+                    return
+                case MavCmd.REQUEST_MESSAGE if self._displays.show(asked, now=now):
+                    asked.answer(MavResult.ACCEPTED)
+                    return
+                case number if number in OUR_COMMANDS:
+                    self._refuse_unknown(asked, now=now)
+                    return
+        if at_server and asked.command.command in ASKING:  # ground stations ask everybody
+            asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
+        elif at_server:
+            self._refuse_unknown(asked, now=now)
+        elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
+            return
+        else:  # also to a component never heard of: an autopilot does what that is told
+            _check_relay(asked, now=now)
+            _relay(asked, now=now)
+
+    def _refuse_unknown(self, asked: Asked, *, now: float) -> None:
+        words = f"command {asked.command.command}: not supported in this version"
+        unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+        self._book.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
+
+    def _claims(self, command: int) -> bool:
+        """Whether a command to the autopilot itself is ours to see to."""
+        return command in OUR_COMMANDS or self._settings.claim
+
+    def _take_in(self, asked: Asked, *, now: float) -> None:
+        """A command that asks for a task; or, without a place, for a pause."""
+        is_reposition = asked.command.command == MavCmd.DO_REPOSITION
+        if is_reposition and place_in(asked.command) is None:
+            asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
+        elif is_reposition:
+            held_at = asked.vehicle.hold_before.since
+            # a copy of a "go to" from before a HOLD says nothing about that
+            is_older = asked.receiver.older_copy(asked.command, before=held_at, now=now)
+            self._submissions.submit(asked, now=now)
+            if not is_older:
+                self._undo_hold_before(asked, now=now)
+        else:
+            self._submissions.submit(asked, now=now)
+
+    def _undo_hold_before(self, asked: Asked, *, now: float) -> None:
+        vehicle = asked.vehicle
+        number = vehicle.hold_before.undoing(asked.client.key, now=now)
+        if number is None:
+            return
+
+        def undo(*, now: float) -> None:
+            vehicle.go_to_follows(number, actor=asked.actor, now=now)
+
+        def leave(*, now: float) -> None:
+            """It was not stored in time."""
+
+        self._submissions.when_durable(undo, leave, now=now)
+
+    def cancel_latest(
+        self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
+    ) -> None:
+        """COMMAND_CANCEL: nothing acknowledges it; the task's own status tells."""
+        vehicle = self._vehicles.get(message.target_system)
+        if vehicle is not None:
+            submitter = client.submitter(packet.source)
+            rights = client.rights
+            self._control.cancel_latest(rights, vehicle, submitter, message.command, now=now)
+
+    def deliver(self, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
+        """Bring a vehicle's answer, or its silence, to the client that asked."""
+        asker = answered.origin
+        assert isinstance(asker, _Asker), "only _relay gives commands an origin"
+        is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
+        if is_accepted and answered.command == MavCmd.DO_SET_HOME:
+            actor = f"{asker.source.system_id}/{asker.source.component_id}"
+            vehicle.home_was_set(answered.request, actor=actor, now=now)
+        client = self._gcs.client(asker.client)
+        if client is None:
+            return
+        ack, command = answered.ack, answered.command
+        if ack is not None:
+            # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK
+            result = ack.result if ack.result <= MavResult.CANCELLED else MavResult.UNSUPPORTED
+            if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
+                result = MavResult.UNSUPPORTED  # as some say that they have no such message
+            answer = Answer(command, result, ack.result_param2, asker.answering)
+        elif command == MavCmd.REQUEST_MESSAGE:
+            answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
+        else:
+            reason = int(R.VEHICLE_SILENT)
+            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
+            words = f"command {command}: no answer from vehicle {vehicle.system_id}"
+            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+        client.answer(answer, asker.source)
+
+    # STOP, pause, modes
+
+    def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
+        """Stop one vehicle or all, whatever component is named; acts on every copy, and answers it.
+
+        DEVIATION: for target_system 0 there is one ack, not one from each system: the worst
+        result, from the task server of the lowest system id.
+        """
+        target = command.target
+        targets = self._vehicles.addressed_by(target.system_id)
+        actor = str(client.submitter(packet.source))
+        is_to_clear = command.params[0] == 1.0
+        clear = is_to_clear and client.rights.reach(OPERATOR)  # of nobody else; STOP is everybody's
+        unheard = self._vehicles.stop_unheard(target.system_id, clear=clear, actor=actor, now=now)
+        if not targets and not unheard:
+            return
+        killed = [vehicle.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
+        silent = [vehicle.system_id for vehicle in targets if not vehicle.is_heard(now=now)]
+        silent += unheard
+        component = targets[0].server_component if targets else MavComponent.ONBOARD_COMPUTER
+        source = Address(
+            target.system_id or min([*unheard, *(vehicle.system_id for vehicle in targets)]),
+            (target.component_id if target.system_id else 0) or component,
+        )
+        if silent:
+            result, param2 = MavResult.FAILED, int(R.VEHICLE_SILENT)
+            words = ", ".join(map(str, silent))
+            client.tell(f"STOP kept: vehicle {words} silent", MavSeverity.ERROR, source, now=now)
+        else:
+            result, param2 = MavResult.ACCEPTED, next((k for k in killed if k), 0)
+        if is_to_clear and not clear and client.may_be_refused(now=now):
+            words = f"stopped; role {client.rights.role} may not clear a queue, {OPERATOR} may"
+            client.tell(words, MavSeverity.WARNING, source, now=now)
+        client.answer(Answer(command.command, result, param2, source), packet.source)
+
+    def _pause_continue(self, asked: Asked, *, now: float) -> int | None:
+        vehicle = asked.vehicle
+        match asked.command.params[0]:
+            case 0.0:
+                return self._pause(asked, now=now)
+            case 1.0:
+                asked.rights.require(OPERATOR, "let a rover go on")
+                if vehicle.tasks.is_stopped and asked.receiver.older_copy(
+                    asked.command, before=vehicle.stopped_at, now=now
+                ):
+                    raise Rejection(R.STOPPED, "STOP came after this: continue again, if meant")
+                return vehicle.proceed(actor=asked.actor, now=now)
+            case value:
+                raise Rejection(R.BAD_PARAMETER, f"param1 {value:g}: 0 pauses, 1 continues")
+
+    def _pause(self, asked: Asked, *, now: float) -> TaskId | None:
+        vehicle = asked.vehicle
+        self._submissions.held(vehicle, asked.submitter)
+        paused = vehicle.pause(actor=asked.actor, now=now)
+        if not vehicle.is_heard(now=now):  # paused all the same
+            words = f"paused, but vehicle {vehicle.system_id} is silent"
+            raise Rejection(R.VEHICLE_SILENT, words)
+        return paused
+
+
+def _check_last_item(asked: Asked) -> None:
+    last = whole(asked.command, 2, "last item", high=0xFFFF)
+    if last:
+        raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)
+
+
+def _check_relay(asked: Asked, *, now: float) -> None:
+    """Refuse what would move a stopped vehicle, or drive one that a task drives."""
+    vehicle, command = asked.vehicle, asked.command
+    number, params = command.command, command.params
+    disarms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] == 0.0
+    if not disarms and number not in ASKING:
+        least = SAFETY if number in BOUNDING else OPERATOR
+        asked.rights.require(least, f"send command {number} to a rover")
+    if vehicle.tasks.is_stopped and not disarms and number not in ASKING:
+        raise Rejection(R.STOPPED, "STOP is latched: continue first")
+    if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
+        vehicle.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
+    why_not = vehicle.why_not_moved(asked.client.key) if number in MOVING else ""
+    if why_not:
+        raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
+    if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
+        raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
+    if number in MOVING:
+        vehicle.is_moved_by(asked.client.key, now=now)
+
+
+def _relay(asked: Asked, *, now: float) -> None:
+    command = asked.command
+    answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
+    asker = _Asker(asked.client.key, asked.packet.source, answering)
+    asked.vehicle.relay(asked.packet, command.message, asker, command=command.command, now=now)

@@ -1,0 +1,231 @@
+"""What a client's wish for a mode means: HOLD, a return, the mission, or the vehicle's own affair.
+
+It comes as a command, which is answered, or as the old message SET_MODE, which nothing
+acknowledges: who sent that waits until a heartbeat shows the mode.
+"""
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.refusals import Refusals
+from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.goals import marks_of
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.missions.plans import MISSION, Plans
+from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import GoTo, Plan
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
+
+R = TaskReason
+
+SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
+CRUISING = Terms(is_cruising=True)
+STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
+
+
+class ModeRequests:
+    """The wishes for modes of all clients."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        refusals: Refusals,
+        settings: Settings,
+    ) -> None:
+        self._refusals = refusals
+        self._gcs = gcs
+        self._book = book
+        self._submissions = submissions
+        self._plans = plans
+        self._claims = settings.claim
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._claims = settings.claim
+
+    def asked(self, asked: Asked, *, now: float) -> bool:
+        """See to DO_SET_MODE; False: it is for the vehicle itself to answer."""
+        vehicle, client = asked.vehicle, asked.client
+        main, sub = asked.command.params[1:3]
+        mode = vehicle.persona.mode_in(main, sub)
+        if mode is None:
+            raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
+        submitter = client.submitter(asked.packet.source)
+        if mode == vehicle.persona.hold_mode:
+            self._submissions.held(vehicle, submitter)
+            paused = vehicle.hold(client=client.key, actor=asked.actor, now=now)
+            if not vehicle.is_heard(now=now):
+                raise Rejection(R.VEHICLE_SILENT, f"vehicle {vehicle.system_id} is silent")
+            asked.answer(MavResult.ACCEPTED, paused or 0)
+            return True
+        if vehicle.tasks.is_stopped:
+            raise STOPPED
+        if self._is_return(vehicle, mode):
+            marks = marks_of(asked.command, asked.packet.raw)
+            self._submissions.run_now(asked, _return_home(vehicle, submitter, marks), now=now)
+            self._show(vehicle, mode, now=now)
+            return True
+        if not self._is_mission(vehicle, mode):
+            client.rights.require(OPERATOR, "change the mode")
+            vehicle.client_asks_mode(mode, client.key, now=now)
+            return False
+        self._plans.check_start(client.rights, vehicle, submitter)
+        if self._is_to_be_armed_first(vehicle):
+            self._mark(vehicle, client, submitter, now=now)
+            shown = self._plans.shown(vehicle)
+            asked.answer(MavResult.ACCEPTED, 0 if shown is None else shown.id)
+        else:
+            self.start_plan(asked, first=0, now=now)
+            self._show(vehicle, mode, now=now)
+        return True
+
+    def heard(
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, mode: int, *, now: float
+    ) -> None:
+        """See to the message SET_MODE."""
+        submitter = client.submitter(packet.source)
+        try:
+            self._heard(client, vehicle, submitter, packet, mode, now=now)
+        except Rejection as refusal:
+            if self._refusals.message(client, vehicle, packet, refusal, now=now):
+                client.tell_refusal(refusal.text, vehicle.server_address, now=now)
+
+    def _heard(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        submitter: Submitter,
+        packet: Packet,
+        mode: int,
+        *,
+        now: float,
+    ) -> None:
+        actor = str(submitter)
+        if mode == vehicle.persona.hold_mode:
+            self._submissions.held(vehicle, submitter)
+            vehicle.hold(client=client.key, actor=actor, now=now)
+        elif vehicle.tasks.is_stopped:
+            raise STOPPED
+        elif self._is_return(vehicle, mode):
+            draft = _return_home(vehicle, submitter, Marks())
+            self._submissions.run_unasked(client, vehicle, draft, actor=actor, now=now)
+            self._show(vehicle, mode, now=now)
+        elif not self._is_mission(vehicle, mode):
+            client.rights.require(OPERATOR, "change the mode")
+            vehicle.client_asks_mode(mode, client.key, now=now)
+            vehicle.requests.forward(packet)
+            vehicle.requests.ask_to_show(now=now)
+        elif self._is_to_be_armed_first(vehicle):
+            self._plans.check_start(client.rights, vehicle, submitter)
+            self._mark(vehicle, client, submitter, now=now)
+        else:
+            self._plans.check_start(client.rights, vehicle, submitter)
+            self._submissions.check_open()
+            vehicle.end_driving_of(client.key, now=now)
+            self._start_unasked(vehicle, submitter, client.rights, now=now)
+
+    # missions
+
+    def start_plan(self, asked: Asked, *, first: int, now: float) -> None:
+        """Start or continue the uploaded mission; one that is over is another task."""
+        vehicle, submitter = asked.vehicle, asked.submitter
+        self._plans.check_start(asked.rights, vehicle, submitter)
+        self._submissions.check_open()
+        vehicle.end_driving_of(asked.client.key, now=now)
+        started = self._plans.start(vehicle, submitter, first=first, now=now)
+        if isinstance(started, Draft):
+            task = self._submissions.submit_draft(asked, started, now=now)
+            self._plans.restarted(vehicle, task, now=now)
+            return
+
+        def accept(*, now: float) -> None:
+            del now
+            asked.answer(MavResult.ACCEPTED, started.id)
+
+        def give_up(*, now: float) -> None:
+            self._plans.stage_again(vehicle, started, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
+            self._book.record(asked.refuse(refusal, now=now))
+
+        self._submissions.when_durable(accept, give_up, now=now)
+
+    def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
+        """Begin the mission of a vehicle that was to be armed first, if it has just been."""
+        if not vehicle.start_mark.is_put(now=now) or not vehicle.armed:
+            return
+        if vehicle.control.is_engaged or vehicle.control.we_armed:
+            return  # armed by ourselves, for a task
+        marker = vehicle.start_mark.take()
+        vehicle.shown.forget()
+        plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
+        if marker is None or marker.plan_id != plan_id:
+            return
+        if vehicle.is_by_hand and not vehicle.is_armed_by_client(now=now):
+            return  # by a person who means to drive
+        try:
+            self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)
+        except Rejection as refusal:
+            self._gcs.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
+
+    def _start_unasked(
+        self, vehicle: Vehicle, submitter: Submitter, rights: Rights, *, now: float
+    ) -> None:
+        self._submissions.check_open()
+        started = self._plans.start(vehicle, submitter, first=0, now=now)
+        if isinstance(started, Draft):
+            allowed = rights.checked(started, waiting=vehicle.tasks.count_of(submitter))
+            task = vehicle.tasks.submit(allowed, now=now)
+            self._plans.restarted(vehicle, task, now=now)
+        self._show(vehicle, vehicle.persona.mission_mode, now=now)
+
+    def _mark(
+        self, vehicle: Vehicle, client: GcsClient, submitter: Submitter, *, now: float
+    ) -> None:
+        plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
+        vehicle.start_mark.put(client.key, submitter, client.rights, plan_id=plan_id, now=now)
+        words = "The mission starts when the rover is armed"
+        client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+        self._show(vehicle, vehicle.persona.mission_mode, now=now)
+
+    def _show(self, vehicle: Vehicle, mode: int, *, now: float) -> None:
+        """Let clients see a mode at once: who sends SET_MODE is told in no other way."""
+        lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
+        vehicle.shown.show(mode, until=now + lasts)
+        heartbeat = vehicle.shown.in_message(vehicle.heartbeat, now=now)
+        source = Address(vehicle.system_id, AUTOPILOT)
+        for client in self._gcs:
+            if client.knows(vehicle.system_id):
+                client.outlet.send(heartbeat, source)
+
+    def _is_to_be_armed_first(self, vehicle: Vehicle) -> bool:
+        return vehicle.persona.starts_when_armed and not vehicle.armed
+
+    def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
+        """Whether a mode is the return that we drive ourselves: towards a home that is known."""
+        return (
+            self._claims and mode == vehicle.persona.return_mode and vehicle.where.home is not None
+        )
+
+    def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
+        """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""
+        begun = vehicle.tasks.begun
+        has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
+        has_plan = has_plan or (begun is not None and isinstance(begun.goal, Plan))
+        return self._claims and mode == vehicle.persona.mission_mode and has_plan
+
+
+def _return_home(vehicle: Vehicle, submitter: Submitter, marks: Marks) -> Draft:
+    """What the mode RTL asks for."""
+    command = MavCmd.NAV_RETURN_TO_LAUNCH
+    return Draft(vehicle.system_id, command, GoTo(None), submitter, CRUISING, marks=marks)

@@ -1,0 +1,299 @@
+"""Submissions of tasks: recognised if they come again, queued, and acknowledged once durable."""
+
+from dataclasses import replace
+from functools import partial
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import OPERATOR
+from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwise
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.goals import OURS, wish_of
+from mav_tasks.engine.commit_gate import CommitGate, Effect
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import Goal, GoTo, describe
+from mav_tasks.tasks.lifecycle import TaskReason, words_of
+from mav_tasks.tasks.recollection import Known, Recollection, Rule
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
+
+R = TaskReason
+
+#: why a queue stands, in the first words that a station shows
+PAUSED = {
+    R.OPERATOR: "queue paused",
+    R.STOPPED: "STOP in force",
+    R.TAKEOVER: "taken over",
+    R.FAILSAFE: "failsafe",
+    R.RESTARTED: "server restarted",
+}
+NONCE = 3  # where it is among the parameters
+
+
+class Submissions:
+    """What becomes a task, and whether it may be said so yet."""
+
+    def __init__(
+        self, gcs: GcsSide, book: TaskBook, recollection: Recollection, settings: Settings
+    ) -> None:
+        self._gcs = gcs
+        self._book = book
+        self._recollection = recollection
+        self._settings = settings
+        self._gate = CommitGate()
+        #: taken in, and not durable yet: who is to be told, each client once for a command
+        self._undecided: dict[TaskId, list[Asked]] = {}
+        self._store_is_away = False
+        self._is_closing = False
+
+    def close(self) -> None:
+        """Take no more: the server ends."""
+        self._is_closing = True
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+
+    def committed(self, through: int, *, now: float) -> None:
+        """Let go what waited for the store."""
+        self._store_is_away = False
+        self._gate.committed(through, now=now)
+
+    def store_failed(self) -> None:
+        """Refuse new submissions until something has been committed again."""
+        self._store_is_away = True
+
+    def next_deadline(self) -> float | None:
+        """Give when a submission has waited too long for the store."""
+        return self._gate.next_deadline()
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Withdraw submissions that did not become durable in time."""
+        self._gate.handle_deadline(now=now)
+
+    def submit(self, asked: Asked, *, now: float) -> None:
+        """Take in the task that a command asks for; Rejection says why not."""
+        command, vehicle = asked.command, asked.vehicle
+        submitter = asked.client.submitter(asked.packet.source)
+        wish = wish_of(
+            command,
+            asked.packet.raw,
+            self._settings.driving,
+            now=now,
+            priority=self._priority_of(submitter),
+        )
+        # A stock client cannot read TASK_STATUS, and counts it as a packet lost; it fills up with
+        # zeros. A nonce, or NaN for none, comes from somebody who knows these commands.
+        is_ours = command.command in OURS
+        asked.client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
+        rover = f"rover {vehicle.system_id}"
+        ability = Ability.of(vehicle.persona, rover=rover)
+        goal = as_driven(wish.goal, ability)
+        self._check_reach(vehicle, goal)
+        is_at_autopilot = command.target.component_id in (0, AUTOPILOT)
+        terms = replace(wish.terms, is_cruising=is_at_autopilot and not is_ours)
+        draft = Draft(vehicle.system_id, command.command, goal, submitter, terms, wish.marks)
+        known = self._recollection.known(
+            draft, confirmation=command.confirmation, origin=vehicle.where.origin, now=now
+        )
+        if known is not None:
+            self._answer_repeat(asked, known, now=now)
+            return
+        self.check_open()
+        draft = _allowed(asked.client, vehicle, draft)
+        if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven
+            vehicle.end_driving_of(asked.client.key, now=now)
+        if self._settings.guided == "now" and asked.is_go_to:
+            asked.rights.require(OPERATOR, "interrupt what a rover does")
+            task = vehicle.run_now(draft, actor=asked.actor, now=now)
+        else:
+            task = vehicle.tasks.submit(draft, now=now)
+        self._await_commit(asked, task, now=now)
+        words = driven_otherwise(wish.goal, ability)
+        if words:
+            asked.tell(words, MavSeverity.INFO, now=now)
+
+    def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
+        """Take in a task that runs at once; Rejection says why not."""
+        asked.vehicle.end_driving_of(asked.client.key, now=now)
+        known = self._recollection.known(
+            draft, confirmation=0, origin=asked.vehicle.where.origin, now=now
+        )
+        if known is not None:
+            self._answer_repeat(asked, known, now=now)
+            return
+        self.check_open()
+        asked.rights.require(OPERATOR, "interrupt what a rover does")
+        draft = _allowed(asked.client, asked.vehicle, draft)
+        task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
+        self._await_commit(asked, task, now=now)
+
+    def run_unasked(
+        self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, actor: str, now: float
+    ) -> None:
+        """The same for what no acknowledgement is expected of."""
+        vehicle.end_driving_of(client.key, now=now)
+        known = self._recollection.known(
+            draft, confirmation=0, origin=vehicle.where.origin, now=now
+        )
+        if known is None:
+            self.check_open()
+            client.rights.require(OPERATOR, "interrupt what a rover does")
+            draft = _allowed(client, vehicle, draft)
+            task = vehicle.run_now(draft, actor=actor, now=now)
+            self._recollection.remember(task, at=now, now=now)
+
+    def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
+        """Take in a task that a command means without naming it; Rejection says why not."""
+        self.check_open()
+        draft = _allowed(asked.client, asked.vehicle, draft)
+        task = asked.vehicle.tasks.submit(draft, now=now)
+        self._await_commit(asked, task, now=now)
+        return task
+
+    def known_plan(self, draft: Draft, *, begun_at: float, now: float) -> TaskId | None:
+        """Give the task that a plan is already, uploaded a moment before: its ack may be lost.
+
+        So may be the ack of this copy: from here on the next one counts.
+        """
+        known = self._recollection.known(draft, confirmation=1, origin=None, now=begun_at)
+        task = None if known is None else self._book.get(known.task_id)
+        if task is None:
+            return None
+        self._recollection.remember(task, at=now, now=now)
+        return task.id
+
+    def submit_plan(self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
+        """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
+        self.check_open()
+        draft = _allowed(client, vehicle, draft)
+        task = vehicle.tasks.submit(draft, now=now)
+        self._recollection.remember(task, at=now, now=now)
+        return task
+
+    def when_durable(self, release: Effect, give_up: Effect, *, now: float) -> None:
+        """Call ``release`` when all that is recorded by now is durable, or ``give_up``."""
+        if self._book.recorded <= self._book.durable:
+            release(now=now)
+            return
+        give_up_at = now + self._settings.watch.commit
+        self._gate.hold(
+            self._book.recorded, give_up_at=give_up_at, release=release, give_up=give_up
+        )
+
+    def take_back(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
+        """A submission was not stored in time: it is none."""
+        self._recollection.forget(task)
+        self._store_is_away = True
+        current = self._book.get(task.id)
+        if current is not None and vehicle.tasks.waits(current):
+            vehicle.tasks.withdraw(current, now=now)
+
+    def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
+        """A client wants a vehicle to stand: what it asks for next is another wish."""
+        self._recollection.held(submitter, vehicle.system_id)
+
+    def _priority_of(self, submitter: Submitter) -> int:
+        priorities = self._settings.clients.priorities
+        if not priorities:
+            return DEFAULT_PRIORITY
+        by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
+        return priorities.get(submitter.place, by_address)
+
+    def _check_reach(self, vehicle: Vehicle, goal: Goal) -> None:
+        """A slip of a digit in a place is a drive that nobody meant."""
+        if not isinstance(goal, GoTo):
+            return
+        far = vehicle.where.distance_to(goal)
+        longest = self._settings.driving.max_distance
+        if far is not None and far > longest:
+            words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+            raise Rejection(R.BAD_PARAMETER, words)
+        if not vehicle.where.is_within_fence(goal):
+            raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
+
+    def check_open(self) -> None:
+        """Raise Rejection while nothing new is taken in."""
+        if self._is_closing:
+            raise Rejection(R.RATE_LIMITED, "the server is shutting down")
+        if self._store_is_away:
+            raise Rejection(R.STORE_UNAVAILABLE, "the store is away: not accepted")
+
+    def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
+        self._recollection.remember(task, at=now, now=now)
+        self._undecided[task.id] = [asked]
+        self.when_durable(
+            partial(self._accept, asked, task), partial(self._withdraw, asked, task), now=now
+        )
+
+    def _accept(self, asked: Asked, task: Task, *, now: float) -> None:
+        """The submission is durable: acknowledge it with the task's id, and tell of it."""
+        for each in self._undecided.pop(task.id):
+            each.answer(MavResult.ACCEPTED, task.id)
+            _note(each, task.id)
+        self._tell_queued(asked, task, now=now)
+
+    def _tell_queued(self, asked: Asked, task: Task, *, now: float) -> None:
+        """Tell everybody of a task; a station that has it wait for a button, as a warning."""
+        tasks, source = asked.vehicle.tasks, asked.vehicle.server_address
+        paused = tasks.paused
+        if tasks.urgent == task.id:
+            words = f"Task {task.id} begins now: {describe(task.goal)}"
+        elif paused:  # who queued it may not be who paused
+            words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
+            words += f". {describe(task.goal)}"
+        elif tasks.is_held_ahead:
+            words = f"Task {task.id} waits, press a Held button: a task is held. "
+            words += describe(task.goal)
+        else:
+            words = f"Task {task.id} queued: {describe(task.goal)}"
+        for client in self._gcs:
+            is_blocked = tasks.urgent != task.id and (paused or tasks.is_held_ahead)
+            is_told_otherwise = client is not asked.client or client.uses_dialect
+            is_calm = is_told_otherwise or not is_blocked
+            severity = MavSeverity.INFO if is_calm else MavSeverity.WARNING
+            client.tell(words, severity, source, now=now)
+
+    def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:
+        askers = self._undecided.pop(task.id)
+        was_for_now = asked.vehicle.tasks.urgent == task.id
+        self.take_back(asked.vehicle, task, now=now)
+        words = "not stored in time: not accepted"
+        if was_for_now:
+            words += "; tasks are paused"
+        refusal = Rejection(R.STORE_UNAVAILABLE, words)
+        for each in askers:
+            self._book.record(each.refuse(refusal, now=now))
+
+    def _answer_repeat(self, asked: Asked, known: Known, *, now: float) -> None:
+        """The same submission again: the same answer, or none yet if it has none yet."""
+        if known.task_id in self._undecided:
+            askers = self._undecided[known.task_id]
+            if asked.answers_to not in {each.answers_to for each in askers}:
+                askers.append(asked)
+            return
+        asked.answer(MavResult.ACCEPTED, known.task_id)
+        _note(asked, known.task_id)  # it names the nonce; an ack does not
+        task = self._book.get(known.task_id)
+        # one click of QGroundControl's is a command and an item: two messages, and nothing twice
+        is_other_message = task is not None and task.command != asked.command.command
+        if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
+            what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
+            state = "" if task is None else f", {task.state.name.lower()}"
+            words = f"same {what} again: still task {known.task_id}{state}"
+            asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def _allowed(client: GcsClient, vehicle: Vehicle, draft: Draft) -> Draft:
+    """Give a task as its client may submit it; Rejection."""
+    return client.rights.checked(draft, waiting=vehicle.tasks.count_of(draft.submitter))
+
+
+def _note(asked: Asked, task_id: TaskId) -> None:
+    """Have a client that reads it told of a task's state."""
+    if asked.client.uses_dialect:
+        asked.client.statuses.changed(task_id)

@@ -1,0 +1,195 @@
+"""Commands about tasks that are there: cancel, clear, modify, release, change speed.
+
+Each gives the id of the task acted on, 0 for none or many; a Rejection says why not.
+"""
+
+from dataclasses import replace
+
+from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.goals import MAX_DELAY, flag, number, whole
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
+from mav_tasks.services.command_receiver import Command
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.task import MAX_PRIORITY, MAX_TASK_ID, Submitter, Task, Terms
+
+R, P = TaskReason, TaskProperty
+
+AGAIN, REMAINDER, SKIP = range(3)  # TASK_RELEASE, param2
+NO_CHANGE, DEFAULT = -1.0, -2.0  # DO_CHANGE_SPEED, param2
+GROUND_OR_AIR = 1  # DO_CHANGE_SPEED, highest param1: airspeed counts as ground speed
+
+
+class TaskControl:
+    """What clients may do to tasks."""
+
+    def __init__(self, book: TaskBook, settings: Settings) -> None:
+        self._book = book
+        self._settings = settings
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+
+    def handles(self, command: int) -> bool:
+        """Whether a command is one of these."""
+        return command in (
+            MavCmd.TASK_CANCEL,
+            MavCmd.TASK_CLEAR,
+            MavCmd.TASK_MODIFY,
+            MavCmd.TASK_RELEASE,
+            MavCmd.DO_CHANGE_SPEED,
+        )
+
+    def act(self, asked: Asked, *, now: float) -> int:
+        """Do what a command asks for."""
+        match asked.command.command:
+            case MavCmd.TASK_CANCEL:
+                return self._cancel(asked, now=now)
+            case MavCmd.TASK_CLEAR:
+                return self._clear(asked, now=now)
+            case MavCmd.TASK_MODIFY:
+                return self._modify(asked, now=now)
+            case MavCmd.TASK_RELEASE:
+                return self._release(asked, now=now)
+            case _:
+                return self._change_speed(asked, now=now)
+
+    def cancel_latest(
+        self, rights: Rights, vehicle: Vehicle, submitter: Submitter, command: int, *, now: float
+    ) -> None:
+        """COMMAND_CANCEL: call off a client's latest task of a command, if it is not over."""
+        task = self._book.latest(submitter, command, vehicle=vehicle.system_id)
+        if task is not None and rights.reach(SUBMITTER):
+            vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
+
+    def _cancel(self, asked: Asked, *, now: float) -> int:
+        """Call one task off; a copy gets the first one's answer, and calls off no other."""
+        first = asked.receiver.answer_to_counted_copy(asked.command, now=now)
+        if first is not None and first.result == MavResult.ACCEPTED:
+            return first.result_param2
+        if first is not None:
+            words = "refused a moment ago; if you still want it, send it again"
+            raise Rejection(R(first.result_param2), words)
+        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
+        kill = flag(asked.command, 2, "kill")
+        begun = asked.vehicle.tasks.begun
+        if task_id == 0 and begun is None:
+            raise Rejection(R.NOT_FOUND, "no task is running")
+        task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
+        asked.rights.require_own(task, asked.submitter, "cancel")
+        asked.vehicle.cancel(task, kill=kill, actor=asked.actor, now=now)
+        return task.id
+
+    def _clear(self, asked: Asked, *, now: float) -> int:
+        asked.rights.require(OPERATOR, "clear a queue")
+        begun_too = flag(asked.command, 1, "scope")
+        asked.vehicle.clear(begun_too=begun_too, actor=asked.actor, now=now)
+        return 0
+
+    def _release(self, asked: Asked, *, now: float) -> int:
+        """Release or skip a held task; a copy decides nothing about what is held since."""
+        copy = asked.receiver.answer_to_copy(asked.command, now=now)
+        if copy is not None:
+            words = f"task {copy.result_param2}: that was decided a moment ago"
+            asked.tell(words, MavSeverity.INFO, now=now)
+            return copy.result_param2
+        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
+        how = whole(asked.command, 2, "how", high=SKIP, default=None)
+        begun = asked.vehicle.tasks.begun
+        if task_id == 0 and (begun is None or begun.state is not TaskState.HELD):
+            raise Rejection(R.NOT_FOUND, "no task is held")
+        task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
+        asked.rights.require_own(task, asked.submitter, "release")
+        if task.state is not TaskState.HELD:
+            raise Rejection(R.WRONG_STATE, f"task {task.id} is not held, it is {_words(task)}")
+        if how == SKIP:
+            asked.vehicle.skip(task, actor=asked.actor, now=now)
+        else:
+            may_restore = asked.rights.reach(OPERATOR)
+            asked.vehicle.release(
+                task, again=how == AGAIN, may_restore=may_restore, actor=asked.actor, now=now
+            )
+        return task.id
+
+    def _modify(self, asked: Asked, *, now: float) -> int:
+        task = self._find(asked, _task_id(asked.command))
+        asked.rights.require_own(task, asked.submitter, "modify")
+        terms = _modified(task, asked.command, now=now)
+        if terms.priority > task.terms.priority:
+            asked.rights.check_priority(terms.priority)
+        if terms.is_preemptive and not task.terms.is_preemptive:
+            asked.rights.check_preemptive()
+        asked.vehicle.modify(task, terms, actor=asked.actor, now=now)
+        return task.id
+
+    def _change_speed(self, asked: Asked, *, now: float) -> int:
+        asked.rights.require(OPERATOR, "set the speed")
+        whole(asked.command, 1, "speed type", high=GROUND_OR_AIR)
+        wish = asked.command.params[1]
+        if wish == NO_CHANGE:
+            return 0
+        top = min(self._settings.driving.max_speed, asked.rights.limits.max_speed)
+        speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
+        return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
+
+    def _find(self, asked: Asked, task_id: int) -> Task:
+        task = self._book.get(task_id)
+        if task is None:
+            raise Rejection(R.NOT_FOUND, f"no task {task_id}")
+        if task.vehicle != asked.vehicle.system_id:
+            raise Rejection(R.NOT_FOUND, f"task {task_id} is one of vehicle {task.vehicle}")
+        if task.state in TERMINAL:
+            raise Rejection(R.WRONG_STATE, f"task {task_id} is over, {_words(task)}")
+        return task
+
+
+def _task_id(command: Command) -> int:
+    return whole(command, 1, "task", low=1, high=MAX_TASK_ID, default=None)
+
+
+def _words(task: Task) -> str:
+    return task.state.name.lower()
+
+
+def _modified(task: Task, command: Command, *, now: float) -> Terms:
+    """Give a task's terms with one of them changed."""
+    terms = task.terms
+    wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
+    if task.state not in WAITING and wanted in _OF_WAITING:
+        raise Rejection(R.WRONG_STATE, f"task {task.id} has begun: {P(wanted).name} is fixed")
+    match wanted:
+        case P.PRIORITY:
+            return replace(
+                terms, priority=whole(command, 3, "priority", high=MAX_PRIORITY, default=None)
+            )
+        case P.START_DELAY:
+            delay = number(command, 3, "start delay", low=0.0, high=MAX_DELAY)
+            return replace(terms, start_at=now + delay if delay else None, start_utc=None)
+        case P.DEADLINE:
+            deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY)
+            return replace(terms, deadline=now + deadline if deadline else None)
+        case P.RUN_AFTER:
+            return replace(
+                terms, after=whole(command, 3, "run after", high=MAX_TASK_ID, default=None)
+            )
+        case P.PREEMPTIBLE:
+            return replace(terms, is_preemptible=flag(command, 3, "pre-emptible", default=None))
+        case P.PREEMPTIVE:
+            return replace(terms, is_preemptive=flag(command, 3, "pre-emptive", default=None))
+        case _:
+            return replace(terms, start_at=None, start_utc=_utc(command))
+
+
+_OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
+
+
+def _utc(command: Command) -> int:
+    if command.frame is None:
+        words = "START_UTC: a float is too coarse, send it as COMMAND_INT"
+        raise Rejection(R.BAD_PARAMETER, words)
+    return whole(command, 5, "UTC", low=1, high=0x7FFFFFFF, default=None)

@@ -1,0 +1,297 @@
+"""Where tasks become messages: results, statuses, words. Pure functions.
+
+Commands become tasks in ``goals``.
+"""
+
+from math import isfinite, nan
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.services.command_receiver import Command
+from mav_tasks.settings import SET_FAILSAFE
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.driving.guidance import Leg
+from mav_tasks.tasks.driving.itinerary import goal_of
+from mav_tasks.tasks.driving.legs import first_leg, leg_count, leg_of, length_of
+from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.events import (
+    SERVER,
+    Event,
+    QueueContinued,
+    QueuePaused,
+    TaskChanged,
+    TaskWaits,
+    VehicleNoted,
+    VehicleSeen,
+)
+from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.outlook import estimate, position, wait_reason
+from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.timing import Timing
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+
+R = TaskReason
+
+#: the wire answer of each refusal; what is not listed is DENIED
+RESULT_OF: dict[int, MavResult] = {
+    R.QUEUE_FULL: MavResult.TEMPORARILY_REJECTED,
+    R.QUOTA: MavResult.TEMPORARILY_REJECTED,
+    R.STORE_UNAVAILABLE: MavResult.TEMPORARILY_REJECTED,
+    R.RATE_LIMITED: MavResult.TEMPORARILY_REJECTED,
+    R.STOPPED: MavResult.TEMPORARILY_REJECTED,
+    R.HELD_AHEAD: MavResult.TEMPORARILY_REJECTED,
+    R.QUEUE_PAUSED: MavResult.TEMPORARILY_REJECTED,
+    R.OTHER_CONTROLLER: MavResult.TEMPORARILY_REJECTED,
+    R.WRONG_MODE: MavResult.TEMPORARILY_REJECTED,
+    R.NO_POSITION: MavResult.TEMPORARILY_REJECTED,
+    R.DISARMED: MavResult.TEMPORARILY_REJECTED,
+    R.LOSS_FAILSAFE: MavResult.TEMPORARILY_REJECTED,
+    R.VEHICLE_SILENT: MavResult.FAILED,
+}
+
+#: what the person who reads that a task waits may do about it
+WAITS_FOR = {
+    R.VEHICLE_SILENT: "the rover is silent",
+    R.OTHER_CONTROLLER: "somebody else drives",
+    R.WRONG_MODE: "wrong mode, set HOLD",
+    R.NO_POSITION: "no position",
+    R.DISARMED: "disarmed; arm, or continue",
+    R.NOT_READY: "the rover is not ready to arm",
+    R.LOSS_FAILSAFE: f"it would not stand without us; {SET_FAILSAFE}",
+}
+
+#: why a task or a queue does not go on: as somebody has asked, or nothing that needs a hand
+CALM = frozenset(
+    {
+        R.VEHICLE_SILENT,  # of which a warning has told
+        R.OTHER_CONTROLLER,
+        R.NO_POSITION,
+        R.NOT_READY,
+        R.OPERATOR,
+        R.PREEMPTED,
+        R.CANCELLED,
+        R.CLEARED,
+        R.REPLACED,
+        R.SKIPPED,
+        R.STOP,
+    }
+)
+
+UNIT_NONE = 0  # TASK_UNIT
+UNIT_METRES = 1
+UNIT_RADIANS = 2
+UNIT_SECONDS = 3
+FLOAT32_MAX = 3.4e38
+UNKNOWN_POSITION = 65535
+LAST_POSITION = 65534  # or behind it: a queue may be longer than the field can say
+UNKNOWN_PROGRESS = 255
+
+
+def result_of(reason: int) -> MavResult:
+    """Give the MAV_RESULT that a refusal is acknowledged with."""
+    return RESULT_OF.get(reason, MavResult.DENIED)
+
+
+def task_status(
+    task: Task,
+    tasks: VehicleTasks,
+    book: TaskBook,
+    *,
+    reader: Address,
+    link_number: int,
+    with_position: bool,
+    now: float,
+) -> m.TaskStatus:
+    """Give the TASK_STATUS of a task of this vehicle, for the client at ``reader``."""
+    reason = wait_reason(tasks, task)
+    ahead = position(tasks, task) if with_position else None
+    is_costly = task.state is TaskState.QUEUED  # it depends on all that are ahead
+    to_start, to_finish = nan, nan
+    if with_position or not is_costly:
+        to_start, to_finish = estimate(tasks, task, book, now=now)
+    leg = _leg(task)
+    return m.TaskStatus(
+        time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
+        task_id=task.id,
+        version=task.version,
+        nonce=task.nonce,
+        after_task_id=task.terms.after,
+        remaining=_remaining(task, leg),
+        time_to_start=_float32(to_start),
+        time_to_finish=_float32(to_finish),
+        execution_time=nan if task.progress.anchor is None else task.progress.execution_time,
+        command=task.command,
+        queue_position=UNKNOWN_POSITION if ahead is None else min(ahead, LAST_POSITION),
+        step=_step(task),
+        step_count=_step_count(task.goal),
+        target_system=reader.system_id,
+        target_component=reader.component_id,
+        state=task.state,
+        reason=reason,
+        priority=task.priority,
+        progress=_progress(task, leg),
+        remaining_unit=_unit(leg),
+        submitter_system=task.submitter.system_id,
+        submitter_component=task.submitter.component_id,
+        submitter_link=link_number,
+        text=_words(task, reason, tasks.words_of_blocker(task.id)).encode()[:50],
+    )
+
+
+def task_timing(
+    task: Task, timing: Timing | None, *, period: float, reader: Address, now: float
+) -> m.TaskTiming:
+    """Give the TASK_TIMING of a task; ``period`` is that of its vehicle's setpoints, in seconds."""
+    return m.TaskTiming(
+        time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
+        task_id=task.id,
+        count=0 if timing is None else timing.count,
+        late=0 if timing is None else timing.late,
+        rate=1 / (period if timing is None else timing.period),
+        p50=nan if timing is None else timing.p50,
+        p99=nan if timing is None else timing.p99,
+        longest=nan if timing is None else timing.longest,
+        target_system=reader.system_id,
+        target_component=reader.component_id,
+    )
+
+
+def queue_status(
+    tasks: VehicleTasks, counts: list[int], *, version: int, now: float
+) -> m.TaskQueueStatus:
+    """Give the TASK_QUEUE_STATUS of a vehicle; ``counts`` are its tasks by TASK_STATE."""
+    begun = tasks.begun
+    return m.TaskQueueStatus(
+        time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
+        version=version & 0xFFFFFFFF,
+        running_id=0 if begun is None else begun.id,
+        next_id=tasks.next_waiting or 0,
+        capacity=tasks.capacity,
+        counts=counts,
+        paused_reason=tasks.paused,
+        flags=0,
+    )
+
+
+def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
+    """Return (vehicle, severity, words) for the people at ground stations, or None.
+
+    What went as asked is INFO; WARNING and ERROR are for what needs a hand.
+    """
+    match event:
+        case TaskChanged(new=TaskState.EXECUTING):
+            return event.vehicle, MavSeverity.INFO, f"Task {event.task_id} started"
+        case TaskChanged(new=TaskState.COMPLETED):
+            return event.vehicle, MavSeverity.INFO, f"Task {event.task_id} done"
+        case TaskChanged(
+            new=TaskState.FAILED | TaskState.HELD | TaskState.EXPIRED as new, reason=reason
+        ):
+            text = f"Task {event.task_id} {new.name.lower()}: {words_of(reason)}"
+            return event.vehicle, MavSeverity.ERROR, text
+        case TaskChanged(
+            new=TaskState.KILLED | TaskState.CANCELLED as new, reason=TaskReason.CANCELLED
+        ):
+            who = event.actor.partition("@")[0]  # the endpoint says nothing to people
+            text = f"Task {event.task_id} {new.name.lower()}"
+            text += "" if event.actor == SERVER else f" by {who}"
+            return event.vehicle, _severity(event.reason), text
+        case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
+            text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
+            return event.vehicle, _severity(event.reason), text
+        case TaskWaits(task_id=task_id, reason=reason):
+            words = f": {event.words}" if event.words else ""
+            text = f"Task {task_id} waits: {WAITS_FOR[reason]}{words}"
+            return event.vehicle, _severity(reason), text
+        case QueuePaused(reason=TaskReason.STOPPED):
+            return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"
+        case QueuePaused(reason=reason):
+            return event.vehicle, _severity(reason), f"Queue paused: {words_of(reason)}"
+        case QueueContinued():
+            return event.vehicle, MavSeverity.INFO, "Queue continued"
+        case VehicleSeen(text=text):
+            return event.vehicle, MavSeverity.INFO, f"Rover {event.vehicle} {text}"
+        case VehicleNoted(text=text):
+            return event.vehicle, MavSeverity.WARNING, f"Rover {event.vehicle} {text}"
+    return None
+
+
+def _severity(reason: TaskReason) -> MavSeverity:
+    """Return how a station says that a task or a queue does not go on.
+
+    QGroundControl shows NOTICE and worse in red, and its megaphone stays a warning triangle.
+    """
+    return MavSeverity.INFO if reason in CALM else MavSeverity.WARNING
+
+
+def message_id_of(command: Command) -> int:
+    """Give the message id in param1 of REQUEST_MESSAGE and its kind; -1 for nonsense."""
+    return _whole(command.params[0])
+
+
+def task_id_of(command: Command) -> int:
+    """Give the task id in param2 of REQUEST_MESSAGE for what is about tasks; -1 for nonsense."""
+    return _whole(command.params[1])
+
+
+def first_index_of(command: Command) -> int:
+    """Give the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 for nonsense."""
+    return _whole(command.params[2])
+
+
+def _float32(value: float) -> float:
+    """Give a number that a float32 can hold; NaN, unknown, for one beyond all sense."""
+    return value if abs(value) < FLOAT32_MAX else nan
+
+
+def _whole(value: float) -> int:
+    return int(value) if isfinite(value) and value == int(value) and value >= 0 else -1
+
+
+def _leg(task: Task) -> Leg | None:
+    """The leg that is being driven; before the start the first one, if it can be known by then."""
+    goal = goal_of(task)
+    return first_leg(goal) if task.progress.anchor is None else leg_of(goal, task.progress)
+
+
+def _remaining(task: Task, leg: Leg | None) -> float:
+    return nan if leg is None else max(0.0, length_of(leg) - task.progress.done)
+
+
+def _unit(leg: Leg | None) -> int:
+    match leg:
+        case None:
+            return UNIT_NONE
+        case Move() | Follow():
+            return UNIT_METRES
+        case Rotate():
+            return UNIT_RADIANS
+        case _:
+            return UNIT_SECONDS
+
+
+def _progress(task: Task, leg: Leg | None) -> int:
+    if task.state is TaskState.COMPLETED:
+        return 100
+    if leg is None or task.progress.anchor is None:
+        return 0
+    length = length_of(leg)
+    share = min(1.0, max(0.0, task.progress.done / length)) if length else 0.0
+    return round(100 * (_step(task) + share) / max(_step_count(task.goal), 1))
+
+
+def _step(task: Task) -> int:
+    """Give the item of a plan that is being driven, of other tasks the leg."""
+    return max(task.progress.step, 0) if isinstance(task.goal, Plan) else task.progress.leg
+
+
+def _step_count(goal: Goal) -> int:
+    return len(goal.steps) if isinstance(goal, Plan) else leg_count(goal)
+
+
+def _words(task: Task, reason: TaskReason, says: str) -> str:
+    """Give a task, its state and the reason in words; ``says``: the vehicle's own about that."""
+    state = task.state.name.lower()
+    why = words_of(reason) + (f": {says}" if says else "")
+    return f"{describe(task.goal)}: {state}" + (f" ({why})" if reason else "")

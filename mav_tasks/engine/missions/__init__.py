@@ -1,0 +1,1 @@
+"""Missions, fences and rally points: taken in, kept, shown and reported on."""

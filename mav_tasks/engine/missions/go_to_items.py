@@ -1,0 +1,98 @@
+"""A mission item that means "go there now": ArduPilot's older way, with ``current`` 2.
+
+QGroundControl sends it beside DO_REPOSITION as long as it does not know whether the autopilot has
+that; both are one task. It is answered by a MISSION_ACK.
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.missions.plan_items import NO_MESSAGE, result_of
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import Command, Pending
+from mav_tasks.services.mission_item import item_of
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason
+
+GO_THERE, ONLY_HIGHER = 2, 3  # MISSION_ITEM.current
+
+
+@dataclass(frozen=True, slots=True)
+class AskedByItem(Asked):
+    """The same as asked by a command, but for the answer."""
+
+    @property
+    def is_go_to(self) -> bool:
+        """It is nothing else."""
+        return True
+
+    def answer(self, result: MavResult, result_param2: int = 0) -> None:
+        """Acknowledge it; only acceptance comes this way."""
+        assert result is MavResult.ACCEPTED, "refusals have a result of their own"
+        self._ack(MavMissionResult.ACCEPTED, opaque_id=result_param2)
+
+    def refuse(
+        self, refusal: Rejection, *, result: MavResult | None = None, now: float
+    ) -> SubmissionRefused:
+        """Answer with what is wrong, and say it in words; gives it for the audit log."""
+        del result
+        self._ack(result_of(refusal))
+        self.tell(refusal.text, MavSeverity.WARNING, now=now)
+        reason, number = TaskReason(refusal.reason), self.command.command
+        return SubmissionRefused(
+            self.vehicle.system_id, number, reason, refusal.text, self.actor, now
+        )
+
+    def _ack(self, result: MavMissionResult, *, opaque_id: int = 0) -> None:
+        ack = m.MissionAck(*self.packet.source, result, MavMissionType.MISSION, opaque_id)
+        self.client.outlet.send(ack, self.answering)
+
+
+class GoToItems:
+    """What becomes of such items."""
+
+    def __init__(self, submissions: Submissions, book: TaskBook) -> None:
+        self._submissions = submissions
+        self._book = book
+
+    def receive(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        packet: Packet,
+        message: m.MissionItem | m.MissionItemInt,
+        *,
+        now: float,
+    ) -> None:
+        """Take in a "go to"; what only changes the height is accepted, and does nothing here."""
+        asked = AskedByItem(client, vehicle, packet, Pending(_command_of(message), packet.raw, now))
+        try:
+            if message.current == ONLY_HIGHER:
+                asked.answer(MavResult.ACCEPTED)
+                return
+            if message.command != MavCmd.NAV_WAYPOINT:
+                words = f"item {message.command} is no place to go to"
+                raise Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
+            self._submissions.submit(asked, now=now)
+        except Rejection as refusal:
+            if client.may_be_refused(now=now):
+                self._book.record(asked.refuse(refusal, now=now))
+
+
+def _command_of(message: m.MissionItem | m.MissionItemInt) -> Command:
+    """Give the command that an item is; a place beyond all numbers is none that could be given."""
+    item = item_of(message)
+    x, y = (inf, inf) if item is None else (float(item.x), float(item.y))
+    first = (message.param1, message.param2, message.param3, message.param4)
+    target = Address(message.target_system, message.target_component or AUTOPILOT)
+    params = (*first, x, y, message.z)
+    return Command(target, message.command, params, 0, message.frame, NO_MESSAGE)

@@ -1,0 +1,103 @@
+"""What each item of an upload is worth, as it comes; and the plan that they all make.
+
+An upload is refused at the first item that cannot be part of a plan, so that its client learns
+which one it is.
+"""
+
+from mav_tasks.engine.commands.goals import bad
+from mav_tasks.engine.missions.fence_items import check_fence_item, check_rally_item
+from mav_tasks.engine.missions.plan_items import Manner, Wanted, plan_of, result_of, step_of
+from mav_tasks.engine.missions.plans import STORED
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
+from mav_tasks.services.mission_item import Item
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.goal import GoTo, Step
+from mav_tasks.tasks.lifecycle import TaskReason
+
+R = TaskReason
+
+
+class ItemCheck:
+    """Looks at the items of uploads to one address, one upload after the other."""
+
+    def __init__(self, vehicle: Vehicle, component: int, settings: Settings) -> None:
+        self._vehicle = vehicle
+        self._is_at_autopilot = component == AUTOPILOT
+        self._settings = settings
+        self._read_by: tuple[int, Manner] | None = None  # length of the plan, and the manner
+        self._read: list[tuple[Item, Step]] = []  # each item is read once: that takes its time
+        self._refusal: Rejection | None = None
+
+    def __repr__(self) -> str:
+        return f"ItemCheck({len(self._read)} items read)"
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+
+    def take_refusal(self) -> Rejection | None:
+        """Return why an item was refused, None if none was since the last call."""
+        refusal, self._refusal = self._refusal, None
+        return refusal
+
+    def __call__(self, kind: int, seq: int, item: Item, count: int) -> MavMissionResult | None:
+        """Whether an item can be part of a plan; the ones before it were asked about."""
+        if kind not in STORED:
+            return MavMissionResult.UNSUPPORTED
+        try:
+            if kind == MavMissionType.FENCE:
+                check_fence_item(item, seq, count=count)
+            elif kind == MavMissionType.RALLY:
+                check_rally_item(item, seq)
+            else:
+                step = self._step(item, seq, count=count)
+                if isinstance(step, GoTo):
+                    self._check_place(step, seq)
+        except Rejection as refusal:
+            self._refusal = refusal
+            return result_of(refusal)
+        return None
+
+    def plan_of(self, items: tuple[Item, ...], *, now: float) -> Wanted:
+        """Give the plan of a whole upload; Rejection says why it is none."""
+        count = len(items)
+        steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
+        wanted = plan_of(items, steps, now=now)
+        forbidden = self._vehicle.where.leg_over_fence(steps)
+        if forbidden is not None:
+            words = f"item {forbidden}: a jump there leads over the fence"
+            raise Rejection(R.OUTSIDE_FENCE, words)
+        return wanted
+
+    def _step(self, item: Item, seq: int, *, count: int) -> Step:
+        persona, driving = self._vehicle.persona, self._settings.driving
+        manner = Manner.of(persona, is_staged=self._is_at_autopilot, driving=driving)
+        if (count, manner) != self._read_by:  # in the middle of an upload all is read anew
+            self._read_by = count, manner
+            self._read.clear()
+        read = self._read
+        if seq < len(read) and read[seq][0] is item:
+            return read[seq][1]
+        step = step_of(item, seq, count=count, manner=manner)
+        if seq <= len(read):
+            read[seq:] = [(item, step)]
+        return step
+
+    def _check_place(self, step: GoTo, seq: int) -> None:
+        """Whether a place is within reach, and it and the way from the one before in the fence."""
+        far, longest = self._vehicle.where.distance_to(step), self._settings.driving.max_distance
+        if far is not None and far > longest:
+            words = f"item {seq} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+            raise bad(words, param=5)
+        if not self._vehicle.where.is_within_fence(step):
+            raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
+        steps: list[Step] = [step]
+        for number in range(min(seq, len(self._read)) - 1, -1, -1):  # as far as the last place
+            steps.insert(0, self._read[number][1])
+            if isinstance(steps[0], GoTo):
+                break
+        if self._vehicle.where.leg_over_fence(steps) is not None:
+            raise Rejection(R.OUTSIDE_FENCE, f"item {seq}: the way there leads over the fence")

@@ -1,0 +1,112 @@
+"""Clearing plans: a mission that has not begun, and what the vehicle keeps as well."""
+
+from collections.abc import Mapping, Sequence
+
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.missions.mission_answers import MissionAnswers
+from mav_tasks.engine.missions.plan_items import result_of
+from mav_tasks.engine.missions.plans import MISSION, NOTHING, STORED, Plans, Stored
+from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
+from mav_tasks.services.mission_receiver import Sender
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason, TaskState
+from mav_tasks.tasks.task import Task, TaskId
+
+R = TaskReason
+
+#: has begun, and is not being driven: a stock autopilot, too, clears a mission in HOLD
+AT_REST = frozenset({TaskState.PAUSED, TaskState.HELD})
+
+
+class MissionClearing:
+    """Sees to MISSION_CLEAR_ALL."""
+
+    def __init__(
+        self,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        answers: MissionAnswers,
+        write_through: WriteThrough,
+    ) -> None:
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._plans = plans
+        self._answers = answers
+        self._write_through = write_through
+
+    def clear(self, vehicle: Vehicle, sender: Sender, kind: int, *, now: float) -> None:
+        """Forget plans of a kind, or of all; the answer comes once that is durable."""
+        kinds: list[int] = list(STORED) if kind == MavMissionType.ALL else [kind]
+        if kinds[0] not in STORED:
+            self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
+            return
+        task = self._plans.task(vehicle)
+        if MISSION in kinds and task is not None and task.state in ACTIVE - AT_REST:
+            self._answers.ack(sender, kind, MavMissionResult.DENIED)
+            words = f"clear: task {task.id} is being driven: pause or cancel it first"
+            self._refused(sender, vehicle, Rejection(R.WRONG_STATE, words), now=now)
+            return
+        stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
+        self._forget(vehicle, sender, kind, stored, {}, now=now)
+
+    def _forget(
+        self,
+        vehicle: Vehicle,
+        sender: Sender,
+        asked: int,
+        kinds: Sequence[int],
+        before: Mapping[int, Stored],
+        *,
+        now: float,
+    ) -> None:
+        """One kind after the other, what the vehicle keeps first there; then the answer."""
+        actor = str(sender.address)
+        if not kinds:
+            task = self._book.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
+
+            def accept(*, now: float) -> None:
+                self._vehicles.get(vehicle.system_id)
+                self._call_off(vehicle, task, actor=actor, now=now)
+                self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+                self._answers.ack(sender, asked, MavMissionResult.ACCEPTED)
+
+            def give_up(*, now: float) -> None:
+                for kind, stored in before.items():
+                    self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
+                self._answers.ack(sender, asked, MavMissionResult.ERROR)
+
+            self._submissions.when_durable(accept, give_up, now=now)
+            return
+        first, rest = kinds[0], kinds[1:]
+
+        def go_on(*, now: float) -> None:
+            so_far = {**before, first: self._plans.stored(vehicle.system_id, first)}
+            self._plans.keep(vehicle, first, NOTHING, actor=actor, now=now)
+            self._forget(vehicle, sender, asked, rest, so_far, now=now)
+
+        def refuse(refusal: Rejection, *, now: float) -> None:
+            self._answers.ack(sender, asked, result_of(refusal))
+            self._refused(sender, vehicle, refusal, now=now)
+
+        if first == MISSION:
+            go_on(now=now)
+        else:
+            self._write_through.write(vehicle, first, (), go_on, refuse, now=now)
+
+    def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
+        """End a mission that was interrupted: without its plan nobody could have it go on."""
+        current = None if task is None else self._book.get(task.id)
+        if current is not None and current.state in AT_REST:
+            vehicle.cancel(current, kill=False, actor=actor, now=now)
+
+    def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
+        message_id = m.MissionClearAll.id
+        self._answers.refused(sender, vehicle, why, message_id=message_id, now=now)

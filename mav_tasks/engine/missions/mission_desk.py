@@ -1,0 +1,252 @@
+"""The mission protocol towards clients: which message is for which end, and downloads.
+
+What becomes of uploads is in ``mission_uploads``, clearing in ``mission_clearing``.
+"""
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import OPERATOR, SAFETY, SUBMITTER
+from mav_tasks.engine.commands.motion_gate import GO_TO
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.missions.go_to_items import GoToItems
+from mav_tasks.engine.missions.item_check import ItemCheck
+from mav_tasks.engine.missions.mission_answers import MissionAnswers
+from mav_tasks.engine.missions.mission_clearing import MissionClearing
+from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadDesk
+from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored, begins_with
+from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.mission_item import unpacked
+from mav_tasks.services.mission_receiver import RequestForm, Sender
+from mav_tasks.services.mission_sender import MissionSender
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TaskReason
+
+#: what clients speak the mission protocol with
+MESSAGES = (
+    m.MissionCount,
+    m.MissionItem,
+    m.MissionItemInt,
+    m.MissionRequestList,
+    m.MissionRequest,
+    m.MissionRequestInt,
+    m.MissionAck,
+    m.MissionClearAll,
+    m.MissionSetCurrent,
+    m.MissionRequestPartialList,
+    m.MissionWritePartialList,
+)
+#: of them, what only reads
+READING = (
+    m.MissionRequestList,
+    m.MissionRequest,
+    m.MissionRequestInt,
+    m.MissionRequestPartialList,
+    m.MissionAck,
+)
+MissionMessage = (
+    m.MissionCount
+    | m.MissionItem
+    | m.MissionItemInt
+    | m.MissionRequestList
+    | m.MissionRequest
+    | m.MissionRequestInt
+    | m.MissionAck
+    | m.MissionClearAll
+    | m.MissionSetCurrent
+    | m.MissionRequestPartialList
+    | m.MissionWritePartialList
+)
+
+
+class _Desk:
+    """Uploads to, and downloads from, one address."""
+
+    def __init__(self, check: ItemCheck, form: RequestForm) -> None:
+        self.uploads = UploadDesk(check, form)
+        self.sender = MissionSender()
+
+
+class MissionDesks:
+    """The ends of uploads and downloads at all addresses."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        settings: Settings,
+    ) -> None:
+        self._vehicles = vehicles
+        self._plans = plans
+        self._settings = settings
+        self._answers = MissionAnswers(gcs, book)
+        write_through = WriteThrough(vehicles)
+        self._uploads = MissionUploads(
+            gcs, vehicles, book, submissions, plans, self._answers, write_through
+        )
+        self._clearing = MissionClearing(
+            vehicles, book, submissions, plans, self._answers, write_through
+        )
+        self._go_to = GoToItems(submissions, book)
+        self._desks: dict[tuple[int, int], _Desk] = {}
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        for desk in self._desks.values():
+            desk.uploads.check.apply(settings)
+
+    def receive(
+        self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
+    ) -> bool:
+        """See to a client's message; False: it is not for us."""
+        # an item more does nothing to the vehicle: what does touches it
+        vehicle = self._vehicles.look_at(message.target_system)
+        if vehicle is None:
+            return False
+        component = message.target_component or AUTOPILOT
+        at_server = component == vehicle.server_component
+        if not at_server and (component != AUTOPILOT or not self._settings.claim):
+            return False
+        desk = self._desk(vehicle, component)
+        who = (client.key, client.signed_by.name)  # one endpoint may have several keys
+        sender = Sender(who, packet.source, Address(vehicle.system_id, component))
+        if self._is_refused(client, vehicle, sender, message, now=now):
+            return True
+        match message:
+            case m.MissionCount() if message.mission_type not in STORED:
+                self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+                words = f"upload: plans of kind {message.mission_type} are not supported"
+                unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
+                self._uploads.refused(sender, vehicle, unknown, now=now)
+            case m.MissionCount():
+                desk.uploads.receiver.count(message, sender, now=now)
+            case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
+                self._vehicles.touch(vehicle)  # never an item of a plan, whatever is under way
+                self._go_to.receive(client, vehicle, packet, message, now=now)
+            case m.MissionItem() | m.MissionItemInt():
+                desk.uploads.receiver.item(message, sender, now=now)
+            case m.MissionAck():
+                desk.uploads.receiver.cancelled(message, sender, now=now)
+                desk.sender.end(sender, message.mission_type)
+            case m.MissionRequestList():
+                self._list(desk, vehicle, sender, message.mission_type, now=now)
+            case m.MissionRequest() | m.MissionRequestInt():
+                kind, seq = message.mission_type, message.seq
+                self._answers.send(
+                    desk.sender.request(
+                        sender,
+                        kind,
+                        seq,
+                        lambda: self._downloadable(vehicle, component, kind).items,
+                        form=type(message),
+                        now=now,
+                    )
+                )
+            case m.MissionClearAll():
+                self._vehicles.touch(vehicle)
+                self._clearing.clear(vehicle, sender, message.mission_type, now=now)
+            case m.MissionSetCurrent():
+                self._vehicles.touch(vehicle)
+                self._set_current(vehicle, client, sender, message.seq, now=now)
+            case m.MissionRequestPartialList() | m.MissionWritePartialList():
+                self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+        self._uploads.flush(desk.uploads, vehicle, now=now)
+        return True
+
+    def _is_refused(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        sender: Sender,
+        message: MissionMessage,
+        *,
+        now: float,
+    ) -> bool:
+        """Whether a client may not write what it writes; it has been told so then."""
+        if isinstance(message, READING) or getattr(message, "current", 0) in GO_TO:
+            return False  # a "go to" is answered as every other task is
+        kind = getattr(message, "mission_type", MISSION)
+        try:
+            if isinstance(message, m.MissionClearAll):
+                client.rights.require(OPERATOR, "clear plans")
+            if kind != MISSION:
+                client.rights.require(SAFETY, "change fence or rally points")
+            if not isinstance(message, m.MissionSetCurrent):  # that is answered in its own way
+                client.rights.require(SUBMITTER, "send plans")
+        except Rejection as refusal:
+            if isinstance(message, m.MissionCount | m.MissionClearAll):
+                self._answers.ack(sender, kind, MavMissionResult.DENIED)
+                is_upload = isinstance(message, m.MissionCount)
+                message_id = 0 if is_upload else type(message).id
+                self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+            return True
+        return False
+
+    def next_deadline(self) -> float | None:
+        """Give when an item is to be asked for again, or an upload given up."""
+        deadlines = [desk.uploads.receiver.next_deadline() for desk in self._desks.values()]
+        return min((d for d in deadlines if d is not None), default=None)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Ask again, and give up."""
+        for (system_id, _), desk in self._desks.items():
+            due = desk.uploads.receiver.next_deadline()
+            vehicle = self._vehicles.get(system_id) if due is not None and due <= now else None
+            if vehicle is not None:
+                desk.uploads.receiver.handle_deadline(now=now)
+                self._uploads.flush(desk.uploads, vehicle, now=now)
+
+    def _desk(self, vehicle: Vehicle, component: int) -> _Desk:
+        key = vehicle.system_id, component
+        desk = self._desks.get(key)
+        if desk is None:
+            is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
+            form = m.MissionRequest if is_plain else m.MissionRequestInt
+            check = ItemCheck(vehicle, component, self._settings)
+            desk = self._desks[key] = _Desk(check, form)
+        return desk
+
+    def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
+        """What an address has to show: the task server, of missions, the one that is driven."""
+        begun = vehicle.tasks.begun
+        if kind == MISSION and component != AUTOPILOT and begun and isinstance(begun.goal, Plan):
+            return Stored(begun.id, unpacked(begun.goal.source))
+        return self._plans.stored(vehicle.system_id, kind)
+
+    def _list(
+        self, desk: _Desk, vehicle: Vehicle, sender: Sender, kind: int, *, now: float
+    ) -> None:
+        if kind not in STORED:
+            self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
+            return
+        stored = self._downloadable(vehicle, sender.addressed.component_id, kind)
+        count = desk.sender.begin(sender, kind, stored.items, opaque_id=stored.plan_id, now=now)
+        self._answers.send(count)
+
+    def _set_current(
+        self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float
+    ) -> None:
+        """The message MISSION_SET_CURRENT; MAVSDK waits for this very number, for ever."""
+        try:
+            self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
+            if self._plans.go_on_with(vehicle, seq, now=now) is None:
+                words = begins_with(seq)
+                client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+        except Rejection as refusal:
+            message_id = m.MissionSetCurrent.id
+            self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+        client.outlet.send(
+            self._plans.current(vehicle, seq=seq), Address(vehicle.system_id, AUTOPILOT)
+        )

@@ -1,0 +1,145 @@
+"""How missions fare, told to clients: MISSION_CURRENT, MISSION_ITEM_REACHED; and what they order.
+
+In the name of the autopilot, because clients listen to nobody else about missions. The vehicle's
+own messages of the mission protocol are withheld meanwhile: two sources would contradict each
+other.
+"""
+
+from dataclasses import dataclass
+
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.missions.plan_items import performed
+from mav_tasks.engine.missions.plans import Plans
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import (
+    Event,
+    PlanStored,
+    StepReached,
+    TaskAdvanced,
+    TaskChanged,
+    VehicleNoted,
+)
+from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.tasks.task import TaskId
+
+INTERVAL = 1.0  # s, of MISSION_CURRENT
+ENDS_TOLD = 5  # times more that the last item's MISSION_ITEM_REACHED is sent; PX4 does 10
+#: of the vehicle, when the server has its missions
+REPLACED = frozenset(
+    {
+        m.MissionAck.id,
+        m.MissionCount.id,
+        m.MissionCurrent.id,
+        m.MissionItem.id,
+        m.MissionItemInt.id,
+        m.MissionItemReached.id,
+        m.MissionRequest.id,
+        m.MissionRequestInt.id,
+    }
+)
+
+
+@dataclass(slots=True)
+class _Last:
+    """The last item that a mission has reached."""
+
+    task_id: TaskId
+    step: int
+    left: int = ENDS_TOLD  # times to say so again, when the mission is over
+
+
+class MissionReports:
+    """What clients are told of missions without asking."""
+
+    def __init__(
+        self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook, plans: Plans, settings: Settings
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._plans = plans
+        self._claims = settings.claim
+        self._next_at = 0.0
+        self._last: dict[int, _Last] = {}  # by vehicle
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._claims = settings.claim
+
+    def replaces(self, packet: Packet) -> bool:
+        """Whether a vehicle's packet is not shown, because the server speaks of missions."""
+        return self._claims and packet.message_id in REPLACED
+
+    def publish(self, events: list[Event], *, now: float) -> None:
+        """Tell of items that were reached, and of what is driven next; send what is ordered."""
+        changed: set[int] = set()
+        for event in events:
+            match event:
+                case StepReached():
+                    self._reached(event, now=now)
+                    changed.add(event.vehicle)
+                case PlanStored():
+                    changed.add(event.vehicle)
+                case TaskChanged() | TaskAdvanced():
+                    task = self._book.get(event.task_id)
+                    if task is not None and isinstance(task.goal, Plan):
+                        changed.add(event.vehicle)
+        for system_id in changed:
+            vehicle = self._vehicles.get(system_id)
+            if vehicle is not None:
+                self._tell(vehicle, self._plans.current(vehicle))
+
+    def next_deadline(self) -> float | None:
+        """Give when MISSION_CURRENT is due; None: there is nobody to tell of."""
+        return self._next_at if self._claims and len(self._vehicles) else None
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Send what is due."""
+        if not self._claims or now < self._next_at:
+            return
+        self._next_at = now + INTERVAL
+        for vehicle in self._vehicles:
+            if vehicle.is_heard(now=now):
+                self._tell(vehicle, self._plans.current(vehicle))
+                self._tell_end_again(vehicle)
+
+    def _tell_end_again(self, vehicle: Vehicle) -> None:
+        """Who has missed the last item would take the mission for unfinished for ever."""
+        task, last = self._plans.shown(vehicle), self._last.get(vehicle.system_id)
+        if task is None or last is None or task.id != last.task_id or last.left == 0:
+            return
+        if task.state is TaskState.COMPLETED:
+            last.left -= 1
+            self._tell(vehicle, m.MissionItemReached(last.step))
+
+    def _reached(self, event: StepReached, *, now: float) -> None:
+        vehicle = self._vehicles.get(event.vehicle)
+        if vehicle is None:
+            return
+        self._tell(vehicle, m.MissionItemReached(event.step))
+        self._last[event.vehicle] = _Last(event.task_id, event.step)
+        task = self._book.get(event.task_id) if event.performs else None
+        if task is not None:
+            item = self._plans.item_of(task, event.step)
+            vehicle.perform(performed(item, Address(vehicle.system_id, AUTOPILOT)), now=now)
+
+    def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
+        """Say what the vehicle would not do of what a plan orders; the plan goes on."""
+        for answered in vehicle.requests.take_unperformed():
+            ack, command = answered.ack, answered.command
+            what = "no answer" if ack is None else f"refused, result {ack.result}"
+            words = f"command {command} of a plan: {what}"
+            self._book.record(VehicleNoted(vehicle.system_id, words, now))
+
+    def _tell(self, vehicle: Vehicle, message: m.Message) -> None:
+        source = Address(vehicle.system_id, AUTOPILOT)
+        for client in self._gcs:
+            if client.is_heard and client.knows(vehicle.system_id):
+                client.outlet.send(message, source)

@@ -1,0 +1,271 @@
+"""What becomes of plans that clients upload: refused, a task, or stored; and when that is said.
+
+To the autopilot's address goes one mission, which waits until it is started, as on an autopilot; to
+the task server's go as many as one likes, each queued at once. Fence and rally points are the
+vehicle's, whichever address they were sent to.
+"""
+
+from dataclasses import replace
+from functools import partial
+from hashlib import blake2b
+from zlib import crc32
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.missions.fence_items import fence_for_vehicle, fence_of
+from mav_tasks.engine.missions.item_check import ItemCheck
+from mav_tasks.engine.missions.mission_answers import MissionAnswers
+from mav_tasks.engine.missions.plan_items import result_of
+from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
+from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavSeverity
+from mav_tasks.services.mission_item import packed
+from mav_tasks.services.mission_receiver import (
+    CAPACITY,
+    GIVE_UP,
+    MissionReceiver,
+    RequestForm,
+    Sender,
+    Upload,
+)
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.goal import Plan, describe
+from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
+
+R = TaskReason
+
+#: why the receiver itself has ended an upload, by its answer
+ENDED = {
+    MavMissionResult.DENIED: Rejection(R.NOT_ALLOWED, "upload: another client is at it: wait"),
+    MavMissionResult.NO_SPACE: Rejection(R.QUEUE_FULL, f"upload: more than {CAPACITY} items"),
+    MavMissionResult.OPERATION_CANCELLED: Rejection(
+        R.WRONG_STATE, f"upload: no item came for {GIVE_UP:g} s: upload it again"
+    ),
+}
+
+
+def refusal_of(result: int) -> Rejection:
+    """Return why an upload ended with this MAV_MISSION_RESULT, where nothing else says so."""
+    unreadable = Rejection(R.BAD_PARAMETER, "upload: an item cannot be read")
+    return ENDED.get(MavMissionResult(result), unreadable)
+
+
+class UploadDesk:
+    """Where uploads to one address are taken in."""
+
+    def __init__(self, check: ItemCheck, form: RequestForm) -> None:
+        self.check = check
+        self.receiver = MissionReceiver(check=check, form=form)
+
+
+class MissionUploads:
+    """Decides about whole uploads, and tells their clients."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        submissions: Submissions,
+        plans: Plans,
+        answers: MissionAnswers,
+        write_through: WriteThrough,
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._book = book
+        self._submissions = submissions
+        self._plans = plans
+        self._answers = answers
+        self._write_through = write_through
+
+    def flush(
+        self,
+        desk: UploadDesk,
+        vehicle: Vehicle,
+        *,
+        refusal: Rejection | None = None,
+        now: float,
+    ) -> None:
+        """Send what a desk has to say, and decide about the plans that are whole.
+
+        ``refusal`` is why the plan was refused that has just been decided about.
+        """
+        outgoing, uploads = desk.receiver.take()
+        for told in outgoing:
+            self._answers.send(told)
+            if isinstance(told.message, m.MissionAck) and told.message.type:
+                why = refusal or desk.check.take_refusal() or refusal_of(told.message.type)
+                self.refused(told.sender, vehicle, why, now=now)
+        for upload in uploads:
+            self._vehicles.touch(vehicle)
+            self._decide(desk, vehicle, upload, now=now)
+
+    def _decide(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        try:
+            self._submissions.check_open()
+            if upload.mission_type != MISSION:
+                self._replace(desk, vehicle, upload, now=now)
+            elif self._is_nothing(vehicle, upload):
+                self._check_not_begun(vehicle)
+                client = self._client(upload.sender)
+                self._check_replaced(client, vehicle, client.submitter(upload.sender.address))
+                self._replace(desk, vehicle, upload._replace(items=()), now=now)
+            else:
+                self._take_in(desk, vehicle, upload, now=now)
+        except Rejection as refusal:
+            self._refuse(desk, vehicle, refusal, now=now)
+
+    def _check_not_begun(self, vehicle: Vehicle) -> None:
+        task = self._plans.task(vehicle)
+        if task is not None and task.state in ACTIVE:
+            raise Rejection(R.NOT_ALLOWED, f"task {task.id} has begun: cancel it first")
+
+    def _is_nothing(self, vehicle: Vehicle, upload: Upload) -> bool:
+        """Whether a mission is none: not an item, or only the home that comes before all others."""
+        is_staged = upload.sender.addressed.component_id == AUTOPILOT
+        return len(upload.items) <= (vehicle.persona.has_home_item and is_staged)
+
+    def _take_in(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        """A mission: a task that waits to be started, or is queued."""
+        sender = upload.sender
+        is_staged = sender.addressed.component_id == AUTOPILOT
+        wanted = desk.check.plan_of(upload.items, now=now)
+        terms = replace(wanted.terms, is_staged=is_staged, is_cruising=is_staged)
+        nonce = 0 if is_staged else wanted.nonce
+        draft = self._draft(vehicle, wanted.plan, terms, sender, nonce=nonce)
+        # a long plan may take longer to come again than it is remembered
+        known = None
+        if not is_staged:
+            known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
+        if known is not None:
+            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
+            self.flush(desk, vehicle, now=now)
+            words = f"same plan again: still task {known}"
+            self._answers.tell(sender, vehicle, words, now=now)
+            return
+        before = self._plans.stored(vehicle.system_id, MISSION)
+        client = self._client(sender)
+        if is_staged:
+            self._check_replaced(client, vehicle, draft.submitter)
+        task = self._submissions.submit_plan(client, vehicle, draft, now=now)
+        if is_staged:
+            self._plans.keep(
+                vehicle, MISSION, Stored(task.id, upload.items), actor=str(sender.address), now=now
+            )
+        self._submissions.when_durable(
+            partial(self._accept, desk, vehicle, sender, task, before),
+            partial(self._withdraw, desk, vehicle, sender, task, before),
+            now=now,
+        )
+
+    def _accept(
+        self,
+        desk: UploadDesk,
+        vehicle: Vehicle,
+        sender: Sender,
+        task: Task,
+        before: Stored,
+        *,
+        now: float,
+    ) -> None:
+        self._vehicles.get(vehicle.system_id)  # something may begin there
+        desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
+        self.flush(desk, vehicle, now=now)
+        replaced = self._book.get(TaskId(before.plan_id))
+        if task.terms.is_staged and replaced is not None:
+            self._plans.end(vehicle, replaced, R.REPLACED, actor=str(sender.address), now=now)
+        if task.terms.is_staged:
+            self._plans.begin_at(vehicle, 0)
+        what = "ready to be started" if task.terms.is_staged else "queued"
+        words = f"Task {task.id} {what}: {describe(task.goal)}"
+        self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+
+    def _withdraw(
+        self,
+        desk: UploadDesk,
+        vehicle: Vehicle,
+        sender: Sender,
+        task: Task,
+        before: Stored,
+        *,
+        now: float,
+    ) -> None:
+        self._vehicles.touch(vehicle)
+        self._submissions.take_back(vehicle, task, now=now)
+        if task.terms.is_staged:
+            self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
+        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
+        self._refuse(desk, vehicle, refusal, now=now)
+
+    def _replace(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        """Fence and rally points, which the vehicle keeps as well, and the empty mission."""
+        if upload.mission_type == MISSION:
+            self._store(desk, vehicle, upload, now=now)
+            return
+        kind, items = upload.mission_type, upload.items
+        if kind == MavMissionType.FENCE:
+            fence_of(items)  # a Rejection leaves the one before in force
+            items = fence_for_vehicle(items)
+        store = partial(self._store, desk, vehicle, upload)
+        refuse = partial(self._refuse, desk, vehicle)
+        self._write_through.write(vehicle, kind, items, store, refuse, now=now)
+
+    def _store(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+        sender, kind = upload.sender, upload.mission_type
+        before, task = self._plans.stored(vehicle.system_id, kind), self._plans.task(vehicle)
+        plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
+        actor, stored = str(sender.address), Stored(plan_id, upload.items)
+        self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
+
+        def accept(*, now: float) -> None:
+            if kind == MISSION:
+                self._vehicles.touch(vehicle)
+                self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
+            self.flush(desk, vehicle, now=now)
+
+        def give_up(*, now: float) -> None:
+            self._plans.keep(vehicle, kind, before, actor=actor, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: as it was before")
+            self._refuse(desk, vehicle, refusal, now=now)
+
+        self._submissions.when_durable(accept, give_up, now=now)
+
+    def _refuse(
+        self, desk: UploadDesk, vehicle: Vehicle, refusal: Rejection, *, now: float
+    ) -> None:
+        desk.receiver.finish(result_of(refusal), opaque_id=0, now=now)
+        self.flush(desk, vehicle, refusal=refusal, now=now)
+
+    def refused(self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, now: float) -> None:
+        """Say why an upload was refused: to its client, and in the log."""
+        self._answers.refused(sender, vehicle, refusal, message_id=0, now=now)
+
+    def _check_replaced(self, client: GcsClient, vehicle: Vehicle, submitter: Submitter) -> None:
+        task = self._plans.task(vehicle)
+        if task is not None and task.state not in TERMINAL:
+            client.rights.require_own(task, submitter, "replace that plan")
+
+    def _client(self, sender: Sender) -> GcsClient:
+        client = self._answers.client(sender)
+        assert client is not None, "it has just spoken"
+        return client
+
+    def _draft(
+        self, vehicle: Vehicle, plan: Plan, terms: Terms, sender: Sender, *, nonce: int = 0
+    ) -> Draft:
+        client = self._client(sender)
+        what = f"{sender.addressed} {plan.source}".encode()
+        marks = Marks(nonce, blake2b(what, digest_size=9).hexdigest(), "")
+        submitter = client.submitter(sender.address)
+        return Draft(
+            vehicle.system_id, MavCmd.MISSION_START, plan, submitter, terms=terms, marks=marks
+        )

@@ -1,0 +1,275 @@
+"""Mission items → a plan of the task domain; a Rejection names what is wrong. Pure functions.
+
+What an item asks for is what the command of the same number asks for (``goals``); here is what only
+plans have: places that are passed, jumps, conditions, and commands that the vehicle is to carry
+out itself.
+"""
+
+from collections.abc import Callable, Sequence
+from math import inf, isnan
+from typing import NamedTuple
+
+from mav_tasks.engine.commands.ability import Ability, as_driven
+from mav_tasks.engine.commands.goals import (
+    KNOWN_FRAMES,
+    MAX_DELAY,
+    MAX_WAIT,
+    MIN_SPEED,
+    OURS,
+    bad,
+    becomes_task,
+    goal_of,
+    number,
+    refuse_infinite,
+    whole,
+)
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
+from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.mission_item import NOT_GIVEN, Item, packed
+from mav_tasks.services.persona import Persona
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.driving.itinerary import loops_in_vain
+from mav_tasks.tasks.goal import (
+    Delay,
+    GoTo,
+    Jump,
+    Near,
+    Nothing,
+    Perform,
+    Plan,
+    SetSpeed,
+    SingleGoal,
+    Step,
+    Wait,
+)
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Terms
+
+R = TaskReason
+
+FOR_EVER = 1e9  # s; JSON has no infinity
+MAX_JUMPS = 65_535
+NO_CHANGE, DEFAULT = -1.0, -2.0  # DO_CHANGE_SPEED, param2
+GROUND_OR_AIR = 1  # the same, highest param1: airspeed counts as ground speed
+NOBODY = Address(0, 0)
+#: an item came in none, and to make one for each takes a tenth of its time
+NO_MESSAGE = m.CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+HERE = (0, NOT_GIVEN)  # what x and y are where no place is meant
+
+#: what the vehicle carries out itself: cameras, gimbals, servos, relays, its home
+PERFORMED = frozenset(
+    {
+        MavCmd.DO_SET_HOME,
+        *(181, 182, 183, 184, 187),  # relays, servos, actuators
+        *(195, 197, 201, 202, 203, 204, 205, 206),  # regions of interest, cameras, mounts
+        *(530, 531, 532, 1000, 1001),  # camera modes, zoom, focus, gimbals
+        *(2000, 2001, 2003, 2500, 2501),  # pictures and videos
+    }
+)
+
+#: mission result of each refusal; of a parameter it is that parameter's
+RESULT_OF: dict[int, MavMissionResult] = {
+    R.BAD_PARAMETER: MavMissionResult.INVALID,
+    R.VEHICLE_SILENT: MavMissionResult.ERROR,
+    R.STORE_UNAVAILABLE: MavMissionResult.ERROR,
+    R.BAD_FRAME: MavMissionResult.UNSUPPORTED_FRAME,
+    R.NOT_SUPPORTED_BY_VEHICLE: MavMissionResult.UNSUPPORTED,
+}
+
+
+class Manner(NamedTuple):
+    """By what items are read: the ways of a vehicle, and the server's limits."""
+
+    has_home: bool  # the first one is home, as ArduPilot has it
+    ability: Ability
+    driving: Driving
+
+    @classmethod
+    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "Manner":
+        """Give that of a vehicle; ``is_staged``: the plan is for the autopilot itself."""
+        return cls(persona.has_home_item and is_staged, Ability.of(persona), driving)
+
+
+class Wanted(NamedTuple):
+    """What a plan asks for: its steps, the terms that it names for itself, and its nonce, or 0."""
+
+    plan: Plan
+    terms: Terms
+    nonce: int = 0
+
+
+def result_of(refusal: Rejection) -> MavMissionResult:
+    """Give the MAV_MISSION_RESULT of a refusal."""
+    if refusal.param:
+        return MavMissionResult(MavMissionResult.INVALID_PARAM1 + refusal.param - 1)
+    return RESULT_OF.get(refusal.reason, MavMissionResult.DENIED)
+
+
+def step_of(item: Item, seq: int, *, count: int, manner: Manner) -> Step:
+    """Give what an item asks for."""
+    if manner.has_home and seq == 0:
+        return Nothing()
+    step = _step_of(item, seq, count=count, driving=manner.driving)
+    if isinstance(step, SingleGoal):
+        return as_driven(step, manner.ability)
+    return step
+
+
+def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
+    command = _command_of(item)
+    if item.frame not in KNOWN_FRAMES:
+        raise Rejection(R.BAD_FRAME, f"item {seq}: frame {item.frame} is unknown")
+    refuse_infinite(command)
+    kind = _STEPS.get(item.command)
+    if kind is not None:
+        return kind(command, count, driving)
+    if item.command in PERFORMED:
+        return Perform()
+    if item.command in OURS:
+        return _own(command, driving)
+    if becomes_task(item.command) and item.command != MavCmd.DO_REPOSITION:
+        return goal_of(command, driving)
+    words = f"item {seq}: command {item.command} is not supported in a plan"
+    raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+
+
+def steps_of(items: Sequence[Item], *, manner: Manner) -> tuple[Step, ...]:
+    """Give what all items of a plan ask for."""
+    return tuple(
+        step_of(item, seq, count=len(items), manner=manner) for seq, item in enumerate(items)
+    )
+
+
+def plan_of(items: Sequence[Item], steps: tuple[Step, ...], *, now: float) -> Wanted:
+    """Give the plan of items and of what they ask for; Rejection when they make none."""
+    plan = Plan(steps, packed(items))
+    loop = loops_in_vain(plan)
+    if loop is not None:
+        raise Rejection(R.BAD_PARAMETER, f"item {loop}: a loop in which nothing is driven")
+    return Wanted(plan, _terms_of(items, now=now), _nonce_of(items))
+
+
+def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
+    """Give the command that an item is for the vehicle itself."""
+    p1, p2, p3, p4 = map(_given, (item.param1, item.param2, item.param3, item.param4))
+    p7 = _given(item.z)
+    if item.frame == MavFrame.MISSION:
+        p5, p6 = float(item.x), float(item.y)
+        return m.CommandLong(*target, item.command, 0, p1, p2, p3, p4, p5, p6, p7)
+    x, y = item.x, item.y
+    return m.CommandInt(*target, item.frame, item.command, 0, 0, p1, p2, p3, p4, x, y, p7)
+
+
+def _given(value: float) -> float:
+    """Give a number for the vehicle: never NaN, which aborts some."""
+    return 0.0 if isnan(value) else value
+
+
+def _command_of(item: Item) -> Command:
+    first = (item.param1, item.param2, item.param3, item.param4)
+    params = (*first, float(item.x), float(item.y), item.z)
+    return Command(NOBODY, item.command, params, 0, item.frame, NO_MESSAGE)
+
+
+def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
+    terms = Terms()
+    for item in items:
+        if item.command == MavCmd.TASK_OPTIONS:
+            terms = _options(_command_of(item), now=now)
+    return terms
+
+
+def _nonce_of(items: Sequence[Item]) -> int:
+    """Give the client's mark in the options; what can be none is not looked at."""
+    marks = [item.x for item in items if item.command == MavCmd.TASK_OPTIONS]
+    return marks[-1] if marks and 0 < marks[-1] <= MAX_TASK_ID else 0
+
+
+def _options(command: Command, *, now: float) -> Terms:
+    delay = number(command, 2, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
+    deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY, default=0.0)
+    return Terms(
+        priority=whole(command, 1, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY),
+        after=whole(command, 4, "run after", high=MAX_TASK_ID),
+        start_at=now + delay if delay else None,
+        deadline=now + deadline if deadline else None,
+    )
+
+
+# steps
+
+
+def _waypoint(command: Command, _count: int, driving: Driving) -> Step:
+    goal = goal_of(command, driving)
+    assert isinstance(goal, GoTo), "a waypoint is a place"
+    if goal.wait or goal.yaw is not None:
+        return goal
+    return GoTo(goal.place, goal.speed, goal.radius, passes=True)
+
+
+def _loiter(command: Command, _count: int, driving: Driving) -> Step:
+    if all(part in HERE for part in command.params[4:6]):
+        return Wait(FOR_EVER)
+    goal = goal_of(command._replace(command=MavCmd.NAV_WAYPOINT), driving)
+    assert isinstance(goal, GoTo), "a waypoint is a place"
+    return GoTo(goal.place, wait=FOR_EVER)
+
+
+def _nothing(_command: Command, _count: int, _driving: Driving) -> Step:
+    return Nothing()
+
+
+def _take_options(command: Command, _count: int, _driving: Driving) -> Step:
+    _options(command, now=0.0)  # only looked at here
+    return Nothing()
+
+
+def _delay(command: Command, _count: int, _driving: Driving) -> Step:
+    return Delay(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
+
+
+def _near(command: Command, _count: int, driving: Driving) -> Step:
+    return Near(number(command, 1, "distance", low=0.0, high=driving.max_distance))
+
+
+def _jump(command: Command, count: int, _driving: Driving) -> Step:
+    to = whole(command, 1, "item", high=count - 1, default=None)
+    return Jump(to, whole(command, 2, "repeat", low=-1, high=MAX_JUMPS, default=None))
+
+
+def _go_on_with(command: Command, count: int, _driving: Driving) -> Step:
+    return Jump(whole(command, 1, "item", high=count - 1, default=None), -1)
+
+
+def _speed(command: Command, _count: int, driving: Driving) -> Step:
+    whole(command, 1, "speed type", high=GROUND_OR_AIR)
+    wish = command.params[1]
+    if wish == NO_CHANGE or isnan(wish):
+        return Nothing()
+    if wish == DEFAULT:
+        return SetSpeed(None)
+    # planners leave speeds of aircraft in there; the limit is kept all the same
+    return SetSpeed(min(number(command, 2, "speed", low=MIN_SPEED, high=inf), driving.max_speed))
+
+
+def _own(command: Command, driving: Driving) -> Step:
+    for index, name in ((5, "run after"), (6, "start delay")):
+        if command.params[index - 1] not in HERE:
+            raise bad(f"param{index} {name}: not within a plan, see TASK_OPTIONS", param=index)
+    return goal_of(command, driving)
+
+
+_STEPS: dict[int, Callable[[Command, int, Driving], Step]] = {
+    MavCmd.NAV_WAYPOINT: _waypoint,
+    MavCmd.NAV_LOITER_UNLIM: _loiter,
+    MavCmd.NAV_TAKEOFF: _nothing,
+    MavCmd.CONDITION_DELAY: _delay,
+    MavCmd.CONDITION_DISTANCE: _near,
+    MavCmd.DO_JUMP: _jump,
+    MavCmd.DO_CHANGE_SPEED: _speed,
+    MavCmd.DO_SET_MISSION_CURRENT: _go_on_with,
+    MavCmd.TASK_OPTIONS: _take_options,
+}

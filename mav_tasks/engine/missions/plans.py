@@ -1,0 +1,319 @@
+"""The plans of each vehicle: what is stored, which mission is shown, starting and going on with it.
+
+A mission at the autopilot's address is staged: a task that waits until it is started. Started again
+when it is over, it is another task.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
+from mav_tasks.engine.missions.fence_items import fence_of, rally_of
+from mav_tasks.engine.missions.plan_items import Manner, plan_of, steps_of
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavCmd, MavMissionType
+from mav_tasks.services.mission_item import Item, item_at, packed, unpacked
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import SERVER, PlanStored
+from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
+
+R, S = TaskReason, TaskState
+
+MISSION = MavMissionType.MISSION
+STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
+NOT_STARTED = 2  # MISSION_STATE
+STARTED_TWICE = 2.5  # s in which a second wish to start means the first: MAVSDK sends two
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A plan as it came, and the id by which clients know it."""
+
+    plan_id: int
+    items: tuple[Item, ...]
+
+
+NOTHING = Stored(0, ())
+CALLED_OFF = TERMINAL - {S.COMPLETED}
+
+
+class _Started(NamedTuple):
+    by: Submitter
+    task_id: TaskId
+    at: float
+
+
+class Plans:
+    """The plans of all vehicles."""
+
+    def __init__(
+        self,
+        book: TaskBook,
+        fleet: Fleet,
+        settings: Settings,
+        *,
+        restored: Mapping[tuple[int, int], tuple[int, str]],
+    ) -> None:
+        self._book = book
+        self._fleet = fleet
+        self._settings = settings
+        self._stored = {
+            key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
+        }
+        self._first: dict[int, int] = {}  # by vehicle: the item with which the next start begins
+        self._started: dict[int, _Started] = {}  # the last start of each vehicle
+        for (system_id, kind), stored in self._stored.items():
+            self._apply_bounds(system_id, kind, stored.items)
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+
+    def stored(self, vehicle: int, kind: int) -> Stored:
+        """Give a vehicle's mission, fence or rally points."""
+        return self._stored.get((vehicle, kind), NOTHING)
+
+    def shown(self, vehicle: Vehicle) -> Task | None:
+        """Give the mission that clients are shown: the one that is driven, else the staged."""
+        begun = vehicle.tasks.begun
+        if begun is not None and isinstance(begun.goal, Plan):
+            return begun
+        return self.task(vehicle)
+
+    def task(self, vehicle: Vehicle) -> Task | None:
+        """Give the task that the staged mission is, while it is remembered."""
+        return self._book.get(TaskId(self.stored(vehicle.system_id, MISSION).plan_id))
+
+    def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
+        """Let a plan take the place of the one before; NOTHING: there is none any more."""
+        if kind == MISSION and stored.items != self.stored(vehicle.system_id, MISSION).items:
+            vehicle.forget_start()
+        self._stored[vehicle.system_id, kind] = stored
+        self._apply_bounds(vehicle.system_id, kind, stored.items)
+        source = packed(stored.items)
+        self._book.record(PlanStored(vehicle.system_id, kind, stored.plan_id, source, actor, now))
+
+    def _apply_bounds(self, system_id: int, kind: int, items: tuple[Item, ...]) -> None:
+        bounds = self._fleet.of(system_id).bounds
+        if kind == MavMissionType.FENCE:
+            bounds.fence = fence_of(items)
+        elif kind == MavMissionType.RALLY:
+            bounds.rally = rally_of(items)
+
+    def end(
+        self, vehicle: Vehicle, task: Task, reason: TaskReason, *, actor: str, now: float
+    ) -> None:
+        """Call off a mission that has not begun."""
+        if task.state not in WAITING:
+            return
+        vehicle.tasks.cancel(task, kill=False, reason=reason, actor=actor, now=now)
+
+    def let_go(
+        self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
+    ) -> None:
+        """A mission is not the vehicle's any more: if it has not begun, it never will."""
+        current = None if task is None else self._book.get(task.id)
+        if current is not None:
+            self.end(vehicle, current, reason, actor=actor, now=now)
+        self._first.pop(vehicle.system_id, None)
+
+    def begin_at(self, vehicle: Vehicle, first: int) -> None:
+        """Let the next start begin with this item; 0: with the first."""
+        self._first[vehicle.system_id] = first
+
+    # starting and jumping
+
+    def check_start(self, rights: Rights, vehicle: Vehicle, submitter: Submitter) -> None:
+        """Raise Rejection unless a client may start, or move on, the plans that are there."""
+        rights.require(SUBMITTER, "start a plan")
+        if vehicle.tasks.paused:
+            rights.require(OPERATOR, "start a plan while tasks are paused")
+        if vehicle.armed and vehicle.is_by_hand:
+            rights.require(OPERATOR, "end driving by hand")
+        for task in (vehicle.tasks.begun, self.task(vehicle)):
+            if task is not None and isinstance(task.goal, Plan):
+                rights.require_own(task, submitter, "start that plan")
+
+    def start(
+        self, vehicle: Vehicle, submitter: Submitter, *, first: int, now: float
+    ) -> Task | Draft:
+        """Start or continue the staged mission.
+
+        Gives the task; or, when that is over, the draft of another one to be submitted, after
+        which ``restarted`` is called. Rejection when there is nothing to start, or it must not be.
+        """
+        if vehicle.tasks.is_stopped:
+            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        self._check_queue(vehicle)
+        vehicle.check_not_by_hand(now=now)
+        stored = self.stored(vehicle.system_id, MISSION)
+        begun, task = vehicle.tasks.begun, self.task(vehicle)
+        is_fresh = task is not None and waits_for_start(task)
+        if begun and begun.id != stored.plan_id and isinstance(begun.goal, Plan) and not is_fresh:
+            self._set_going(vehicle, begun, actor=str(submitter), now=now)
+            return begun
+        if not stored.items:
+            raise Rejection(R.NOT_FOUND, "no plan is uploaded")
+        if first >= len(stored.items):
+            words = f"param1 first item {first}: there are {len(stored.items)}"
+            raise Rejection(R.BAD_PARAMETER, words, param=1)
+        if task is not None and self._is_started_again(vehicle, submitter, task, now=now):
+            return task
+        chosen = self._first.pop(vehicle.system_id, 0)
+        first = first or chosen
+        if task is None or task.state in TERMINAL:
+            return self._again(vehicle, stored, submitter, first=first, now=now)
+        if first:
+            vehicle.tasks.skip_to(task, first, now=now)
+        self._set_going(vehicle, self._book[task.id], actor=str(submitter), now=now)
+        self._note_start(vehicle, submitter, task, now=now)
+        return task
+
+    def _check_queue(self, vehicle: Vehicle) -> None:
+        """A start ends no more than a pause: of the rest a person must say that all is well."""
+        paused = vehicle.tasks.paused
+        if paused and paused is not R.OPERATOR:
+            words = f"paused, {words_of(paused)}: continue first"
+            raise Rejection(R.QUEUE_PAUSED, words)
+        task = self.task(vehicle)
+        if task is not None and task.state is S.HELD:
+            raise Rejection(R.HELD_AHEAD, f"task {task.id} is held: release it first")
+        if task is not None and task.state is S.CANCELLING:
+            raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
+
+    def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
+        """Of a paused queue the mission alone goes on; what others have paused stays so."""
+        vehicle.leave_manual(now=now)
+        if task.state in ACTIVE:
+            if vehicle.tasks.paused:
+                vehicle.go_on(actor=actor, now=now)
+            return
+        if task.terms.is_staged:
+            terms = replace(task.terms, is_staged=False)
+            vehicle.modify(task, terms, actor=actor, now=now)
+        if vehicle.tasks.paused:
+            vehicle.tasks.give_way_to(task, actor=actor, now=now)
+        vehicle.wake(now=now)
+
+    def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
+        """A start was not stored in time: it is none."""
+        current = self._book.get(task.id)
+        self._started.pop(vehicle.system_id, None)
+        if current is not None and current.state in WAITING:
+            terms = replace(current.terms, is_staged=True)
+            vehicle.modify(current, terms, actor=SERVER, now=now)
+
+    def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
+        """The mission was submitted anew: clients know it by that task's id from now on."""
+        stored = replace(self.stored(vehicle.system_id, MISSION), plan_id=task.id)
+        self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
+        self._set_going(vehicle, task, actor=str(task.submitter), now=now)
+        self._note_start(vehicle, task.submitter, task, now=now)
+
+    def _note_start(
+        self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
+    ) -> None:
+        self._started[vehicle.system_id] = _Started(submitter, task.id, now)
+
+    def _is_started_again(
+        self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
+    ) -> bool:
+        """Whether a client means the start that it has just asked for in another way."""
+        started = self._started.get(vehicle.system_id)
+        if started is None or now - started.at > STARTED_TWICE:
+            return False
+        is_same = (started.by, started.task_id) == (submitter, task.id)
+        return is_same and task.state not in CALLED_OFF and not vehicle.tasks.paused
+
+    def _again(
+        self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
+    ) -> Draft:
+        manner = Manner.of(vehicle.persona, is_staged=True, driving=self._settings.driving)
+        wanted = plan_of(stored.items, steps_of(stored.items, manner=manner), now=now)
+        plan = replace(wanted.plan, first=first)
+        command, terms = MavCmd.MISSION_START, replace(wanted.terms, is_cruising=True)
+        return Draft(vehicle.system_id, command, plan, submitter, terms=terms)
+
+    def go_on_with(self, vehicle: Vehicle, seq: int, *, now: float) -> Task | None:
+        """Let the mission go on with another item; None: it will begin with that when started.
+
+        Raise Rejection if there is no such item.
+        """
+        task = self.shown(vehicle)
+        count = len(self.stored(vehicle.system_id, MISSION).items)
+        if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
+            count = len(task.goal.steps)
+        if seq >= count:
+            raise Rejection(R.BAD_PARAMETER, f"item {seq}: there are {count}", param=1)
+        if task is None or task.state in TERMINAL:
+            self.begin_at(vehicle, seq)
+            return None
+        vehicle.tasks.skip_to(task, seq, now=now)
+        return task
+
+    # showing
+
+    def current(self, vehicle: Vehicle, *, seq: int | None = None) -> m.MissionCurrent:
+        """Give MISSION_CURRENT; ``seq`` instead of the item that is driven."""
+        task, system_id = self.shown(vehicle), vehicle.system_id
+        stored = self.stored(system_id, MISSION)
+        count = len(stored.items)
+        if task is not None and isinstance(task.goal, Plan):
+            count = len(task.goal.steps)
+        chosen, state = self._first.get(system_id), _mission_state(task, has_plan=bool(count))
+        at = chosen or 0
+        if chosen is not None and task is not None and task.state in TERMINAL:
+            state = NOT_STARTED  # over, and to begin again with another item
+        elif task is not None and task.progress.step >= 0:
+            at = min(task.progress.step, max(count - 1, 0))
+        return m.MissionCurrent(
+            at if seq is None else seq,
+            count,
+            state,
+            0,
+            stored.plan_id if task is None else task.id,
+            self.stored(system_id, MavMissionType.FENCE).plan_id,
+            self.stored(system_id, MavMissionType.RALLY).plan_id,
+        )
+
+    def item_of(self, task: Task, step: int) -> Item:
+        """Give an item of a task's plan as it came."""
+        return item_at(plan_of_task(task).source, step)
+
+
+def plan_of_task(task: Task) -> Plan:
+    """Give the plan of a task that is known to be one."""
+    assert isinstance(task.goal, Plan), "the task of a mission is a plan"
+    return task.goal
+
+
+def waits_for_start(task: Task) -> bool:
+    """Whether a task is a mission that nobody has started."""
+    return task.state in WAITING and task.terms.is_staged
+
+
+def begins_with(seq: int) -> str:
+    """Return what a client is told that has chosen an item of a mission that does not run."""
+    return f"Mission begins with item {seq} when started"
+
+
+def _mission_state(task: Task | None, *, has_plan: bool) -> int:
+    """Give the MISSION_STATE."""
+    if not has_plan:
+        return 1  # NO_MISSION
+    match None if task is None else task.state:
+        case S.STARTING | S.EXECUTING:
+            return 3  # ACTIVE
+        case S.PAUSED | S.HELD | S.CANCELLING:
+            return 4  # PAUSED
+        case S.COMPLETED:
+            return 5  # COMPLETE
+        case _:
+            return NOT_STARTED

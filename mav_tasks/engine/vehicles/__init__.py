@@ -1,0 +1,1 @@
+"""The rovers: what each says, and how each is made to do what is wanted."""

@@ -1,0 +1,151 @@
+"""Whether a vehicle moves as it was told to: what is to be done about it when it does not.
+
+It measures and decides; the vehicle carries out. Two things are looked at with each setpoint: that
+a vehicle that was told to stand does (``stop_ladder``), and that one that was told to drive is not
+faster than that (``overspeed``).
+"""
+
+from enum import Enum, auto
+from math import inf
+from typing import NamedTuple
+
+from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.overspeed import Overspeed
+from mav_tasks.engine.vehicles.stop_ladder import MOVES, NO_EFFECT, Step, StopLadder
+from mav_tasks.settings import Watch
+
+NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
+SWINGS = 1.0  # s in which a car may swing back after its task's own zeros: to 0.15 m/s (ArduPilot)
+RUNS_ON = 0.4  # m/s on those, that are more than a speed loop that has wound up
+ROLLS = 0.03  # m/s, at which one that rolls out still brakes; with 0.05 it went on for 9 cm
+BRAKES_WITHIN = 2.0  # s; from 2 m/s at 1 m/s², and what takes longer is HOLD's
+SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
+
+
+class Measure(Enum):
+    """What is to be done."""
+
+    #: it stands so nearly that HOLD does not let it roll
+    HOLD_NOW = auto()
+    #: setpoints do not stop it: HOLD
+    HOLD = auto()
+    #: HOLD does not stop it either
+    DISARM = auto()
+    #: it is faster than it was told to be
+    STOP_TASK = auto()
+
+
+class Found(NamedTuple):
+    """What is to be done, and what was seen, in words for the operator."""
+
+    measure: Measure
+    words: str = ""
+
+
+class Told(NamedTuple):
+    """What the vehicle is told, and by whom it is driven."""
+
+    forward: float  # m/s that are asked for now
+    moves: bool  # a velocity other than zero is asked for, and it is in our control
+    is_ours: bool  # we drive it, hand it back or stop it
+    is_stopping: bool  # STOP, or what is like it
+    rolls_out: bool  # in our mode, such a vehicle rolls on or swings back before it stands
+    may_drive: bool  # in our control, and STOP is not latched
+    goes_on: bool  # it stands for a task that goes on, or begins
+    is_released: bool  # we do nothing to it any more
+    is_held: bool  # it shows HOLD
+    armed: bool
+    still: bool
+    heard: bool
+
+
+class MotionGuard:
+    """Guards one vehicle."""
+
+    def __init__(self, motion: MotionMonitor, watch: Watch) -> None:
+        self._motion = motion
+        self._watch = watch
+        self.ladder = StopLadder()
+        self._overspeed = Overspeed()
+        self._told_to_move_at = -inf
+
+    def __repr__(self) -> str:
+        return f"MotionGuard({self.ladder!r}, {self._overspeed!r})"
+
+    def apply(self, watch: Watch) -> None:
+        """Take new settings."""
+        self._watch = watch
+
+    def is_fresh(self, *, now: float) -> bool:
+        """Return whether it is known how the vehicle moves now."""
+        motion = self._motion.latest()
+        return motion is not None and now - motion.at <= self._watch.motion_fresh
+
+    def brakes(self, *, rolls_out: bool, now: float) -> bool:
+        """Return whether it was told to move a moment ago, and still rolls on along its heading.
+
+        At rest an estimate wanders, too, but for longer; and it is the speed that is reported or
+        the way that was made, not both.
+        """
+        motion = self._motion.latest()
+        if motion is None or now - self._told_to_move_at > BRAKES_WITHIN:
+            return False
+        least = ROLLS if rolls_out else MOVES
+        forward = self._motion.standstill.forward(SPEED_WINDOW, now=now)
+        is_known = forward is not None and self.is_fresh(now=now)
+        return is_known and min(abs(forward or 0.0), abs(motion.forward)) > least
+
+    def look(self, told: Told, *, now: float) -> list[Found]:
+        """Return what is to be done now, in order."""
+        found = []
+        if told.may_drive:
+            too_fast = self._is_too_fast(told.forward, now=now)
+            if too_fast:
+                found.append(Found(Measure.STOP_TASK, too_fast))
+        if told.moves:
+            self._told_to_move_at = now
+            self.ladder.end()
+        elif told.is_ours and told.armed and not told.still:
+            self.ladder.begin(now=now)
+        if self.ladder.is_on:
+            found += self._climb(told, now=now)
+        return found
+
+    def _climb(self, told: Told, *, now: float) -> list[Found]:
+        if told.still or not told.heard or (told.is_released and not told.is_held):
+            self.ladder.end()
+            return []
+        speed = self._speed(now=now)
+        if speed is None and not told.is_stopping:
+            return []  # zeros go on, and HOLD follows them: nobody knows of a car that HOLD rolls
+        is_own = told.goes_on and not told.is_stopping
+        step = self.ladder.climb(
+            speed=speed,
+            is_held=told.is_held,
+            patience=SWINGS if is_own else NO_EFFECT,
+            moves=RUNS_ON if is_own else MOVES,
+            disarm_after=self._watch.disarm_moving or inf,
+            now=now,
+        )
+        if step is Step.HOLD:
+            return [Found(Measure.HOLD)]
+        if step is Step.DISARM and told.armed:
+            return [Found(Measure.DISARM, f"moves in HOLD, {speed or 0.0:.1f} m/s: disarmed")]
+        ends = told.is_stopping or (told.rolls_out and not told.goes_on)
+        if ends and speed is not None and speed < NEARLY_STANDS:
+            return [Found(Measure.HOLD_NOW)]
+        return []
+
+    def _is_too_fast(self, asked: float, *, now: float) -> str:
+        speed, motion = self._speed(now=now), self._motion.latest()
+        reported = 0.0 if motion is None else motion.speed
+        most = self._overspeed.look(asked, min(speed or 0.0, reported), now=now)
+        if most is None:
+            return ""
+        return f"drives {speed:.1f} m/s, asked for {most:.1f}: stopped. Is a stick off its centre?"
+
+    def _speed(self, *, now: float) -> float | None:
+        """Return m/s by displacement, None while nothing fresh is known."""
+        return (
+            self._motion.standstill.speed(SPEED_WINDOW, now=now) if self.is_fresh(now=now) else None
+        )

@@ -1,0 +1,144 @@
+"""A vehicle's own position, heading and standstill, from LOCAL_POSITION_NED and ATTITUDE."""
+
+from math import cos, hypot, inf, isfinite, sin
+
+from mav_tasks.engine.vehicles.standstill import Standstill
+from mav_tasks.mavlink.messages import Attitude, LocalPositionNed
+from mav_tasks.settings import Watch
+from mav_tasks.tasks.driving.guidance import Motion
+from mav_tasks.tasks.task import Pose
+
+REBOOT = 1000  # ms that a vehicle's clock must go back to mean a restart, not reordering
+
+
+class MotionMonitor:
+    """What one vehicle measures of its motion."""
+
+    def __init__(self, watch: Watch) -> None:
+        self._watch = watch
+        self._position: LocalPositionNed | None = None
+        self._position_at = 0.0
+        self._attitude: Attitude | None = None
+        self._attitude_at = 0.0
+        self._moved_at: float | None = None
+        self._latest: Motion | None = None  # made of what came last, when it is asked for
+        self._last_boot_ms: dict[int, int] = {}
+        #: where it was lately, and what it does at rest
+        self.standstill = Standstill()
+        self._doubted_until = -inf
+        self.rebooted = False
+
+    def apply(self, watch: Watch) -> None:
+        """Take new settings."""
+        self._watch = watch
+
+    def receive(self, message: Attitude | LocalPositionNed, *, now: float) -> None:
+        """Take a message in; one that is not finite, or older than the last, is dropped."""
+        if not is_finite(message) or not self._is_newer(message):
+            return
+        self._latest = None
+        if isinstance(message, LocalPositionNed):
+            if not self._is_frozen(message):
+                self._position_at = now
+            self._position = message
+        else:
+            self._attitude, self._attitude_at = message, now
+        if self._moved_at is None or not self._is_slow():
+            self._moved_at = now
+        motion = self.latest()
+        if motion is not None and isinstance(message, LocalPositionNed):
+            self.standstill.receive(motion, now=now)
+
+    def latest(self) -> Motion | None:
+        """Give the last measured motion, or None before both messages have come."""
+        if self._latest is None:
+            self._latest = self._motion()
+        return self._latest
+
+    def _motion(self) -> Motion | None:
+        position, attitude = self._position, self._attitude
+        if position is None or attitude is None:
+            return None
+        north, east = cos(attitude.yaw), sin(attitude.yaw)
+        return Motion(
+            pose=Pose(position.x, position.y, attitude.yaw),
+            forward=position.vx * north + position.vy * east,
+            sideways=position.vy * north - position.vx * east,
+            yaw_rate=attitude.yawspeed,
+            at=min(self._position_at, self._attitude_at),
+        )
+
+    def is_still(self, *, now: float) -> bool:
+        """Whether fresh data say that the vehicle has stood for a while.
+
+        That nothing was heard since it moved is no standstill, however long data count as fresh.
+        """
+        motion, watch = self.latest(), self._watch
+        if motion is None or now - motion.at > watch.motion_fresh or now < self._doubted_until:
+            return False
+        if abs(motion.yaw_rate) >= watch.still_turn_rate:  # at rest 1.4 deg/s was the most measured
+            return False
+        says_so = (
+            self._is_slow()
+            and self._moved_at is not None
+            and now - self._moved_at >= watch.still_time
+        )
+        if says_so and self.standstill.confirms(watch, now=now):
+            return True
+        return self.standstill.has_stood(watch, now=now)
+
+    def doubt(self, *, until: float) -> None:
+        """Do not believe before then that it stands, whatever it says."""
+        self._doubted_until = until
+
+    def forget(self) -> None:
+        """Start afresh, as after a restart of the vehicle."""
+        self._position = self._attitude = self._latest = None
+        self._moved_at = None
+        self.standstill.forget()
+        self._last_boot_ms.clear()
+        self.rebooted = False
+
+    def _is_newer(self, message: Attitude | LocalPositionNed) -> bool:
+        last = self._last_boot_ms.get(message.id)
+        if last is None:
+            self._last_boot_ms[message.id] = message.time_boot_ms
+            return True
+        if last == message.time_boot_ms:
+            return False  # the same again, by a net or an estimator that repeats it
+        back = (last - message.time_boot_ms) & 0xFFFFFFFF  # the field overflows after 49 days
+        if 0 < back < 0x80000000:
+            if back < REBOOT:
+                return False
+            self.rebooted = True
+        self._last_boot_ms[message.id] = message.time_boot_ms
+        return True
+
+    def _is_frozen(self, message: LocalPositionNed) -> bool:
+        """Whether it says that it moves, and yet is where it was: an estimator that stands still.
+
+        Such a position is as old as the first of its kind.
+        """
+        last = self._position
+        return (
+            last is not None
+            and (message.x, message.y) == (last.x, last.y)
+            and hypot(message.vx, message.vy) >= self._watch.still_speed
+        )
+
+    def _is_slow(self) -> bool:
+        position, attitude = self._position, self._attitude
+        watch = self._watch
+        return (
+            position is not None
+            and attitude is not None
+            and hypot(position.vx, position.vy) < watch.still_speed
+            and abs(attitude.yawspeed) < watch.still_turn_rate
+        )
+
+
+def is_finite(message: Attitude | LocalPositionNed) -> bool:
+    """Whether all numbers of it that are used are numbers."""
+    if isinstance(message, LocalPositionNed):
+        return all(map(isfinite, (message.x, message.y, message.vx, message.vy)))
+    return isfinite(message.yaw) and isfinite(message.yawspeed)

@@ -1,0 +1,393 @@
+"""All vehicles and the links to them: finding, hearing, and the way to each.
+
+Any bytes may come in here; only a packet with a good CRC from a known or newly heartbeating system
+changes anything.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import inf
+
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.vehicles.agenda import Agenda
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
+from mav_tasks.mavlink.enums import MavType
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Place, Router
+from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
+from mav_tasks.services.persona import persona_of
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
+from mav_tasks.tasks.fleet import Fleet
+
+OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
+MAX_PEERS = 256  # endpoints on one vehicle link
+BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
+
+#: messages that nobody but a controller of the vehicle sends
+SETPOINTS = frozenset(
+    {m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id, m.SetAttitudeTarget.id}
+)
+#: what the server itself makes use of; everything else is forwarded unread
+USED = frozenset(
+    {
+        m.Heartbeat.id,
+        m.Attitude.id,
+        m.LocalPositionNed.id,
+        m.GlobalPositionInt.id,
+        m.GpsGlobalOrigin.id,
+        m.HomePosition.id,
+        m.AutopilotVersion.id,
+        m.CommandAck.id,
+        m.MissionAck.id,
+        m.MissionCurrent.id,
+        m.MissionRequest.id,
+        m.MissionRequestInt.id,
+        m.ParamValue.id,
+        m.RcChannels.id,
+        m.Statustext.id,
+        m.SysStatus.id,
+    }
+    | SETPOINTS
+)
+NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
+DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
+
+
+@dataclass(slots=True)
+class _Link:
+    is_local: bool
+    heartbeat: HeartbeatSender
+    outlets: dict[Peer, Outlet] = field(default_factory=dict)
+
+
+class VehicleSide:
+    """The vehicles by system id, and the vehicle links."""
+
+    def __init__(
+        self,
+        *,
+        queue: list[Outgoing],
+        packer: Packer,
+        signatures: Signatures,
+        book: TaskBook,
+        fleet: Fleet,
+        settings: Settings,
+    ) -> None:
+        self._queue = queue
+        self._packer = packer
+        self._signatures = signatures
+        self._book = book
+        self._fleet = fleet
+        self._settings = settings
+        self._decoder = Decoder()
+        self._links: dict[str, _Link] = {}
+        self._router = Router()
+        self._agenda = Agenda()
+        self._old_until = -inf
+        self._noted: set[str] = set()
+        self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
+        #: heartbeats of a known vehicle's id from another place: when the first one came
+        self._rivals: dict[tuple[int, str, Peer], float] = {}
+        #: where nobody is any more: whoever was there may be back at once, anywhere
+        self._left: set[Place] = set()
+        self._vehicles: dict[int, Vehicle] = {}
+
+    def __iter__(self) -> Iterator[Vehicle]:
+        """Give every vehicle, to be looked at only."""
+        return iter(self._vehicles.values())
+
+    def __len__(self) -> int:
+        return len(self._vehicles)
+
+    def get(self, system_id: int) -> Vehicle | None:
+        """Give a vehicle, to do something to it."""
+        vehicle = self._vehicles.get(system_id)
+        if vehicle is not None:
+            self._agenda.touch(vehicle)
+        return vehicle
+
+    def touch(self, vehicle: Vehicle) -> None:
+        """Note that something is about to be done to a vehicle that was only looked at."""
+        self._agenda.touch(vehicle)
+
+    def look_at(self, system_id: int) -> Vehicle | None:
+        """Give a vehicle to which nothing is done."""
+        return self._vehicles.get(system_id)
+
+    def addressed_by(self, system_id: int) -> list[Vehicle]:
+        """Give the vehicles that a target_system means, 0 all of them, to do something to them."""
+        wanted = sorted(self._vehicles) if system_id == 0 else [system_id]
+        return [vehicle for vehicle in map(self.get, wanted) if vehicle is not None]
+
+    def stop_unheard(self, system_id: int, *, clear: bool, actor: str, now: float) -> list[int]:
+        """Latch STOP for vehicles of an earlier run that were not heard yet; gives them.
+
+        They are stopped when they are heard. ``system_id`` 0: all of them.
+        """
+        unheard = [
+            tasks
+            for tasks in self._fleet
+            if tasks.vehicle not in self._vehicles and system_id in (0, tasks.vehicle)
+        ]
+        for tasks in unheard:
+            tasks.stop(clear=clear, actor=actor, now=now)
+        return [tasks.vehicle for tasks in unheard]
+
+    def settle(self) -> list[Vehicle]:
+        """Look at what became of those to which something was done; gives them."""
+        return self._agenda.settle()
+
+    @property
+    def last_words(self) -> tuple[Outgoing, ...]:
+        """Zero and HOLD for every vehicle that is being driven."""
+        return self._agenda.last_words
+
+    def commit(self, durable: int, *, now: float) -> None:
+        """Let begin what waited for nothing but that events are durable up to this number."""
+        waiting = self._agenda.awaiting_commit()
+        self._book.durable = durable
+        for vehicle in waiting:
+            self._agenda.touch(vehicle)
+            vehicle.step(now=now)
+
+    @property
+    def counts(self) -> DecodeCounts:
+        """What came in on these links."""
+        return self._decoder.counts
+
+    def change_link(self, change: LinkChanged, *, now: float) -> None:
+        """Take a link into use, or out of it."""
+        if not change.up:
+            self._links.pop(change.link, None)
+            return
+        link = _Link(change.is_local, HeartbeatSender(now=now))
+        places = [self._router.place_of(vehicle.system_id) for vehicle in self]
+        known = [place[1] for place in places if place is not None and place[0] == change.link]
+        for peer in (*change.peers, *known):
+            link.outlets[peer] = self._outlet(change.link, peer)
+        self._links[change.link] = link
+
+    def change_peer(self, change: PeerChanged) -> None:
+        """Speak to who has come; who is gone may come back from another place."""
+        link, place = self._links.get(change.link), (change.link, change.peer)
+        if link is None:
+            return
+        if not change.up:
+            link.outlets.pop(change.peer, None)
+            self._left.add(place)
+            self._forget_if_empty(place)
+        elif len(link.outlets) < MAX_PEERS:
+            self._left.discard(place)
+            link.outlets[change.peer] = self._outlet(*place)
+            for vehicle in self:
+                if self._router.place_of(vehicle.system_id) == place:
+                    vehicle.comes_anew()
+
+    def owns(self, link: str) -> bool:
+        """Whether a link of this name is a vehicle link."""
+        return link in self._links
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        for vehicle in self:
+            vehicle.apply(settings)
+            self._agenda.touch(vehicle)  # its deadlines may be others
+
+    def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
+        """Take a packet in; gives the vehicle in whose name it is to be forwarded, if any.
+
+        COMMAND_ACK is not to be forwarded: it goes to the one who asked.
+        """
+        message: m.Message | None = None
+        if packet.message_id in USED or packet.source == self.our_address:
+            message = self._decoder.decode(packet)
+            if message is None:  # what cannot be verified changes nothing
+                return None
+        elif packet.message_id not in m.ALL:
+            self.counts.unknown += 1
+        if self._signatures.admit(link, peer, packet) is None:
+            return None
+        if self._is_intruder(packet):
+            self._note_intruder(link, packet, message, now=now)
+            return None
+        vehicle = self.get(packet.system_id)
+        if vehicle is None:
+            if not isinstance(message, m.Heartbeat):
+                return None
+            vehicle = self._meet(link, peer, packet, message, now=now)
+            if vehicle is None:
+                return None
+        elif self._router.place_of(vehicle.system_id) != (link, peer) and not (
+            isinstance(message, m.Heartbeat)
+            and packet.component_id == AUTOPILOT
+            and self._moves(vehicle, link, peer, now=now)
+        ):
+            return None
+        if packet.component_id == AUTOPILOT:
+            vehicle.count(packet.seq)
+        vehicle.requests.intervals.heard(packet.message_id)
+        if message is not None:
+            if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
+                if vehicle.is_overtaken(now=now):
+                    return vehicle  # an old mode, or an old arming, is not news
+                vehicle.last_heartbeat = packet
+            vehicle.receive(message, packet.component_id, now=now)
+        return vehicle
+
+    def check_late(self, *, now: float) -> None:
+        """Stop what was driven on without us; before anything else is done after a delay."""
+        if self.next_deadline() + self._settings.watch.late_tick >= now:
+            return
+        self._old_until = now + OLD_NEWS
+        for vehicle in self:
+            self._agenda.touch(vehicle)
+            vehicle.check_late(now=now)
+
+    def is_old_news(self, *, now: float) -> bool:
+        """Whether what is read now may have waited while this process stood still."""
+        return now < self._old_until
+
+    def next_deadline(self) -> float:
+        """Give when ``handle_deadline`` has something to do; inf: never, as things are."""
+        heartbeats = [link.heartbeat.next_deadline() for link in self._links.values()]
+        return min(self._agenda.next_deadline(), *heartbeats, inf)
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Send heartbeats and let each vehicle do what is due."""
+        source = self.our_address
+        for link in self._links.values():
+            if link.heartbeat.is_due(now=now):
+                for outlet in link.outlets.values():
+                    outlet.send(gcs_heartbeat(), source)
+        for system_id in self._agenda.take_due(now=now):
+            vehicle = self.get(system_id)
+            if vehicle is not None:
+                vehicle.handle_deadline(now=now)
+
+    @property
+    def our_address(self) -> Address:
+        """As whom the server speaks to vehicles."""
+        identity = self._settings.identity
+        return Address(identity.system_id, identity.component_id)
+
+    def _outlet(self, link: str, peer: Peer) -> Outlet:
+        outlet = self._outlets.get((link, peer))
+        if outlet is None:
+            outlet = self._outlets[link, peer] = Outlet(
+                link, peer, self._queue, self._packer, self._signatures
+            )
+        return outlet
+
+    def _meet(
+        self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
+    ) -> Vehicle | None:
+        """A first heartbeat: from an autopilot that we can drive, it is a new vehicle."""
+        if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
+            return None
+        if packet.system_id in (0, self.our_address.system_id):
+            return None  # 0 would address every vehicle, and our own id is no vehicle's
+        if heartbeat.type not in DRIVEN:  # others mean other things by the same mode numbers
+            words = f"a vehicle of type {heartbeat.type} is no rover: not driven"
+            self._note_once(packet.system_id, words, now=now)
+            return None
+        honours = self._settings.yaw_rate == "honoured"
+        persona = persona_of(heartbeat, honours_yaw_rate=honours)
+        if persona is None:
+            self._note_once(
+                packet.system_id,
+                f"autopilot {heartbeat.autopilot} is not supported in this version",
+                now=now,
+            )
+            return None
+        link = self._links[link_name]
+        outlet = link.outlets.get(peer)
+        if outlet is None:
+            if len(link.outlets) >= MAX_PEERS:
+                return None
+            outlet = link.outlets[peer] = self._outlet(link_name, peer)
+            outlet.send(gcs_heartbeat(), self.our_address)
+        self._router.learn(packet.system_id, (link_name, peer))
+        vehicle = Vehicle(
+            packet.system_id,
+            heartbeat=heartbeat,
+            persona=persona,
+            outlet=outlet,
+            book=self._book,
+            tasks=self._fleet.of(packet.system_id),
+            settings=self._settings,
+            may_arm=self._may_arm(link),
+            now=now,
+        )
+        self._vehicles[packet.system_id] = vehicle
+        self._agenda.touch(vehicle)
+        self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
+        vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
+        vehicle.step(now=now)
+        return vehicle
+
+    def _may_arm(self, link: _Link) -> bool:
+        arming = self._settings.arming
+        return arming == "server" or (arming == "auto" and link.is_local)
+
+    def _moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
+        """Whether a vehicle that fell silent is back at another place; two are not mixed.
+
+        One that was there while the vehicle itself still was is another one, for good.
+        """
+        rival = vehicle.system_id, link, peer
+        if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
+            del self._rivals[next(iter(self._rivals))]
+        is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
+        old = self._router.place_of(vehicle.system_id)
+        if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
+            words = f"one of this id at {peer} has no key, this one had: ignored"
+            self._note_once(vehicle.system_id, words, now=now)
+            return False
+        if is_another or (old not in self._left and vehicle.is_heard(now=now)):
+            self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
+            return False
+        outlets, may_arm = self._links[link].outlets, self._may_arm(self._links[link])
+        if peer not in outlets and len(outlets) >= MAX_PEERS:
+            return False
+        del self._rivals[rival]
+        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
+        self._router.learn(vehicle.system_id, (link, peer))
+        self._forget_if_empty(old)
+        self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
+        return True
+
+    def _forget_if_empty(self, place: Place | None) -> None:
+        """Keep nothing of a place that was left, unless a vehicle may still come back to it."""
+        if place in self._left and all(
+            self._router.place_of(vehicle.system_id) != place for vehicle in self
+        ):
+            self._left.discard(place)
+            self._outlets.pop(place, None)
+
+    def _is_intruder(self, packet: Packet) -> bool:
+        return packet.source == self.our_address or packet.message_id in SETPOINTS
+
+    def _note_intruder(
+        self, link: str, packet: Packet, message: m.Message | None, *, now: float
+    ) -> None:
+        """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
+        target = getattr(message, "target_system", 0)
+        for vehicle in self:
+            place = self._router.place_of(vehicle.system_id)
+            if target in (0, vehicle.system_id) and place is not None and place[0] == link:
+                self._agenda.touch(vehicle)
+                vehicle.second_controller(packet.source, now=now)
+
+    def _note_once(self, system_id: int, text: str, *, now: float) -> None:
+        key = f"{system_id} {text}"
+        if key not in self._noted and len(self._noted) < MAX_PEERS:
+            self._noted.add(key)
+            self._book.record(VehicleNoted(system_id, text, now))

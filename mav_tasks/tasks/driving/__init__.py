@@ -1,0 +1,1 @@
+"""How a rover gets from where it is to where it is to be: geometry and closed loop, all pure."""

@@ -1,0 +1,38 @@
+"""Whether a vehicle's position or heading has moved further than it can have driven or turned."""
+
+from math import radians
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.driving.guidance import Motion, wrap
+
+JUMP = 2.0  # m, beyond what the vehicle can have driven meanwhile
+TURN = radians(45)  # rad, the same of a heading
+
+
+class JumpWatch:
+    """The last pose of one vehicle."""
+
+    def __init__(self) -> None:
+        self._last: Motion | None = None
+
+    @property
+    def last(self) -> Motion | None:
+        """Where it was at the last look."""
+        return self._last
+
+    def has_jumped(self, motion: Motion | None, *, driving: Driving) -> bool:
+        """Look at the present pose; whether nobody can have driven or turned there."""
+        last = self._last
+        if motion is None or motion is last:
+            return False
+        self._last = motion
+        if last is None:
+            return False
+        elapsed = max(0.0, motion.at - last.at)
+        north = motion.pose.north - last.pose.north
+        east = motion.pose.east - last.pose.east
+        reach = JUMP + 2 * driving.max_speed * elapsed
+        turned = abs(wrap(motion.pose.yaw - last.pose.yaw))
+        if turned > TURN + 2 * driving.max_turn_rate * elapsed:
+            return True
+        return north * north + east * east > reach * reach

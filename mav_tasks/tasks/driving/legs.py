@@ -1,0 +1,135 @@
+"""What a goal comes down to: one leg after another, each counted from its own anchor.
+
+A leg is a goal that ``guidance`` can steer. The legs follow from the goal, from where the task was
+when each began (``Progress.anchor``) and from the place that was meant (``Progress.target``), so
+that a resumed task drives the very same ones.
+"""
+
+from dataclasses import replace
+from math import atan2, copysign, cos, hypot, pi, sin, tau
+
+from mav_tasks.tasks.driving.guidance import Leg, wrap
+from mav_tasks.tasks.driving.path import Follow, path_length
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    GoTo,
+    Head,
+    LocalPlace,
+    Move,
+    MoveTurned,
+    Rotate,
+    SingleGoal,
+    Wait,
+)
+from mav_tasks.tasks.task import Pose, Progress
+
+#: the legs of a GoTo: face the place (as a car: drive to where the last run to it begins), drive
+#: there, then what else was asked for
+FACE, WAY = range(2)
+
+
+def leg_count(goal: SingleGoal) -> int:
+    """Give the number of a goal's legs."""
+    if isinstance(goal, GoTo):
+        return 2 + (goal.yaw is not None) + (goal.wait > 0)
+    return 3 if isinstance(goal, MoveTurned) else 1
+
+
+def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
+    """Give the pose from which a leg that begins at ``pose`` counts."""
+    if isinstance(goal, GoTo) and leg == WAY:
+        assert target is not None, "the place was found before the task began"
+        return replace(pose, yaw=bearing(pose, target))
+    return pose
+
+
+def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
+    """Give the leg that is being driven."""
+    anchor = progress.anchor
+    assert anchor is not None, "a leg is driven from its anchor"
+    match goal:
+        case Move() | Rotate() | Drive() | Wait():
+            return goal
+        case MoveTurned(distance=distance, speed=speed):
+            return Move(distance, speed) if progress.leg == WAY else Rotate(pi)
+        case Head():
+            return (
+                replace(goal, yaw=wrap(anchor.yaw + goal.yaw), is_relative=False)
+                if (goal.is_relative)
+                else goal
+            )
+        case Face(yaw=yaw, direction=direction, rate=rate):
+            return Rotate(_turn(anchor.yaw, yaw, direction), rate)
+        case GoTo():
+            return _leg_of_way(goal, progress, anchor)
+
+
+def first_leg(goal: SingleGoal) -> Leg | None:
+    """Give the first leg of a task that has not begun, if its size can be known by then."""
+    return goal if isinstance(goal, Move | Rotate | Drive | Wait | Head) else None
+
+
+def length_of(leg: Leg) -> float:
+    """Give the whole of a leg, unsigned: metres, radians or seconds."""
+    match leg:
+        case Move(distance=distance):
+            return abs(distance)
+        case Rotate(angle=angle):
+            return abs(angle)
+        case Follow(path=path):
+            return path_length(path)
+        case Drive(duration=duration) | Head(duration=duration) | Wait(duration=duration):
+            return duration
+
+
+def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
+    """Give the anchor of a goal of which ``done`` is behind a vehicle that stands at ``pose``.
+
+    For what is continued from here, because where it began can no longer be said.
+    """
+    match goal:
+        case Move(distance=distance):
+            back = -copysign(done, distance)
+            return replace(
+                pose,
+                north=pose.north + back * cos(pose.yaw),
+                east=pose.east + back * sin(pose.yaw),
+            )
+        case Rotate(angle=angle):
+            return replace(pose, yaw=wrap(pose.yaw - copysign(done, angle)))
+        case _:
+            return pose
+
+
+def bearing(pose: Pose, place: LocalPlace) -> float:
+    """Give the direction of a place; where the vehicle already is, its own heading."""
+    if distance(pose, place) < 1e-6:
+        return pose.yaw
+    return atan2(place.east - pose.east, place.north - pose.north)
+
+
+def distance(pose: Pose, place: LocalPlace) -> float:
+    """Give the metres from a pose to a place."""
+    return hypot(place.north - pose.north, place.east - pose.east)
+
+
+def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
+    if progress.leg <= WAY:
+        assert progress.target is not None, "the place was found before the task began"
+        if progress.path:
+            return Follow(progress.path, goal.speed)
+        if progress.leg == FACE:
+            return Rotate(wrap(bearing(anchor, progress.target) - anchor.yaw))
+        return Move(distance(anchor, progress.target), goal.speed)
+    if progress.leg == WAY + 1 and goal.yaw is not None:
+        return Rotate(_turn(anchor.yaw, goal.yaw, 0))
+    return Wait(goal.wait)
+
+
+def _turn(have: float, want: float, direction: int) -> float:
+    """Give the angle from one heading to another: the shorter way, or the way that is asked for."""
+    short = wrap(want - have)
+    if direction == 0 or short * direction >= 0 or abs(abs(short) - pi) < 1e-9:
+        return copysign(short, direction) if direction else short
+    return short + direction * tau

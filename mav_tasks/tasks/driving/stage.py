@@ -1,0 +1,176 @@
+"""One stage of a task, a single goal or a step of a plan: how it begins, and what is done on it."""
+
+from dataclasses import dataclass, replace
+from math import inf, radians
+
+from mav_tasks.settings import Driving, Turning
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.course import Course
+from mav_tasks.tasks.driving.follow import bend_speed
+from mav_tasks.tasks.driving.guidance import Motion, corner_speed, wrap
+from mav_tasks.tasks.driving.itinerary import begun, goes_on_to_a_place, present_goal
+from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, bearing, begun_from, distance
+from mav_tasks.tasks.driving.path import path_length, pose_on
+from mav_tasks.tasks.driving.planner import Steering, set_out_to
+from mav_tasks.tasks.driving.way_back import resumed
+from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, LocalPlace, Near, Perform, Plan, SetSpeed
+from mav_tasks.tasks.scheduler import place_of
+from mav_tasks.tasks.task import Pose, Progress
+from mav_tasks.tasks.view import VehicleView
+
+#: rad; a car that has to turn by more stops first: it may be shorter to reverse
+ROLLING_TURN = radians(100)
+ROLLING = 0.05  # m/s; a vehicle that is faster goes on to its next place without stopping
+
+
+@dataclass(frozen=True, slots=True)
+class OnTheWay:
+    """What of the steps on the way has been done in one look."""
+
+    progress: Progress
+    done: tuple[int, ...] = ()
+    performed: tuple[int, ...] = ()  # of those, commands to the vehicle
+
+
+def steering_of(seen: VehicleView, bounds: Bounds) -> Steering | None:
+    """Give what ways of a car are made of; None for a vehicle that turns on the spot."""
+    if seen.turning is not Turning.STEERED:
+        return None
+    return Steering(seen.turning_radius, seen.honours_yaw_rate, bounds.local(seen.origin))
+
+
+def set_out(
+    goal: Goal,
+    progress: Progress,
+    seen: VehicleView,
+    motion: Motion,
+    *,
+    steering: Steering | None = None,
+) -> Progress | None:
+    """Give the progress with which a task goes on, or begins, here; None: its place is unknown.
+
+    ``steering`` of a vehicle that steers as a car.
+    """
+    if isinstance(goal, Plan) and progress.step < 0:
+        progress = begun(goal, progress)
+    single = present_goal(goal, progress)
+    turns_first = seen.honours_yaw_rate and steering is None
+    if progress.anchor is not None:
+        return resumed(single, progress, motion, turns_first=turns_first, steering=steering)
+    if not isinstance(single, GoTo):
+        done = 0.0 if isinstance(single, Face) else progress.done  # it means a heading, not a way
+        anchor = begun_from(single, anchor_of(single, 0, motion.pose, None), done)
+        begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=0, done=done)
+        return replace(begun_here, target=None, path=())
+    target = place_of(single, seen)
+    if target is None:
+        return None
+    if steering is not None:
+        placed = replace(progress, frame=seen.frame, target=target)
+        return set_out_to(placed, motion.pose, target, steering)
+    is_rolling = motion.speed > ROLLING and _bends_gently(motion, target)
+    leg = WAY if is_rolling or not turns_first else FACE
+    anchor = anchor_of(single, leg, motion.pose, target)
+    begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=leg, done=0.0)
+    return replace(begun_here, target=target, path=())
+
+
+def may_go_on_rolling(
+    goal: Goal,
+    progress: Progress,
+    seen: VehicleView,
+    motion: Motion,
+    *,
+    steering: Steering | None = None,
+) -> bool:
+    """Whether a stage can begin without standing first."""
+    single = present_goal(goal, progress)
+    target = place_of(single, seen) if isinstance(single, GoTo) else None
+    if steering is not None and target is not None:
+        return set_out_to(progress, motion.pose, target, steering).leg == WAY
+    return target is not None and _bends_gently(motion, target)
+
+
+def _bends_gently(motion: Motion, target: LocalPlace) -> bool:
+    return corner_speed(_off(motion.pose, bearing(motion.pose, target)), lead=1.0) > 0.0
+
+
+def course_of(
+    goal: Goal,
+    progress: Progress,
+    seen: VehicleView,
+    *,
+    driving: Driving,
+    steering: Steering | None = None,
+) -> Course:
+    """Give the course of the present stage, which may lead on to the next place."""
+    single = present_goal(goal, progress)
+    by_course = not seen.honours_yaw_rate
+    stopping = Course(single, progress, by_course=by_course, steering=steering)
+    if not (isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes):
+        return stopping
+    target, anchor = progress.target, progress.anchor
+    following = goes_on_to_a_place(goal, progress)
+    after = None if following is None else place_of(following, seen)
+    if after is None or target is None or anchor is None:
+        return stopping
+    here = Pose(target.north, target.east, bearing(anchor, target))
+    if progress.path:
+        here = replace(here, yaw=pose_on(anchor, progress.path, path_length(progress.path)).yaw)
+    within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
+    turn = _off(here, bearing(here, after))
+    speed = corner_speed(turn, lead=within)
+    if steering is not None:
+        speed = _speed_of_bend(turn, steering, driving)
+    return Course(
+        single,
+        progress,
+        passing=min(driving.max_speed, speed),
+        within=within,
+        by_course=by_course,
+        steering=steering,
+    )
+
+
+def _speed_of_bend(turn: float, steering: Steering, driving: Driving) -> float:
+    """Give the speed in m/s at which a car begins its turn to the next place; 0: it stops."""
+    return bend_speed(1 / steering.planned_radius, driving) if abs(turn) <= ROLLING_TURN else 0.0
+
+
+def _off(pose: Pose, yaw: float) -> float:
+    return wrap(yaw - pose.yaw)
+
+
+def look_on_the_way(
+    plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
+) -> OnTheWay:
+    """Do of the pending steps what can be done now.
+
+    ``to_place`` is the metres to the place that is driven to, None where none is; ``elapsed`` the
+    seconds since the last look.
+    """
+    done: list[int] = []
+    performed: list[int] = []
+    left_to_place = -inf if to_place is None else to_place
+    for number in progress.pending:
+        step = plan.steps[number]
+        match step:
+            case Delay(seconds=seconds):
+                waited = progress.pending_for + elapsed
+                if waited < seconds:
+                    progress = replace(progress, pending_for=waited)
+                    break
+                elapsed = waited - seconds
+                progress = replace(progress, pending_for=0.0)
+            case Near(distance=near) if left_to_place > near:
+                break
+            case SetSpeed(speed=speed):
+                progress = replace(progress, speed=speed)
+            case Perform():
+                performed.append(number)
+        done.append(number)
+        if performed:  # one at a time: the vehicle answers each
+            break
+    if done:
+        progress = replace(progress, pending=progress.pending[len(done) :])
+    return OnTheWay(progress, tuple(done), tuple(performed))

@@ -1,0 +1,134 @@
+"""Whether a vehicle that is told to move does: the same place for too long, or for too much asked.
+
+Two ways to see it: no progress towards the end of the leg, or, where a leg has no place to come
+nearer to, standing still while a velocity is asked for.
+"""
+
+from math import hypot, inf, pi, radians
+
+from mav_tasks.tasks.driving.course import Course
+from mav_tasks.tasks.driving.guidance import Motion, Velocity, is_far_off, wrap
+from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.goal import Move, Rotate
+from mav_tasks.tasks.task import Pose
+from mav_tasks.tasks.view import VehicleView
+
+PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
+FULL_TURNS = 2 * pi  # rad that it turns by itself towards its course, at the most; more is a circle
+TURNED = radians(5)  # rad, more is a turn on the spot, or in a bow, and it does follow
+LIVES = 1e-6  # m from one look to the next: an estimate that has not stopped
+SLOW = 0.3  # of the way that was asked for; more is motion
+BLIND = 1.0  # m or rad commanded without progress, or without motion: the same, but sooner
+
+
+SAID_AFTER = 1.5  # s of being asked to move without moving; the slowest rover began after 0.6
+LEAST_ASKED = 0.1  # m/s, slower is the approach of an end
+LEAST_PART = 0.1  # of the way that was asked for, or it stands
+
+
+class Follows:
+    """Whether a vehicle follows at all: said long before it is stuck, so that somebody can look."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+        self._from = Pose(0.0, 0.0, 0.0)
+        self._way = 0.0  # m asked for since then
+        self._is_said = False
+
+    def begin(self) -> None:
+        """Begin anew with another leg."""
+        self._since, self._is_said = None, False
+
+    def look(self, velocity: Velocity, motion: Motion, *, seconds: float, now: float) -> str:
+        """Return in words that it does not move, once each leg; "" otherwise."""
+        speed = abs(velocity.forward)
+        if speed < LEAST_ASKED:
+            self._since = None
+            return ""
+        if self._since is None:
+            self._since, self._from, self._way = now, motion.pose, 0.0
+        self._way += speed * seconds
+        here, there = motion.pose, self._from
+        went = hypot(here.north - there.north, here.east - there.east)
+        has_turned = abs(wrap(here.yaw - there.yaw)) > TURNED
+        if went > LEAST_PART * self._way or has_turned:
+            self._since = now if now - self._since > SAID_AFTER else self._since
+            return ""
+        if self._is_said or now - self._since < SAID_AFTER:
+            return ""
+        self._is_said = True
+        return f"asked for {speed:.1f} m/s, stands: look at its brake, speed gains, least speed"
+
+
+class StuckWatch:
+    """The memory of one stretch of driving."""
+
+    def __init__(self) -> None:
+        self._best_remaining = inf
+        self._progress_at = 0.0
+        self._commanded = 0.0  # m or rad, since the last progress
+        self._last = (0.0, 0.0)
+        self._course: float | None = None  # that it was told to drive in, if it was
+        self._turned = 0.0  # rad, by itself since the last progress
+        self._yaw: float | None = None  # when that was last looked at
+        self._pose: Pose | None = None  # at the last look
+
+    def begin(self, *, now: float) -> None:
+        """Begin anew: another leg, or nothing has been asked for yet."""
+        self._best_remaining = inf
+        self._progress_at = now
+        self._commanded = 0.0
+        self._last = (0.0, 0.0)
+        self._turned, self._yaw = 0.0, None
+
+    def commanded(self, velocity: Velocity, *, seconds: float) -> None:
+        """Take in what is asked of the vehicle for the next ``seconds``."""
+        self._last = (abs(velocity.forward) * seconds, abs(velocity.yaw_rate) * seconds)
+        self._course = velocity.course
+
+    def is_stuck(self, course: Course, seen: VehicleView, *, limit: float, now: float) -> bool:
+        """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
+        leg = course.leg
+        forward, turned = self._last
+        lives = self._lives(seen, has_one_try=course.has_one_try)
+        if self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS:
+            self._progressed(now)
+        if isinstance(leg, Move | Rotate | Follow):
+            if not lives:
+                self._commanded += turned if isinstance(leg, Rotate) else forward
+            left = abs(course.remaining)
+            if left < self._best_remaining - PROGRESS:
+                self._best_remaining = left
+                self._turned = 0.0
+                self._progressed(now)
+        elif not seen.still or not (forward or turned):
+            self._progressed(now)
+        elif not lives:
+            self._commanded += max(forward, turned)
+        return now - self._progress_at > limit or self._commanded > BLIND
+
+    def _lives(self, seen: VehicleView, *, has_one_try: bool) -> bool:
+        """Whether a rover hardly moves by an estimate that is never twice the same.
+
+        One that stands for seconds before its speed loop overcomes friction (PX4) is only slow; of
+        one whose estimate stands nobody knows what it does, and it soon counts as stuck. The
+        estimate of a car that is steered by course may go anywhere meanwhile, and holds it up.
+        """
+        before, self._pose = self._pose, None if seen.motion is None else seen.motion.pose
+        if before is None or self._pose is None:
+            return False
+        moved = hypot(self._pose.north - before.north, self._pose.east - before.east)
+        return moved > LIVES and (has_one_try or moved < SLOW * self._last[0])
+
+    def _turns_by_itself(self, seen: VehicleView) -> bool:
+        """Whether it was told to drive where it does not point yet."""
+        if self._course is None or seen.motion is None:
+            return False
+        yaw = seen.motion.pose.yaw
+        self._turned += abs(wrap(yaw - (yaw if self._yaw is None else self._yaw)))
+        self._yaw = yaw
+        return is_far_off(wrap(self._course - seen.motion.pose.yaw))
+
+    def _progressed(self, now: float) -> None:
+        self._progress_at = now
+        self._commanded = 0.0

@@ -1,0 +1,33 @@
+"""The links to clients."""
+
+from mav_tasks.engine.clients.gcs_side import MAX_LINK_NUMBER, GcsSide
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.inputs import LinkChanged, LinkSide
+from mav_tasks.mavlink.codec import Packer
+from mav_tasks.settings import Settings
+
+
+def side(*links: str) -> GcsSide:
+    made = GcsSide(
+        queue=[],
+        packer=Packer(),
+        signatures=Signatures(window=60.0),
+        settings=Settings(),
+        now=0.0,
+    )
+    for link in links:
+        made.change_link(LinkChanged(link, LinkSide.CLIENTS, up=True), now=0.0)
+    return made
+
+
+def test_links_are_numbered_as_they_came_and_keep_their_number() -> None:
+    gcs = side("one", "two")
+    gcs.change_link(LinkChanged("one", LinkSide.CLIENTS, up=False), now=1.0)
+    gcs.change_link(LinkChanged("three", LinkSide.CLIENTS, up=True), now=1.0)
+    gcs.change_link(LinkChanged("one", LinkSide.CLIENTS, up=True), now=2.0)
+    assert [gcs.link_number(name) for name in ("one", "two", "three", "other")] == [1, 2, 3, 0]
+
+
+def test_numbers_fit_their_field() -> None:
+    gcs = side(*(f"link{number}" for number in range(300)))
+    assert gcs.link_number("link299") == MAX_LINK_NUMBER

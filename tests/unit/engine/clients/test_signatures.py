@@ -1,0 +1,211 @@
+"""Whose a packet is, as the engine sees it; and what the store has to keep for that."""
+
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide
+from mav_tasks.mavlink.packet import Packet, split_datagram
+from mav_tasks.mavlink.signing import HIGHEST_TIMESTAMP, Key, timestamp_at, timestamp_of
+
+UTC = 1.8e9  # s
+NOW = timestamp_at(UTC)
+ANNA, BEN = Key("anna", b"a" * 32, "operator"), Key("ben", b"b" * 32, "safety")
+ROVER, OTHER = Key("r1", b"r" * 32), Key("r2", b"o" * 32)
+REVOKED = Key("anna", b"", "operator", ANNA.fingerprint)
+CLIENTS, VEHICLES = "clients", "vehicles"
+UNSIGNED_HEARTBEAT = bytes.fromhex("fd090000fa01bf0000000f0000000a03d10403deb7")
+
+
+def signatures(*keys: Key, clients: dict[str, Any] | None = None, **made: Any) -> Signatures:
+    """A server with a link for clients on which all is signed, and one to vehicles with a key."""
+    it = Signatures(window=60.0, **made)
+    it.set_wall(UTC)
+    it.change_keys(KeysChanged(keys or (ANNA, BEN, ROVER, OTHER)))
+    asked = {"takes_unsigned": False} | (clients or {})
+    it.change_link(LinkChanged(CLIENTS, LinkSide.CLIENTS, up=True, **asked))
+    it.change_link(
+        LinkChanged(VEHICLES, LinkSide.VEHICLES, up=True, takes_unsigned=False, key="r1")
+    )
+    return it
+
+
+def packet(
+    key: Key | None = ANNA,
+    *,
+    timestamp: int = NOW,
+    link_id: int = 1,
+    kind: str = "command",
+    v1: bool = False,
+) -> Packet:
+    """A packet by pymavlink."""
+    mav = common.MAVLink(None, srcSystem=255, srcComponent=190)
+    if key is not None:
+        mav.signing.secret_key, mav.signing.sign_outgoing = key.secret, True
+        mav.signing.link_id, mav.signing.timestamp = link_id, timestamp
+    made: Any = {
+        "command": common.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+        "heartbeat": common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+        "radio": common.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7),
+    }[kind]
+    (whole,) = split_datagram(made.pack(mav, force_mavlink1=v1))
+    return whole
+
+
+def counts(it: Signatures) -> tuple[int, int, int]:
+    return it.counts.unsigned, it.counts.unverified, it.counts.old
+
+
+def test_each_key_of_the_ring_is_known_by_its_signature() -> None:
+    it = signatures()
+    assert it.admit(CLIENTS, "p", packet(ANNA)) == ANNA
+    assert it.admit(CLIENTS, "p", packet(BEN)) == BEN
+    assert it.admit(CLIENTS, "q", packet(ANNA, timestamp=NOW + 1)) == ANNA
+    assert counts(it) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("v1", [False, True])
+def test_unsigned_packets_are_taken_where_that_is_allowed(v1: bool) -> None:
+    bare = packet(None, v1=v1)
+    assert signatures().admit(CLIENTS, "p", bare) is None
+    assert signatures(clients={"takes_unsigned": True}).admit(CLIENTS, "p", bare) is UNSIGNED
+
+
+def test_a_mavlink_1_packet_of_who_signs_is_none_of_his() -> None:
+    it = signatures()
+    assert it.admit(CLIENTS, "p", packet(ANNA)) == ANNA
+    assert it.admit(CLIENTS, "p", packet(None, v1=True)) is None
+    assert counts(it) == (1, 0, 0)
+
+
+def test_radios_of_vehicles_speak_unsigned() -> None:
+    """A client's says nothing to a rover, and would make whoever sends one a client."""
+    radio = packet(None, kind="radio")
+    assert signatures().admit(VEHICLES, "p", radio) is UNSIGNED
+    assert signatures().admit(CLIENTS, "p", radio) is None
+
+
+@pytest.mark.parametrize("key", [ROVER, OTHER, Key("x", b"x" * 32, "safety")])
+def test_what_is_signed_with_no_clients_key_is_unknown(key: Key) -> None:
+    for takes_unsigned in (False, True):
+        it = signatures(clients={"takes_unsigned": takes_unsigned})
+        assert it.admit(CLIENTS, "p", packet(key)) is None
+        assert counts(it) == (0, 1, 0)
+
+
+@pytest.mark.parametrize("key", [ANNA, BEN, OTHER, None])
+def test_on_a_link_to_vehicles_only_its_own_key_counts(key: Key | None) -> None:
+    it = signatures()
+    assert it.admit(VEHICLES, "rover", packet(ROVER)) == ROVER
+    assert it.admit(VEHICLES, "rover", packet(key, timestamp=NOW + 1)) is None
+
+
+def test_the_same_bytes_are_no_news_wherever_they_come_from() -> None:
+    it = signatures()
+    raw = packet()
+    assert it.admit(CLIENTS, "p", raw) == ANNA
+    assert [it.admit(CLIENTS, peer, raw) for peer in ("p", "attacker")] == [None, None]
+    assert counts(it) == (0, 0, 2)
+
+
+def test_nor_after_a_restart_on_what_the_store_has() -> None:
+    it = signatures()
+    raw = packet()
+    it.admit(CLIENTS, "p", raw)
+    seen = it.take_times()
+    assert seen is not None, "at once: before the command is answered"
+    again = signatures(times=seen.times, signed_until=seen.signed_until)
+    assert again.admit(CLIENTS, "p", raw) is None
+    assert again.admit(CLIENTS, "p", packet(timestamp=NOW + 1)) == ANNA
+
+
+def test_what_comes_often_is_kept_once_a_second() -> None:
+    it = signatures()
+    it.admit(CLIENTS, "p", packet(kind="heartbeat"))
+    it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
+    it.take_times()  # of its own times it keeps a reserve, at once
+    it.admit(CLIENTS, "p", packet(kind="heartbeat", timestamp=NOW + 1))
+    assert (it.take_times(), it.next_deadline()) == (None, 1.0)
+    it.now = 1.0
+    seen = it.take_times()
+    assert seen is not None
+    assert [time.timestamp for time in seen.times] == [NOW + 1]
+    assert it.next_deadline() is None
+
+
+def test_who_signs_is_answered_with_his_key_and_in_his_time() -> None:
+    it = signatures()
+    ahead = NOW + 500
+    it.admit(CLIENTS, "p", packet(timestamp=ahead))
+    (sealed,) = split_datagram(it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT))
+    assert timestamp_of(sealed) > ahead
+    assert it.sealed(CLIENTS, "q", UNSIGNED_HEARTBEAT) == UNSIGNED_HEARTBEAT
+
+
+def test_each_end_is_signed_to_later_than_before_also_after_a_restart_with_the_clock_back() -> None:
+    it = signatures()
+    sent = [it.sealed(VEHICLES, "rover", UNSIGNED_HEARTBEAT) for _ in range(3)]
+    seen = it.take_times()
+    assert seen is not None
+    again = signatures(times=seen.times, signed_until=seen.signed_until)
+    again.set_wall(UTC - 3600.0)
+    sent.append(again.sealed(VEHICLES, "rover", UNSIGNED_HEARTBEAT))
+    times = [timestamp_of(split_datagram(each)[0]) for each in sent]
+    assert times == sorted(set(times))
+
+
+def test_a_holder_of_a_key_cannot_lead_the_servers_time_away() -> None:
+    """Or else what others hear would be of one time for ever, and so no news to them."""
+    it = signatures()
+    assert it.admit(CLIENTS, "p", packet(timestamp=HIGHEST_TIMESTAMP)) == ANNA
+    it.admit(CLIENTS, "q", packet(BEN))
+    for _ in range(3):
+        it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)  # it does not fail
+    to_ben = [it.sealed(CLIENTS, "q", UNSIGNED_HEARTBEAT) for _ in range(2)]
+    seen = it.take_times()
+    assert seen is not None
+    assert seen.signed_until < NOW + 3600 * 100_000
+    again = signatures(times=seen.times, signed_until=seen.signed_until)
+    again.admit(CLIENTS, "q", packet(BEN, timestamp=NOW + 1))
+    to_ben += [again.sealed(CLIENTS, "q", UNSIGNED_HEARTBEAT) for _ in range(2)]
+    times = [timestamp_of(split_datagram(each)[0]) for each in to_ben]
+    assert times == sorted(set(times))
+
+
+def test_a_revoked_key_is_unknown_and_nothing_is_signed_with_it() -> None:
+    it = signatures()
+    it.admit(CLIENTS, "p", packet())
+    it.change_keys(KeysChanged((REVOKED, BEN)))
+    assert not it.knows(ANNA)
+    assert it.admit(CLIENTS, "p", packet(timestamp=NOW + 1)) is None
+    assert it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT) == UNSIGNED_HEARTBEAT
+    assert counts(it) == (0, 1, 0)
+
+
+def test_what_a_key_has_signed_is_no_news_when_it_comes_back() -> None:
+    it = signatures()
+    raw = packet()
+    it.admit(CLIENTS, "p", raw)
+    it.change_keys(KeysChanged((BEN,)))
+    it.change_keys(KeysChanged((ANNA, BEN)))
+    assert it.admit(CLIENTS, "p", raw) is None
+
+
+def test_the_link_s_own_key_signs_to_who_has_not_signed_yet() -> None:
+    it = signatures(clients={"takes_unsigned": True, "key": "anna"})
+    (sealed,) = split_datagram(it.sealed(CLIENTS, "pushed to", UNSIGNED_HEARTBEAT))
+    assert sealed.is_signed
+    it.admit(CLIENTS, "pushed to", packet(BEN))
+    again = it.sealed(CLIENTS, "pushed to", UNSIGNED_HEARTBEAT)
+    assert again[10:21] == sealed.raw[10:21]
+    assert again != sealed.raw
+
+
+def test_no_repr_has_a_secret() -> None:
+    it = signatures()
+    it.admit(CLIENTS, "p", packet())
+    for key in (ANNA, BEN, ROVER):
+        assert key.secret.hex() not in repr(it)
+        assert repr(key.secret) not in repr(it)

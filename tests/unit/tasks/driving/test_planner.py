@@ -1,0 +1,137 @@
+"""Ways for a vehicle that steers as a car: they end where they should, and turn no tighter."""
+
+from math import cos, hypot, pi, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
+from mav_tasks.tasks.driving.guidance import wrap
+from mav_tasks.tasks.driving.path import Path, beside, nearest, path_length, pose_on, runs_of
+from mav_tasks.tasks.driving.planner import SPARE, Steering, is_allowed, way_to, way_to_pose
+from mav_tasks.tasks.frames import to_global
+from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
+from mav_tasks.tasks.task import Pose
+
+RADIUS = 1.5
+CAR = Steering(RADIUS, reverses=True)
+FORWARD_ONLY = Steering(RADIUS, reverses=False)
+EARTH = GlobalPlace(473977420, 85455940)
+HERE = Pose(0.0, 0.0, 0.0)
+
+metres = st.floats(-20, 20)
+angles = st.floats(-pi, pi)
+poses = st.builds(Pose, metres, metres, angles)
+places = st.builds(LocalPlace, metres, metres)
+
+
+def end_of(pose: Pose, way: Path) -> Pose:
+    for run in runs_of(way):
+        pose = pose_on(pose, run, path_length(run))
+    return pose
+
+
+def is_drivable(way: Path, *, reverses: bool) -> bool:
+    limit = 1 / (SPARE * RADIUS) + 1e-9
+    return all(abs(b.curvature) <= limit and (reverses or b.length > 0) for b in way)
+
+
+def yard(*corners: tuple[float, float]) -> LocalFence:
+    zone = Polygon(tuple(to_global(LocalPlace(*c), EARTH) for c in corners), is_inclusion=True)
+    return LocalFence(Fence((zone,)), EARTH)
+
+
+def box(south: float, west: float, north: float, east: float) -> LocalFence:
+    return yard((south, west), (south, east), (north, east), (north, west))
+
+
+@given(poses, places, st.booleans())
+def test_a_way_ends_at_its_place_and_turns_no_tighter_than_the_vehicle(
+    pose: Pose, place: LocalPlace, reverses: bool
+) -> None:
+    way = way_to(pose, place, Steering(RADIUS, reverses))
+    assert way is not None
+    end = end_of(pose, way)
+    assert hypot(end.north - place.north, end.east - place.east) < 2e-3
+    assert is_drivable(way, reverses=reverses)
+    assert way[-1].length > 0, "it comes to a place forwards"
+
+
+@given(poses, poses, st.booleans())
+def test_a_way_to_a_pose_ends_with_its_heading(pose: Pose, goal: Pose, reverses: bool) -> None:
+    way = way_to_pose(pose, goal, Steering(RADIUS, reverses))
+    assert way is not None
+    end = end_of(pose, way)
+    assert hypot(end.north - goal.north, end.east - goal.east) < 2e-3
+    assert abs(wrap(end.yaw - goal.yaw)) < 2e-3
+    assert is_drivable(way, reverses=reverses)
+    assert len(runs_of(way)) == 1
+
+
+def test_what_lies_ahead_is_driven_to_straight() -> None:
+    way = way_to(HERE, LocalPlace(5.0, 0.0), CAR)
+    assert way is not None
+    assert [bend.curvature for bend in way] == [0.0]
+    assert path_length(way) == pytest.approx(5.0)
+
+
+def test_what_lies_far_behind_is_turned_to_on_an_arc() -> None:
+    way = way_to(HERE, LocalPlace(-10.0, 4.0), CAR)
+    assert way is not None
+    assert [bend.curvature > 0 for bend in way] == [True, False]
+
+
+def test_a_place_beside_it_is_reached_by_reversing_or_by_a_loop() -> None:
+    beside_it = LocalPlace(0.0, 1.0)
+    backing, loop = way_to(HERE, beside_it, CAR), way_to(HERE, beside_it, FORWARD_ONLY)
+    assert backing is not None
+    assert loop is not None
+    assert [run[0].length < 0 for run in runs_of(backing)] == [True, False]
+    assert path_length(loop) > pi * RADIUS
+
+
+def test_a_loop_that_leaves_the_fence_becomes_a_turn_with_reversing() -> None:
+    alley, behind = box(-8.0, -1.6, 8.0, 1.6), LocalPlace(-6.0, 0.0)
+    assert way_to(HERE, behind, Steering(RADIUS, reverses=False, fence=alley)) is None
+    way = way_to(HERE, behind, Steering(RADIUS, reverses=True, fence=alley))
+    assert way is not None
+    assert len(runs_of(way)) > 1
+    assert is_allowed(HERE, way, alley)
+
+
+def test_a_bend_keeps_clear_of_the_fence_where_it_can() -> None:
+    zone = Circle(to_global(LocalPlace(2.0, 1.725), EARTH), 0.1, is_inclusion=False)
+    fence = LocalFence(Fence((zone,)), EARTH)
+    place = LocalPlace(0.0, 5.0)
+    bold, careful = (
+        way_to(HERE, place, FORWARD_ONLY),
+        way_to(HERE, place, Steering(RADIUS, reverses=False, fence=fence)),
+    )
+    assert bold is not None
+    assert careful is not None
+    assert is_allowed(HERE, careful, fence, clear=0.3)
+    assert not is_allowed(HERE, bold, fence, clear=0.3)
+
+
+def test_from_outside_the_fence_a_way_leads_in_and_stays() -> None:
+    fence = box(2.0, -10.0, 20.0, 10.0)
+    way = way_to(HERE, LocalPlace(6.0, 3.0), Steering(RADIUS, reverses=True, fence=fence))
+    assert way is not None
+    assert is_allowed(HERE, way, fence)
+    assert way_to(HERE, LocalPlace(-6.0, 0.0), Steering(RADIUS, True, fence)) is None
+
+
+@given(poses, places, st.floats(0, 1), st.floats(-0.4, 0.4))
+def test_a_vehicle_beside_its_path_is_found_on_it(
+    pose: Pose, place: LocalPlace, share: float, right: float
+) -> None:
+    way = way_to(pose, place, FORWARD_ONLY)
+    assert way is not None
+    along = share * path_length(way)
+    on = pose_on(pose, way, along)
+    seen = Pose(on.north - right * sin(on.yaw), on.east + right * cos(on.yaw), on.yaw)
+    found = nearest(pose, way, seen, around=along)
+    there = pose_on(pose, way, found)
+    assert hypot(there.north - seen.north, there.east - seen.east) <= abs(right) + 1e-9
+    assert abs(beside(pose, way, seen, found)) <= abs(right) + 1e-9
