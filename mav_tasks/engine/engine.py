@@ -5,6 +5,7 @@ journal what happened and ``take_packets`` the links what to send. Time comes in
 monotonic seconds, never going back.
 """
 
+from collections.abc import Iterable
 from math import inf
 from typing import assert_never
 
@@ -22,8 +23,10 @@ from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.commands.asked import AskedByMessage
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.ordering import Kind, kind_of_message
 from mav_tasks.engine.commands.passing import Passing
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
@@ -36,6 +39,7 @@ from mav_tasks.engine.inputs import (
     LinkSide,
     Outgoing,
     Packets,
+    Peer,
     PeerChanged,
     SettingsChanged,
     Shutdown,
@@ -50,6 +54,7 @@ from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
+from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
@@ -274,12 +279,11 @@ class Engine:
             return
         counts = self._vehicles.counts if from_vehicles else self._gcs.counts
         let_in = self._gates.let_in(item, now=now)
-        for peer, packet in self._intake.packets(let_in, counts, now=now):
-            if not from_vehicles:
-                received = self._gcs.receive(item.link, peer, packet, now=now)
-                if received is not None:
-                    self._receive_from_client(received, now=now)
-                continue
+        packets = self._intake.packets(let_in, counts, now=now)
+        if not from_vehicles:
+            self._receive_from_clients(item.link, packets, now=now)
+            return
+        for peer, packet in packets:
             vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
             if vehicle is not None:
                 if self._restarts.begins_anew(packet, now=now):
@@ -288,6 +292,34 @@ class Engine:
                     self._publisher.withhold(packet)
                 else:
                     self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
+
+    def _receive_from_clients(
+        self, link: str, packets: Iterable[tuple[Peer, Packet]], *, now: float
+    ) -> None:
+        """Take in what came at one moment: what makes a rover stand comes first."""
+        taken = (self._gcs.receive(link, peer, packet, now=now) for peer, packet in packets)
+        received = [each for each in taken if each is not None]
+        if len(received) > 1:
+            received = self._halts_first(received)
+        for each in received:
+            self._gcs.hear_out(each, now=now)
+            self._receive_from_client(each, now=now)
+
+    def _halts_first(self, received: list[Received]) -> list[Received]:
+        """Put what lets a rover go behind what makes one stand; all else keeps its order."""
+        kinds = [self._kind_of(each.message) for each in received]
+        if Kind.HALT not in kinds or Kind.GO not in kinds:
+            return received
+        going = [each for each, kind in zip(received, kinds, strict=True) if kind is Kind.GO]
+        return [
+            *(each for each, kind in zip(received, kinds, strict=True) if kind is not Kind.GO),
+            *going,
+        ]
+
+    def _kind_of(self, message: m.Message | None) -> Kind:
+        target = getattr(message, "target_system", 0)
+        vehicle = self._vehicles.look_at(target) if target else next(iter(self._vehicles), None)
+        return Kind.OTHER if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
@@ -306,7 +338,9 @@ class Engine:
         elif isinstance(message, m.SetMode):
             vehicle = self._vehicles.get(message.target_system)
             if vehicle is not None:
-                self._modes.heard(client, vehicle, packet, int(message.custom_mode), now=now)
+                asked = AskedByMessage.of(client, vehicle, packet, int(message.custom_mode))
+                is_old = self._vehicles.is_old_news(now=now)
+                self._modes.heard(asked, is_old=is_old, now=now)
         elif isinstance(message, m.RequestDataStream):
             self._displays.set_streams(client, message)
         elif isinstance(message, m.SetupSigning):

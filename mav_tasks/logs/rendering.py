@@ -22,6 +22,7 @@ from mav_tasks.tasks.events import (
     SubmissionRefused,
     TaskProgressed,
     TaskSubmitted,
+    VehicleHalted,
     VehicleNoted,
 )
 from mav_tasks.tasks.goal import Goal, Place
@@ -60,8 +61,8 @@ def event_values(event: Event, *, offset: float) -> dict[str, Any]:
 
 def level_of(event: Event) -> int:
     """Give the log level of an event: what its operator should look at is a warning."""
-    if isinstance(event, SignaturesSeen | TaskProgressed):
-        return logging.DEBUG  # no part of the journal either
+    if isinstance(event, SignaturesSeen | TaskProgressed | VehicleHalted):
+        return logging.DEBUG  # beside what else is told of it
     noteworthy = isinstance(event, SubmissionRefused | VehicleNoted | QueuePaused)
     return logging.WARNING if noteworthy else logging.INFO
 

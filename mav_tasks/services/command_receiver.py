@@ -32,6 +32,10 @@ class Command(NamedTuple):
     message: CommandLong | CommandInt
 
 
+#: of a command that came in none, and to make one for each takes its time
+NO_MESSAGE = CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
 def command_of(message: CommandLong | CommandInt) -> Command:
     """Give the command that a message carries."""
     target = Address(message.target_system, message.target_component)

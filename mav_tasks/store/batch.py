@@ -17,6 +17,7 @@ from mav_tasks.tasks.events import (
     TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
+    VehicleHalted,
     VehicleHomeSet,
     VehicleIdentified,
     VehicleSpeedSet,
@@ -103,6 +104,8 @@ class Batch:
                 self.vehicles["paused", event.vehicle] = event.reason
             case QueueContinued():
                 self.vehicles["paused", event.vehicle] = None
+            case VehicleHalted():
+                self.vehicles["halt_epoch", event.vehicle] = event.epoch
             case VehicleIdentified():
                 self.vehicles["uid", event.vehicle] = event.uid
             case VehicleHomeSet():

@@ -55,6 +55,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE meta ADD COLUMN signed_until INTEGER NOT NULL DEFAULT 0",
     ),
     ("ALTER TABLE vehicles ADD COLUMN home TEXT",),  # the event that said where it is
+    ("ALTER TABLE vehicles ADD COLUMN halt_epoch INTEGER",),
 )
 
 

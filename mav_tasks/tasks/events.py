@@ -213,6 +213,24 @@ class QueueContinued:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleHalted:
+    """Something made a vehicle stand, or would have: ``epoch`` counts these.
+
+    What lets it go on has to be newer than the last one.
+    """
+
+    vehicle: int
+    epoch: int
+    reason: TaskReason
+    actor: str
+    at: float
+
+    def __str__(self) -> str:
+        words = f"vehicle {self.vehicle}: halt {self.epoch}, {words_of(self.reason)}"
+        return words if self.actor == SERVER else f"{words}, by {self.actor}"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleIdentified:
     """The vehicle behind a system id has told its unique id (AUTOPILOT_VERSION)."""
 
@@ -357,6 +375,7 @@ Event = (
     | SubmissionRefused
     | QueuePaused
     | QueueContinued
+    | VehicleHalted
     | VehicleIdentified
     | VehicleSpeedSet
     | VehicleHomeSet

@@ -41,7 +41,7 @@ class Fleet:
             tasks = VehicleTasks(vehicle, self._book, self.room, self._settings)
             self._of[vehicle] = tasks
             if self._comes_up_paused:
-                tasks.restore((), paused=R.RESTARTED, speed=None, uid="")
+                tasks.restore((), paused=R.RESTARTED, speed=None, uid="", now=self._began_at)
                 self._book.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self._began_at))
         return tasks
 
@@ -78,6 +78,7 @@ class Fleet:
         pauses = self._settings.on_restart == "pause"
         self._began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
+        of_note |= restored.halt_epochs.keys()
         for vehicle in begun.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
@@ -91,6 +92,8 @@ class Fleet:
                 paused=paused,
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),
+                halt_epoch=restored.halt_epochs.get(vehicle, 1),
+                now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)
         self._comes_up_paused = pauses and not restored.ended_well  # those that come now

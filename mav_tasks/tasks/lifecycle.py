@@ -104,6 +104,7 @@ class TaskReason(IntEnum):
     NONCE_REUSED = 111
     WRONG_STATE = 112
     RATE_LIMITED = 113
+    STALE = 114
 
 
 #: a task is paused because a person, another program or the rover's own failsafe drives the rover

@@ -25,6 +25,7 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     TaskWaits,
+    VehicleHalted,
     VehicleHomeSet,
     VehicleIdentified,
     VehicleNoted,
@@ -32,6 +33,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.executor import Executor, has_moved
 from mav_tasks.tasks.goal import GlobalPlace, MoveTurned, Plan, Rotate, SingleGoal
+from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank, TaskQueue
 from mav_tasks.tasks.scheduler import outranks, start_blocker
@@ -52,6 +54,7 @@ class _Release:
 
     task_id: TaskId
     again: bool
+    may_continue: bool  # who has released it might also let the queue go on
     actor: str
     until: float
     waits_for: TaskReason
@@ -86,6 +89,8 @@ class VehicleTasks:
         self._cruise: float | None = None  # m/s, at which the vehicle itself would drive
         self._stop: tuple[float, float] | None = None  # m/s and m of one that was measured
         self._paused = R.NONE
+        #: what made the vehicle stand, and when
+        self.halts = Halts()
         self._urgent: TaskId | None = None  # runs although the queue is paused
         self._is_halting = False  # killed: nothing begins before the vehicle stands
         self._begun_at = 0.0
@@ -248,9 +253,18 @@ class VehicleTasks:
             self._apply_driving()
 
     def restore(
-        self, tasks: Iterable[Task], *, paused: TaskReason, speed: float | None, uid: str
+        self,
+        tasks: Iterable[Task],
+        *,
+        paused: TaskReason,
+        speed: float | None,
+        uid: str,
+        halt_epoch: int = 1,
+        now: float,
     ) -> None:
         """Take on what had begun in an earlier run, as it was left."""
+        self.halts = Halts(epoch=halt_epoch)
+        self.halt(R.RESTARTED, actor=SERVER, now=now)
         self._paused = paused
         self._uid = uid
         self._speed = speed
@@ -261,6 +275,12 @@ class VehicleTasks:
                 self._executor.adopt(task)
             else:
                 self._aside[task.id] = None
+
+    def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
+        """Note that the vehicle is to stand: what lets it go on has to be newer than this."""
+        if self.halts.raise_epoch(reason, actor=actor, now=now):
+            epoch = self.halts.epoch
+            self._book.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
 
     def identified(self, uid: str, *, now: float) -> None:
         """The vehicle has said which one it is; another one does not run this one's tasks unasked.
@@ -294,6 +314,7 @@ class VehicleTasks:
     def _may_be_another(self, *, now: float) -> None:
         self._release = None
         if self.is_driving or self._room.count(self.vehicle):
+            self.halt(R.RESTARTED, actor=SERVER, now=now)
             self._executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self._pause_queue(R.RESTARTED, actor=SERVER, now=now)
 
@@ -361,10 +382,12 @@ class VehicleTasks:
             self._book.change(task.id, state, reason=reason, actor=actor, now=now)
             self._room.ended(task.id, now=now)
         elif kill:
+            self.halt(reason, actor=actor, now=now)
             self._is_halting |= not self._is_of_another_driver(task)
             self._executor.kill(reason, actor=actor, now=now)
             self._ended(task.id, now=now)
         else:
+            self.halt(reason, actor=actor, now=now)
             self._executor.cancel(reason, actor=actor, now=now)
             if self.begun is None:
                 self._ended(task.id, now=now)
@@ -390,12 +413,21 @@ class VehicleTasks:
             self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
 
     def release(
-        self, task: Task, *, again: bool, seen: VehicleView, actor: str, now: float
+        self,
+        task: Task,
+        *,
+        again: bool,
+        may_continue: bool,
+        seen: VehicleView,
+        actor: str,
+        now: float,
     ) -> None:
         """Let a held task go on from here: all of it again, or its remainder.
 
-        Raise Rejection, and change nothing, while it could not take the vehicle. While a vehicle
-        that has restarted is not up yet, the task waits for that, until something halts it.
+        Raise Rejection, and change nothing, while it could not take the vehicle. While the queue is
+        paused, or a vehicle that has restarted is not up yet, the task waits for that, until
+        something halts it. A pause for a restart is over for it if who releases it
+        ``may_continue``.
         """
         if self.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
@@ -403,7 +435,7 @@ class VehicleTasks:
         if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
             words = f"task {begun.id} is {begun.state.name.lower()}"
             raise Rejection(R.WRONG_STATE, words)
-        waits_for = self._waits_for_restart(task, seen, now=now)
+        waits_for = self._waits_for(task, seen, may_continue=may_continue, now=now)
         if not waits_for:
             self._check_start(seen, goal_of(task), now=now)
         if not again:
@@ -416,7 +448,7 @@ class VehicleTasks:
         self._of_earlier_run.discard(task.id)
         if waits_for:
             until = now + self._settings.watch.ready_timeout
-            self._release = _Release(task.id, again, actor, until, waits_for)
+            self._release = _Release(task.id, again, may_continue, actor, until, waits_for)
             self._book.record(TaskWaits(task.id, self.vehicle, waits_for, now))
             return
         self._begin_released(again=again, actor=actor, now=now)
@@ -425,6 +457,14 @@ class VehicleTasks:
         self._release = None
         self._executor.release(again=again, actor=actor, now=now)
         self._begun_at = now
+
+    def _waits_for(
+        self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
+    ) -> TaskReason:
+        """Return what a held task waits for that is released, NONE if it can go on."""
+        if self._paused and not (self._paused is R.RESTARTED and may_continue):
+            return R.QUEUE_PAUSED
+        return self._waits_for_restart(task, seen, now=now)
 
     def _waits_for_restart(self, task: Task, seen: VehicleView, *, now: float) -> TaskReason:
         """Return what a held task waits for, NONE unless the vehicle restarts and is not up."""
@@ -448,7 +488,7 @@ class VehicleTasks:
         if task is None or task.id != release.task_id or task.state is not S.HELD:
             self._release = None
             return
-        waits_for = self._waits_for_restart(task, seen, now=now)
+        waits_for = self._waits_for(task, seen, may_continue=release.may_continue, now=now)
         if not waits_for:
             try:
                 self._check_start(seen, goal_of(task), now=now)
@@ -456,7 +496,7 @@ class VehicleTasks:
                 self._note_held(task, refusal.text, now=now)
             else:
                 self._begin_released(again=release.again, actor=release.actor, now=now)
-        elif now >= release.until:
+        elif now >= release.until and waits_for is not R.QUEUE_PAUSED:
             self._note_held(task, f"waited too long: {words_of(waits_for)}", now=now)
         elif waits_for is not release.waits_for:
             self._release = replace(release, waits_for=waits_for)
@@ -516,6 +556,7 @@ class VehicleTasks:
         What was to run at once and has not begun waits as any other. Where somebody else has the
         vehicle, nobody waits for it to stand before a cancelled task is over.
         """
+        self.halt(reason, actor=actor, now=now)
         self._release = None
         self._executor.pause(reason, actor=actor, now=now)
         self._pause_queue(reason, actor=actor, now=now)
@@ -588,6 +629,8 @@ class VehicleTasks:
 
         With its frame every other line is lost, too.
         """
+        if self.is_driving:
+            self.halt(reason, actor=SERVER, now=now)
         self._executor.hold(reason, now=now)
         if reason is R.FRAME_RESET:
             for task in self.aside:
@@ -615,6 +658,7 @@ class VehicleTasks:
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """Kill the begun task and latch; with ``clear`` all others are cancelled too."""
+        self.halt(R.STOPPED, actor=actor, now=now)
         killed = self._executor.kill(R.STOP, actor=actor, now=now)
         self._urgent = None
         self._pause_queue(R.STOPPED, actor=actor, now=now)
@@ -644,14 +688,22 @@ class VehicleTasks:
         self._try_released(seen, now=now)
         before = self.begun
         demand = self._executor.step(seen, now=now)
-        if before is not None and self.begun is None:
-            self._ended(before.id, now=now)
+        if before is not None:
+            self._note_step(before, now=now)
         if self.begun is not None and not self._is_interrupted(seen, now=now):
             return demand
         self._begin_next(seen, now=now)
         if self.begun is not None:  # what was refused was refused to the one before
             return self._executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
+
+    def _note_step(self, before: Task, *, now: float) -> None:
+        """See what became of the begun task in this step: it ended, or something halted it."""
+        begun = self.begun
+        if begun is None:
+            self._ended(before.id, now=now)
+        elif begun.state is not before.state and begun.state in (S.PAUSED, S.HELD):
+            self.halt(begun.reason, actor=SERVER, now=now)
 
     def _is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Set the running task aside if a waiting one may interrupt it, and could begin."""
@@ -714,6 +766,11 @@ class VehicleTasks:
             self._begin_next(seen, now=now)
             return
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal_of(task))
+        if blocker is R.WRONG_MODE and seen.armed:  # somebody drives: a person lets tasks go on
+            actor = f"vehicle {self.vehicle}"
+            self.halt(R.TAKEOVER, actor=actor, now=now)
+            self._pause_queue(R.TAKEOVER, actor=actor, now=now)
+            return
         self._note_blocker(first, blocker, now=now)
         if not blocker and self._book.is_durable(first):
             self._begin(task, seen, now=now)

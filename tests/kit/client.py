@@ -63,6 +63,7 @@ class TaskStatus(NamedTuple):
     submitter_component: int
     submitter_link: int
     text: str
+    halt_epoch: int
 
     @property
     def why(self) -> tuple[int, int]:
@@ -71,8 +72,8 @@ class TaskStatus(NamedTuple):
 
     @classmethod
     def of(cls, payload: bytes) -> "TaskStatus":
-        values = list(struct.unpack("<5I4f4H10B50s", payload.ljust(104, b"\0")))
-        values[-1] = values[-1].rstrip(b"\0").decode()
+        values = list(struct.unpack("<5I4f4H10B50sI", payload.ljust(108, b"\0")))
+        values[-2] = values[-2].rstrip(b"\0").decode()
         return cls._make(values)
 
 

@@ -183,7 +183,9 @@ class Lives(RuleBasedStateMachine):
         tasks, seen = self.fleet.of(task.vehicle), self.view(task.vehicle)
         before = self.book.all()
         if refused(
-            lambda: tasks.release(task, again=again, seen=seen, actor="client", now=self.now)
+            lambda: tasks.release(
+                task, again=again, may_continue=True, seen=seen, actor="client", now=self.now
+            )
         ):
             assert self.book.all() == before
         self.follow()

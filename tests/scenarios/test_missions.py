@@ -239,7 +239,7 @@ def test_after_a_stop_or_a_takeover_a_start_is_refused(world: World, what: str, 
         world.client.stop()
     else:
         world.operator_arm(False)
-    world.run(3)
+    world.run(4)
     assert start(world) == (TEMPORARILY_REJECTED, reason)
 
 

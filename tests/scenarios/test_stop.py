@@ -436,7 +436,7 @@ def test_a_repeat_of_an_older_continue_does_not_release_a_newer_stop(world: Worl
     world.run(1)
     assert (proceed.result, again.result) == (ACCEPTED, TEMPORARILY_REJECTED)
     assert world.paused() is R.STOPPED
-    world.run(2)
+    world.run(4)
     world.client.proceed()  # meant so
     world.run(0.5)
     assert world.paused() is R.NONE

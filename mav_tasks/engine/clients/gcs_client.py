@@ -4,6 +4,7 @@ from collections import OrderedDict
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, Rights
+from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.outlet import Outlet
@@ -12,7 +13,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
-from mav_tasks.services.command_receiver import Answer, CommandReceiver, Pending
+from mav_tasks.services.command_receiver import Answer, Pending
 from mav_tasks.services.message_interval import Thinner
 from mav_tasks.services.task_status import TaskStatusSender
 from mav_tasks.services.token_bucket import TokenBucket
@@ -28,6 +29,7 @@ MAX_REFUSALS_TOLD = 64
 BACK_AFTER = 3.5  # s of silence, after which a ground station may be another run of it
 MAX_FOLLOWED = 1000  # tasks of others that one client is told about
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
+MAX_SENDERS = 32  # of which it is remembered what they have sent: there may be a router
 
 Nonces = dict[Address, OrderedDict[int, Pending]]
 
@@ -80,7 +82,7 @@ class GcsClient:
         self._requests = TokenBucket(rate=0.0, burst=0.0, now=now)
         self._requests_of: dict[str, TokenBucket] = {}  # by role: who signs otherwise has another
         self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS, now=now)
-        self._receivers: dict[Address, CommandReceiver] = {}
+        self._senders: dict[Address, Sender] = {}
 
     def __repr__(self) -> str:
         names = " ".join(map(str, self._addresses)) or "unheard"
@@ -146,17 +148,19 @@ class GcsClient:
         """Whether it has asked about a task."""
         return task_id in self._followed
 
-    def receiver(self, source: Address) -> CommandReceiver:
-        """Give the memory of the commands of one address at this endpoint."""
-        receiver = self._receivers.get(source)
-        if receiver is None:
-            if len(self._receivers) >= MAX_ADDRESSES:
-                del self._receivers[next(iter(self._receivers))]
-            receiver = self._receivers[source] = CommandReceiver()
-        return receiver
+    def sender(self, source: Address) -> Sender:
+        """Return the memory of what one address at this endpoint has sent."""
+        sender = self._senders.get(source)
+        if sender is None:
+            if len(self._senders) >= MAX_SENDERS:
+                del self._senders[next(iter(self._senders))]
+            sender = self._senders[source] = Sender()
+        return sender
 
-    def heard(self, source: Address, *, now: float) -> None:
-        """Note that a packet of this address came from here."""
+    def heard(self, packet: Packet, *, now: float) -> None:
+        """Note that a packet came from here."""
+        source = packet.source
+        self.sender(source).line.place(packet.seq, now=now)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
             self._informed.clear()

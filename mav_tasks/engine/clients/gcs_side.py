@@ -17,6 +17,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.services.command_receiver import is_stop
 from mav_tasks.services.heartbeat import HeartbeatSender
 from mav_tasks.services.token_bucket import TokenBucket
@@ -34,6 +35,7 @@ class Received(NamedTuple):
     client: GcsClient
     packet: Packet
     message: m.Message | None
+    key: Key
 
 
 class GcsSide:
@@ -158,8 +160,16 @@ class GcsSide:
         client.signed_by = key
         client.take_rights(self._rights.of(key, client.submitter(packet.source)), now=now)
         if message is not None:
-            client.heard(packet.source, now=now)
-        return Received(client, packet, message)
+            client.heard(packet, now=now)
+        return Received(client, packet, message, key)
+
+    def hear_out(self, received: Received, *, now: float) -> None:
+        """Have a client be again who it was when it sent this packet, of several at one moment."""
+        client, key = received.client, received.key
+        if client.signed_by is not key:
+            client.signed_by = key
+            rights = self._rights.of(key, client.submitter(received.packet.source))
+            client.take_rights(rights, now=now)
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Show a vehicle's packet to every client that is to have it.

@@ -2,20 +2,28 @@
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from typing import Self
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.rights import Rights
+from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.commands import translate
-from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
+from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer, Command, CommandReceiver, Pending
+from mav_tasks.services.command_receiver import (
+    NO_MESSAGE,
+    Answer,
+    Command,
+    CommandReceiver,
+    Pending,
+)
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Submitter
+from mav_tasks.tasks.task import Marks, Submitter
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +53,14 @@ class Asked:
         return str(self.submitter)
 
     @property
+    def sender(self) -> Sender:
+        """What is remembered of who asks."""
+        return self.client.sender(self.packet.source)
+
+    @property
     def receiver(self) -> CommandReceiver:
         """The memory of what this client asked before."""
-        return self.client.receiver(self.packet.source)
+        return self.sender.commands
 
     @property
     def answering(self) -> Address:
@@ -59,6 +72,11 @@ class Asked:
     def answers_to(self) -> Hashable:
         """What one answer is enough for, however often it was asked."""
         return self.client.key, type(self), self.command.command, self.answering
+
+    @property
+    def marks(self) -> Marks:
+        """By what it is recognised when it comes again."""
+        return marks_of(self.command, self.packet.raw)
 
     @property
     def is_go_to(self) -> bool:
@@ -94,3 +112,24 @@ class Asked:
     def tell(self, text: str, severity: MavSeverity, *, now: float) -> None:
         """Say something to the client, in the name of the vehicle's task server."""
         self.client.tell(text, severity, self.vehicle.server_address, now=now)
+
+
+@dataclass(frozen=True, slots=True)
+class AskedByMessage(Asked):
+    """The same as asked by the message SET_MODE, which nothing acknowledges."""
+
+    @classmethod
+    def of(cls, client: GcsClient, vehicle: Vehicle, packet: Packet, mode: int) -> Self:
+        """Return the wish for a mode, by its number."""
+        target = Address(vehicle.system_id, AUTOPILOT)
+        params = (*vehicle.persona.mode_params(mode), 0.0, 0.0, 0.0, 0.0)
+        command = Command(target, MavCmd.DO_SET_MODE, params, 0, None, NO_MESSAGE)
+        return cls(client, vehicle, packet, Pending(command, packet.raw, 0.0))
+
+    @property
+    def marks(self) -> Marks:
+        """None: a ground station sends it again and again, and means it once."""
+        return Marks()
+
+    def answer(self, result: MavResult, result_param2: int = 0) -> None:
+        """Do nothing: heartbeats show the mode."""

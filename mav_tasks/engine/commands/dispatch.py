@@ -23,6 +23,7 @@ from mav_tasks.engine.commands.goals import (
     whole,
 )
 from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.ordering import Kind, kind_of, note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import result_of
@@ -92,6 +93,7 @@ BOUNDING = frozenset(
 )
 
 
+GIVEN_UP = 3.5  # s, after which a client waits for no answer any more
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
 
 
@@ -144,7 +146,7 @@ class Commands:
         if not addressed:
             return  # clients send everything to everyone: it is for somebody else
         vehicle = addressed[0]
-        receiver = client.receiver(packet.source)
+        receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None:
             if known.answer is not None:
@@ -152,7 +154,13 @@ class Commands:
             return
         pending = receiver.remember(command, packet.raw, now=now)
         asked = Asked(client, vehicle, packet, pending)
+        epoch = vehicle.tasks.halts.epoch
         try:
+            now_too = self._settings.guided == "now"
+            kind = kind_of(command, vehicle.persona, runs_goals_now=now_too)
+            if kind is Kind.GO:
+                is_old = self._vehicles.is_old_news(now=now)
+                require_newer(asked, is_old=is_old, now=now)
             self._dispatch(asked, now=now)
         except Rejection as refusal:
             if self._is_tried_again(asked, now=now):
@@ -161,6 +169,7 @@ class Commands:
                 self._book.record(asked.refuse(refusal, now=now))
             else:  # a flood of them fills neither disk nor net
                 asked.answer(result_of(refusal.reason), refusal.reason)
+        note_halt(asked, before=epoch)
 
     def _is_tried_again(self, asked: Asked, *, now: float) -> bool:
         """Whether a mode that has just been refused is asked for, and refused, once more.
@@ -252,6 +261,9 @@ class Commands:
 
     def _take_in(self, asked: Asked, *, now: float) -> None:
         """A command that asks for a task; or, without a place, for a pause."""
+        if self._vehicles.may_have_waited(now=now) > GIVEN_UP:
+            words = "it waited while the server stood still: send it again"
+            raise Rejection(R.STALE, words)
         is_reposition = asked.command.command == MavCmd.DO_REPOSITION
         if is_reposition and place_in(asked.command) is None:
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
@@ -267,8 +279,8 @@ class Commands:
 
     def _undo_hold_before(self, asked: Asked, *, now: float) -> None:
         vehicle = asked.vehicle
-        number = vehicle.hold_before.undoing(asked.client.key, now=now)
-        if number is None:
+        number = vehicle.hold_before.undoing(asked.sender, now=now)
+        if number is None or not asked.rights.reach(OPERATOR):
             return
 
         def undo(*, now: float) -> None:
@@ -333,6 +345,9 @@ class Commands:
         if not targets and not unheard:
             return
         killed = [vehicle.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
+        sender = client.sender(packet.source)
+        for vehicle in targets:
+            vehicle.tasks.halts.was_said_by(sender, sender.line.number_of(packet.seq))
         silent = [vehicle.system_id for vehicle in targets if not vehicle.is_heard(now=now)]
         silent += unheard
         component = targets[0].server_component if targets else MavComponent.ONBOARD_COMPUTER
@@ -358,10 +373,6 @@ class Commands:
                 return self._pause(asked, now=now)
             case 1.0:
                 asked.rights.require(OPERATOR, "let a rover go on")
-                if vehicle.tasks.is_stopped and asked.receiver.older_copy(
-                    asked.command, before=vehicle.stopped_at, now=now
-                ):
-                    raise Rejection(R.STOPPED, "STOP came after this: continue again, if meant")
                 return vehicle.proceed(actor=asked.actor, now=now)
             case value:
                 raise Rejection(R.BAD_PARAMETER, f"param1 {value:g}: 0 pauses, 1 continues")
@@ -407,4 +418,11 @@ def _relay(asked: Asked, *, now: float) -> None:
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
     asker = _Asker(asked.client.key, asked.packet.source, answering)
-    asked.vehicle.relay(asked.packet, command.message, asker, command=command.command, now=now)
+    asked.vehicle.relay(
+        asked.packet,
+        command.message,
+        asker,
+        command=command.command,
+        actor=asked.actor,
+        now=now,
+    )

@@ -4,12 +4,11 @@ It comes as a command, which is answered, or as the old message SET_MODE, which 
 acknowledges: who sent that waits until a heartbeat shows the mode.
 """
 
-from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
-from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import marks_of
+from mav_tasks.engine.commands.asked import Asked, AskedByMessage
+from mav_tasks.engine.commands.ordering import Kind, kind_of, note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
@@ -17,12 +16,11 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.mavlink.packet import Packet
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
+from mav_tasks.tasks.task import Draft, Submitter, Terms
 
 R = TaskReason
 
@@ -55,16 +53,15 @@ class ModeRequests:
         self._claims = settings.claim
 
     def asked(self, asked: Asked, *, now: float) -> bool:
-        """See to DO_SET_MODE; False: it is for the vehicle itself to answer."""
+        """See to a wish for a mode; False: it is for the vehicle itself to answer."""
         vehicle, client = asked.vehicle, asked.client
         main, sub = asked.command.params[1:3]
         mode = vehicle.persona.mode_in(main, sub)
         if mode is None:
             raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
-        submitter = client.submitter(asked.packet.source)
         if mode == vehicle.persona.hold_mode:
-            self._submissions.held(vehicle, submitter)
-            paused = vehicle.hold(client=client.key, actor=asked.actor, now=now)
+            self._submissions.held(vehicle, asked.submitter)
+            paused = vehicle.hold(sender=asked.sender, actor=asked.actor, now=now)
             if not vehicle.is_heard(now=now):
                 raise Rejection(R.VEHICLE_SILENT, f"vehicle {vehicle.system_id} is silent")
             asked.answer(MavResult.ACCEPTED, paused or 0)
@@ -72,17 +69,16 @@ class ModeRequests:
         if vehicle.tasks.is_stopped:
             raise STOPPED
         if self._is_return(vehicle, mode):
-            marks = marks_of(asked.command, asked.packet.raw)
-            self._submissions.run_now(asked, _return_home(vehicle, submitter, marks), now=now)
+            self._submissions.run_now(asked, _return_home(asked), now=now)
             self._show(vehicle, mode, now=now)
             return True
         if not self._is_mission(vehicle, mode):
-            client.rights.require(OPERATOR, "change the mode")
+            asked.rights.require(OPERATOR, "change the mode")
             vehicle.client_asks_mode(mode, client.key, now=now)
             return False
-        self._plans.check_start(client.rights, vehicle, submitter)
+        self._plans.check_start(asked.rights, vehicle, asked.submitter)
         if self._is_to_be_armed_first(vehicle):
-            self._mark(vehicle, client, submitter, now=now)
+            self._mark(asked, now=now)
             shown = self._plans.shown(vehicle)
             asked.answer(MavResult.ACCEPTED, 0 if shown is None else shown.id)
         else:
@@ -90,50 +86,20 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
         return True
 
-    def heard(
-        self, client: GcsClient, vehicle: Vehicle, packet: Packet, mode: int, *, now: float
-    ) -> None:
+    def heard(self, asked: AskedByMessage, *, is_old: bool, now: float) -> None:
         """See to the message SET_MODE."""
-        submitter = client.submitter(packet.source)
+        vehicle = asked.vehicle
+        epoch = vehicle.tasks.halts.epoch
         try:
-            self._heard(client, vehicle, submitter, packet, mode, now=now)
+            if kind_of(asked.command, vehicle.persona, runs_goals_now=False) is Kind.GO:
+                require_newer(asked, is_old=is_old, now=now)
+            if not self.asked(asked, now=now):
+                vehicle.requests.forward(asked.packet)
+                vehicle.requests.ask_to_show(now=now)
         except Rejection as refusal:
-            if self._refusals.message(client, vehicle, packet, refusal, now=now):
-                client.tell_refusal(refusal.text, vehicle.server_address, now=now)
-
-    def _heard(
-        self,
-        client: GcsClient,
-        vehicle: Vehicle,
-        submitter: Submitter,
-        packet: Packet,
-        mode: int,
-        *,
-        now: float,
-    ) -> None:
-        actor = str(submitter)
-        if mode == vehicle.persona.hold_mode:
-            self._submissions.held(vehicle, submitter)
-            vehicle.hold(client=client.key, actor=actor, now=now)
-        elif vehicle.tasks.is_stopped:
-            raise STOPPED
-        elif self._is_return(vehicle, mode):
-            draft = _return_home(vehicle, submitter, Marks())
-            self._submissions.run_unasked(client, vehicle, draft, actor=actor, now=now)
-            self._show(vehicle, mode, now=now)
-        elif not self._is_mission(vehicle, mode):
-            client.rights.require(OPERATOR, "change the mode")
-            vehicle.client_asks_mode(mode, client.key, now=now)
-            vehicle.requests.forward(packet)
-            vehicle.requests.ask_to_show(now=now)
-        elif self._is_to_be_armed_first(vehicle):
-            self._plans.check_start(client.rights, vehicle, submitter)
-            self._mark(vehicle, client, submitter, now=now)
-        else:
-            self._plans.check_start(client.rights, vehicle, submitter)
-            self._submissions.check_open()
-            vehicle.end_driving_of(client.key, now=now)
-            self._start_unasked(vehicle, submitter, client.rights, now=now)
+            if self._refusals.message(asked.client, vehicle, asked.packet, refusal, now=now):
+                asked.client.tell_refusal(refusal.text, vehicle.server_address, now=now)
+        note_halt(asked, before=epoch)
 
     # missions
 
@@ -189,13 +155,13 @@ class ModeRequests:
             self._plans.restarted(vehicle, task, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
-    def _mark(
-        self, vehicle: Vehicle, client: GcsClient, submitter: Submitter, *, now: float
-    ) -> None:
+    def _mark(self, asked: Asked, *, now: float) -> None:
+        vehicle = asked.vehicle
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
-        vehicle.start_mark.put(client.key, submitter, client.rights, plan_id=plan_id, now=now)
-        words = "The mission starts when the rover is armed"
-        client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+        vehicle.start_mark.put(
+            asked.client.key, asked.submitter, asked.rights, plan_id=plan_id, now=now
+        )
+        asked.tell("The mission starts when the rover is armed", MavSeverity.INFO, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
     def _show(self, vehicle: Vehicle, mode: int, *, now: float) -> None:
@@ -225,7 +191,14 @@ class ModeRequests:
         return self._claims and mode == vehicle.persona.mission_mode and has_plan
 
 
-def _return_home(vehicle: Vehicle, submitter: Submitter, marks: Marks) -> Draft:
+def _return_home(asked: Asked) -> Draft:
     """What the mode RTL asks for."""
     command = MavCmd.NAV_RETURN_TO_LAUNCH
-    return Draft(vehicle.system_id, command, GoTo(None), submitter, CRUISING, marks=marks)
+    return Draft(
+        asked.vehicle.system_id,
+        command,
+        GoTo(None),
+        asked.submitter,
+        CRUISING,
+        marks=asked.marks,
+    )

@@ -22,8 +22,6 @@ MOTION = (
     m.MissionItem,  # with current = 2 it is ArduPilot's "go to"
     m.MissionItemInt,
 )
-#: of them, what comes again and again, each for a moment
-STREAMED = (m.SetPositionTargetLocalNed, m.SetPositionTargetGlobalInt, m.SetAttitudeTarget)
 NO_PLACE = 7  # type_mask of what ignores x, y and z
 #: the same, of kinds that are no messages here: inputs of a radio or of a simulator, of which it is
 #: not looked at what they say
@@ -68,9 +66,11 @@ def may_pass(
     ``is_old``: it may have waited for us while the vehicle stopped by itself.
     """
     if _moves(packet, message):
-        if is_old and isinstance(message, STREAMED) and not _asks_to_stand(message):
+        if is_old and not _asks_to_stand(message):
             return False
         return (message is None or _is_finite(message)) and vehicle.may_move(client)
+    if is_old and isinstance(message, m.ManualControl | m.RcChannelsOverride):
+        return not _off_centre(message)
     return packet.message_id in MOTIONLESS or not vehicle.tasks.is_stopped
 
 
@@ -100,7 +100,7 @@ def _moves(packet: Packet, message: m.Message | None) -> bool:
     return isinstance(message, MOTION)
 
 
-def _asks_to_stand(message: m.Message) -> bool:
+def _asks_to_stand(message: m.Message | None) -> bool:
     return (
         isinstance(message, m.SetPositionTargetLocalNed)
         and message.type_mask & NO_PLACE == NO_PLACE

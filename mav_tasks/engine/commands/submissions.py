@@ -132,21 +132,6 @@ class Submissions:
         task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
         self._await_commit(asked, task, now=now)
 
-    def run_unasked(
-        self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, actor: str, now: float
-    ) -> None:
-        """The same for what no acknowledgement is expected of."""
-        vehicle.end_driving_of(client.key, now=now)
-        known = self._recollection.known(
-            draft, confirmation=0, origin=vehicle.where.origin, now=now
-        )
-        if known is None:
-            self.check_open()
-            client.rights.require(OPERATOR, "interrupt what a rover does")
-            draft = _allowed(client, vehicle, draft)
-            task = vehicle.run_now(draft, actor=actor, now=now)
-            self._recollection.remember(task, at=now, now=now)
-
     def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
         """Take in a task that a command means without naming it; Rejection says why not."""
         self.check_open()

@@ -110,9 +110,9 @@ class TaskControl:
         if how == SKIP:
             asked.vehicle.skip(task, actor=asked.actor, now=now)
         else:
-            may_restore = asked.rights.reach(OPERATOR)
+            may_continue = asked.rights.reach(OPERATOR)
             asked.vehicle.release(
-                task, again=how == AGAIN, may_restore=may_restore, actor=asked.actor, now=now
+                task, again=how == AGAIN, may_continue=may_continue, actor=asked.actor, now=now
             )
         return task.id
 

@@ -40,6 +40,7 @@ RESULT_OF: dict[int, MavResult] = {
     R.QUOTA: MavResult.TEMPORARILY_REJECTED,
     R.STORE_UNAVAILABLE: MavResult.TEMPORARILY_REJECTED,
     R.RATE_LIMITED: MavResult.TEMPORARILY_REJECTED,
+    R.STALE: MavResult.TEMPORARILY_REJECTED,
     R.STOPPED: MavResult.TEMPORARILY_REJECTED,
     R.HELD_AHEAD: MavResult.TEMPORARILY_REJECTED,
     R.QUEUE_PAUSED: MavResult.TEMPORARILY_REJECTED,
@@ -56,6 +57,7 @@ WAITS_FOR = {
     R.VEHICLE_SILENT: "the rover is silent",
     R.OTHER_CONTROLLER: "somebody else drives",
     R.WRONG_MODE: "wrong mode, set HOLD",
+    R.QUEUE_PAUSED: "released, and goes on when continued",
     R.NO_POSITION: "no position",
     R.DISARMED: "disarmed; arm, or continue",
     R.NOT_READY: "the rover is not ready to arm",
@@ -69,6 +71,7 @@ CALM = frozenset(
         R.OTHER_CONTROLLER,
         R.NO_POSITION,
         R.NOT_READY,
+        R.QUEUE_PAUSED,
         R.OPERATOR,
         R.PREEMPTED,
         R.CANCELLED,
@@ -137,6 +140,7 @@ def task_status(
         submitter_component=task.submitter.component_id,
         submitter_link=link_number,
         text=_words(task, reason, tasks.words_of_blocker(task.id)).encode()[:50],
+        halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
     )
 
 
@@ -172,6 +176,7 @@ def queue_status(
         counts=counts,
         paused_reason=tasks.paused,
         flags=0,
+        halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
     )
 
 

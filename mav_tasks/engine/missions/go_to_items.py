@@ -10,14 +10,14 @@ from math import inf
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.submissions import Submissions
-from mav_tasks.engine.missions.plan_items import NO_MESSAGE, result_of
+from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Command, Pending
+from mav_tasks.services.command_receiver import NO_MESSAGE, Command, Pending
 from mav_tasks.services.mission_item import item_of
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused

@@ -27,7 +27,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
-from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.command_receiver import NO_MESSAGE, Command
 from mav_tasks.services.mission_item import NOT_GIVEN, Item, packed
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
@@ -55,8 +55,6 @@ MAX_JUMPS = 65_535
 NO_CHANGE, DEFAULT = -1.0, -2.0  # DO_CHANGE_SPEED, param2
 GROUND_OR_AIR = 1  # the same, highest param1: airspeed counts as ground speed
 NOBODY = Address(0, 0)
-#: an item came in none, and to make one for each takes a tenth of its time
-NO_MESSAGE = m.CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 HERE = (0, NOT_GIVEN)  # what x and y are where no place is meant
 
 #: what the vehicle carries out itself: cameras, gimbals, servos, relays, its home

@@ -14,7 +14,7 @@ class HoldBefore:
     """The last HOLD of a client while we drove, for as long as it may be such a one."""
 
     def __init__(self) -> None:
-        self._client: Hashable = None
+        self._sender: Hashable = None
         self._until = -inf
         self._has_paused = False
         self._number = 0  # of wishes: which one a promise to undo was about
@@ -22,19 +22,19 @@ class HoldBefore:
         self.since = -inf
 
     def __repr__(self) -> str:
-        return f"HoldBefore({self._client}, until={self._until:.2f})"
+        return f"HoldBefore({self._sender}, until={self._until:.2f})"
 
-    def note(self, client: Hashable, *, has_paused: bool, now: float) -> None:
+    def note(self, sender: Hashable, *, has_paused: bool, now: float) -> None:
         """A client asks for HOLD; ``has_paused``: what was running is paused by this one.
 
         Repeated by the same client it is one and the same.
         """
-        if client == self._client and self.is_open(now=now):
+        if sender == self._sender and self.is_open(now=now):
             has_paused = has_paused or self._has_paused
         else:
             self.since = now
         self._number += 1
-        self._client, self._has_paused, self._until = client, has_paused, now + WAITS
+        self._sender, self._has_paused, self._until = sender, has_paused, now + WAITS
 
     def is_open(self, *, now: float) -> bool:
         """Whether its "go to" may still come."""
@@ -45,12 +45,12 @@ class HoldBefore:
         self._number += 1
         self._until = -inf
 
-    def undoing(self, client: Hashable, *, now: float) -> int | None:
+    def undoing(self, sender: Hashable, *, now: float) -> int | None:
         """A "go to" of this client is being taken in: it may show that the pause was not meant.
 
         Gives what ``is_still`` is asked with when it has been; None: it undoes nothing.
         """
-        if client != self._client or not self.is_open(now=now):
+        if sender != self._sender or not self.is_open(now=now):
             return None
         self.forget()
         return self._number if self._has_paused else None

@@ -480,6 +480,8 @@ class Vehicle:
         self, what: str, reason: TaskReason = TaskReason.TAKEOVER, *, now: float
     ) -> None:
         """Somebody else has the vehicle: let go, and let the queue stand if a task has begun."""
+        actor = f"vehicle {self.system_id}"
+        self.tasks.halt(reason, actor=actor, now=now)
         if self.tasks.is_stopped:
             return
         self.hold_before.forget()
@@ -492,7 +494,7 @@ class Vehicle:
             return
         if begun.state in RUNNING or self.tasks.paused not in TAKEN:
             self._note(f"taken over: {what}", now=now)
-            self.tasks.pause(reason, actor=f"vehicle {self.system_id}", now=now)
+            self.tasks.pause(reason, actor=actor, now=now)
 
     def _zero_what_is_kept(self) -> None:
         """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
@@ -508,7 +510,14 @@ class Vehicle:
     # what clients ask for, beyond tasks
 
     def relay(
-        self, packet: Packet, message: m.Message, origin: Hashable, *, command: int, now: float
+        self,
+        packet: Packet,
+        message: m.Message,
+        origin: Hashable,
+        *,
+        command: int,
+        actor: str,
+        now: float,
     ) -> None:
         """Forward a client's command; its answer comes from ``requests``."""
         asked = getattr(message, "target_component", 0)
@@ -518,6 +527,8 @@ class Vehicle:
         if command == MavCmd.COMPONENT_ARM_DISARM and not disarms:
             self._authority.client_arms(now=now)
             self.control.keep_armed()
+        if disarms:
+            self.tasks.halt(TaskReason.DISARMED, actor=actor, now=now)
         if disarms and self.control.is_engaged and self.control.phase is not Phase.STOPPING:
             self._authority.withdraw_arming()
             self._zero_what_is_kept()
@@ -706,6 +717,7 @@ class Vehicle:
         """Setpoints or an address like ours, not from us: HOLD once, then let go."""
         if self._authority.since_other(now=now) > self._settings.watch.other_controller:
             self._note(f"second controller {who}", now=now)
+            self.tasks.halt(TaskReason.OTHER_CONTROLLER, actor=str(who), now=now)
         self._authority.note_other(now=now)
         if self.control.phase is Phase.STOPPING:
             return
@@ -748,11 +760,12 @@ class Vehicle:
         self._clock.restart(now=now)
         self.requests.flush(now=now)
 
-    def hold(self, *, client: Hashable, actor: str, now: float) -> TaskId | None:
+    def hold(self, *, sender: Hashable, actor: str, now: float) -> TaskId | None:
         """A client wants HOLD: zeros and the mode at once; a task and its queue pause.
 
         Where it may belong to a "go to" that follows, zeros at once, and the mode a little later.
         """
+        self.tasks.halt(TaskReason.OPERATOR, actor=actor, now=now)
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
             return None
@@ -762,7 +775,7 @@ class Vehicle:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         self.forget_start()
         if self.persona.is_held_before_places and self.control.phase is Phase.CONTROL:
-            self.hold_before.note(client, has_paused=not was_paused, now=now)
+            self.hold_before.note(sender, has_paused=not was_paused, now=now)
             self.step(now=now)
             return paused
         self.hold_before.forget()
@@ -788,6 +801,7 @@ class Vehicle:
         self.forget_start()
         self.tasks.clear(begun_too=begun_too, actor=actor, now=now)
         if begun_too:
+            self.tasks.halt(TaskReason.CLEARED, actor=actor, now=now)
             self.end_driving_of(self._driver(now=now), now=now)
             self._authority.revoke()
         if begun_too and self.control.is_engaged:
@@ -798,19 +812,21 @@ class Vehicle:
         self.tasks.modify(task, terms, actor=actor, now=now)
 
     def release(
-        self, task: Task, *, again: bool, may_restore: bool, actor: str, now: float
+        self, task: Task, *, again: bool, may_continue: bool, actor: str, now: float
     ) -> None:
         """Let a held task go on; raise Rejection while it could not take the vehicle.
 
         After a restart of the vehicle this is a person's word that all is well, and restores
-        the permission to arm if the person may give it (``may_restore``). What somebody has
+        the permission to arm if the person may give it (``may_continue``). What somebody has
         disarmed stays so until a continue.
         """
         seen = self.view(now=now)
-        restores = may_restore and self._authority.is_withdrawn_by_restart
+        restores = may_continue and self._authority.is_withdrawn_by_restart
         if restores:
             seen = replace(seen, may_arm=self._authority.may_arm_again)
-        self.tasks.release(task, again=again, seen=seen, actor=actor, now=now)
+        self.tasks.release(
+            task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
+        )
         if restores:
             self._authority.restore_arming()
         self.wake(now=now)
@@ -849,7 +865,7 @@ class Vehicle:
         is_driven = begun is not None and begun.reason not in TAKEN
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
         if not is_driven and self.armed and not self.control.is_engaged:
-            self.hold(client=None, actor=actor, now=now)
+            self.hold(sender=None, actor=actor, now=now)
         else:
             self.step(now=now)
         return paused

@@ -91,6 +91,7 @@ class VehicleSide:
         self._router = Router()
         self._agenda = Agenda()
         self._old_until = -inf
+        self._stood_for = 0.0  # s, that this process stood still before that
         self._noted: set[str] = set()
         self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
         #: heartbeats of a known vehicle's id from another place: when the first one came
@@ -244,9 +245,10 @@ class VehicleSide:
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
-        if self.next_deadline() + self._settings.watch.late_tick >= now:
+        due = self.next_deadline()
+        if due + self._settings.watch.late_tick >= now:
             return
-        self._old_until = now + OLD_NEWS
+        self._old_until, self._stood_for = now + OLD_NEWS, now - due
         for vehicle in self:
             self._agenda.touch(vehicle)
             vehicle.check_late(now=now)
@@ -254,6 +256,10 @@ class VehicleSide:
     def is_old_news(self, *, now: float) -> bool:
         """Whether what is read now may have waited while this process stood still."""
         return now < self._old_until
+
+    def may_have_waited(self, *, now: float) -> float:
+        """Return for how many seconds what is read now may have waited."""
+        return self._stood_for if now < self._old_until else 0.0
 
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do; inf: never, as things are."""

@@ -34,6 +34,8 @@ class Rig:
 
     def reached_at(self, at: float) -> set[object]:
         """To where what is for the rover goes."""
+        self.engine.handle_deadline(now=at - 0.4)  # what comes after a standstill may be old
+        self.engine.handle_deadline(now=at)
         self.engine.take_packets()
         ping = m.SetMode(1, 0, 0)
         data = self.packer.pack(ping, Address(255, 190), seq=int(at) % 256)

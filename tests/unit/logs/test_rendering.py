@@ -31,6 +31,7 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     TaskWaits,
     TaskWithdrawn,
+    VehicleHalted,
     VehicleHomeSet,
     VehicleIdentified,
     VehicleNoted,
@@ -86,6 +87,10 @@ SAMPLES: list[tuple[Event, dict[str, object]]] = [
     ),
     (ParameterSet("SPEED", nan, "a", AT), {"name": "SPEED", "value": None, "actor": "a"}),
     (SignaturesSeen((), (), 7, AT), {"signed_until": 7}),
+    (
+        VehicleHalted(1, 7, TaskReason.OPERATOR, "a", AT),
+        {"epoch": 7, "reason": "operator", "actor": "a"},
+    ),
     (VehicleSeen(1, "found", AT), {"text": "found"}),
     (VehicleNoted(1, "silent", AT), {"text": "silent"}),
     (ServerStopped((1, 2), AT), {"unconfirmed": [1, 2]}),

@@ -11,14 +11,14 @@ STATES = 14
 
 
 def test_task_status_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskStatus.id, m.TaskStatus.unpacker.size) == (54000, 104)
-    assert m.TaskStatus.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50s"
+    assert (m.TaskStatus.id, m.TaskStatus.unpacker.size) == (54000, 108)
+    assert m.TaskStatus.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50sI"
     assert m.TaskStatus.ordered_fieldnames == m.TaskStatus.fieldnames
-    assert struct.calcsize("<5I4f4H10B50s") == 104
+    assert struct.calcsize("<5I4f4H10B50sI") == 108
 
 
 def test_task_queue_status_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskQueueStatus.id, m.TaskQueueStatus.unpacker.size) == (54001, 78)
+    assert (m.TaskQueueStatus.id, m.TaskQueueStatus.unpacker.size) == (54001, 82)
     assert m.TaskQueueStatus.ordered_fieldnames == [
         "time_boot_ms",
         "version",
@@ -28,6 +28,7 @@ def test_task_queue_status_is_as_the_contract_draws_it() -> None:
         "counts",
         "paused_reason",
         "flags",
+        "halt_epoch",
     ]
     assert m.TaskQueueStatus.array_lengths[5] == STATES
 

@@ -131,7 +131,9 @@ class TestHeldTasks:
 
     def release(self, rig: Rig, rover: Rover, *, again: bool, task_id: int = 1) -> None:
         seen = rover.view(rig.now)
-        rig.tasks.release(rig.task(task_id), again=again, seen=seen, actor=BY, now=rig.now)
+        rig.tasks.release(
+            rig.task(task_id), again=again, may_continue=True, seen=seen, actor=BY, now=rig.now
+        )
         rig.keep()
 
     @pytest.mark.parametrize(("again", "end"), [(True, 5.0), (False, 4.0)])
@@ -166,7 +168,9 @@ class TestHeldTasks:
         before = rig.book.all()
         seen = replace(in_control(rig.now), mode=ModeKind.OTHER)
         with pytest.raises(Rejection) as refusal:
-            rig.tasks.release(rig.task(1), again=True, seen=seen, actor=BY, now=rig.now)
+            rig.tasks.release(
+                rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
+            )
         assert (refusal.value.reason, rig.book.all()) == (R.WRONG_MODE, before)
 
     def test_a_reset_frame_holds_what_was_set_aside_too_and_each_is_released_by_itself(
@@ -176,13 +180,19 @@ class TestHeldTasks:
         rig.tasks.hold(R.FRAME_RESET, now=rig.now)
         assert rig.states() == [S.HELD, S.HELD]
         seen = in_control(rig.now)
-        rig.tasks.release(rig.task(1), again=True, seen=seen, actor=BY, now=rig.now)
+        rig.tasks.release(
+            rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
+        )
         assert ([t.id for t in rig.tasks.aside], rig.states()) == ([2], [S.STARTING, S.HELD])
         with pytest.raises(Rejection, match="task 1 is starting"):
-            rig.tasks.release(rig.task(2), again=True, seen=seen, actor=BY, now=rig.now)
+            rig.tasks.release(
+                rig.task(2), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
+            )
         rig.cancel(1)
         rig.steps(in_control, seconds=2 * TICK)
-        rig.tasks.release(rig.task(2), again=True, seen=seen, actor=BY, now=rig.now)
+        rig.tasks.release(
+            rig.task(2), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
+        )
         assert rig.states() == [S.CANCELLED, S.STARTING]
 
     def test_a_jump_holds_what_was_set_aside_too(self) -> None:
@@ -332,7 +342,9 @@ class TestStop:
         rig.steps(in_control, seconds=1.0)
         assert rig.states() == [S.HELD, S.KILLED]
         seen = in_control(rig.now)
-        rig.tasks.release(rig.task(1), again=True, seen=seen, actor=BY, now=rig.now)
+        rig.tasks.release(
+            rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
+        )
         rig.keep()
         rig.steps(in_control, seconds=2 * TICK)
         assert rig.states() == [S.EXECUTING, S.KILLED]

@@ -196,7 +196,9 @@ class TestAfterwards:
         rig.step(in_control)
         rig.tasks.hold(R.FRAME_RESET, now=rig.now)
         seen = in_control(rig.now)
-        rig.tasks.release(rig.task(1), again=True, seen=seen, actor=BY, now=rig.now)
+        rig.tasks.release(
+            rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
+        )
         rig.submit(LONG, terms=replace(URGENT, priority=9))
         rig.steps(in_control, seconds=4.0)
         assert rig.states() == [S.EXECUTING, S.HELD, S.QUEUED]

@@ -7,7 +7,7 @@ import pytest
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.tasks.events import QueueContinued, QueuePaused
+from mav_tasks.tasks.events import QueueContinued, QueuePaused, VehicleHalted
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import position, wait_reason
@@ -324,7 +324,10 @@ class TestStop:
         rig = Rig()
         for _ in range(3):
             rig.tasks.stop(clear=False, actor="a", now=rig.now)
-        assert rig.book.take_events() == [QueuePaused(1, R.STOPPED, "a", rig.now)]
+        assert rig.book.take_events() == [
+            VehicleHalted(1, 2, R.STOPPED, "a", rig.now),
+            QueuePaused(1, R.STOPPED, "a", rig.now),
+        ]
 
 
 def test_after_the_last_task_the_vehicle_is_handed_back() -> None:

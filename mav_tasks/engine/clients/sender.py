@@ -1,0 +1,46 @@
+"""One MAVLink address at a client's endpoint: what it has sent, and in which order."""
+
+from collections import OrderedDict
+from collections.abc import Hashable
+from typing import NamedTuple
+
+from mav_tasks.mavlink.number_line import NumberLine
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import CommandReceiver
+
+COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
+DOUBLED = 30.0  # s, the same for the very same packet: what a net delivers twice, it may hold long
+REMEMBERED = 64  # words
+
+
+class _Said(NamedTuple):
+    epoch: int  # of the vehicle, when the first copy came
+    at: float  # s, of the last copy
+    packet: bytes
+
+
+class Sender:
+    """The memory of what one address has sent."""
+
+    def __init__(self) -> None:
+        self.commands = CommandReceiver()
+        self.line = NumberLine()
+        self._said: OrderedDict[Hashable, _Said] = OrderedDict()
+
+    def __repr__(self) -> str:
+        return f"Sender({self.line!r}, {len(self._said)} words)"
+
+    def first_epoch(self, content: Hashable, packet: Packet, *, now: float) -> int | None:
+        """Return the epoch at which the first copy of this word came; None: it is none."""
+        said = self._said.get(content)
+        if said is None:
+            return None
+        within = DOUBLED if said.packet == packet.raw else COPIED
+        return said.epoch if now - said.at <= within else None
+
+    def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:
+        """Remember a word, or that one more copy of it has come."""
+        self._said.pop(content, None)
+        self._said[content] = _Said(epoch, now, packet.raw)
+        if len(self._said) > REMEMBERED:
+            self._said.popitem(last=False)

@@ -1,0 +1,114 @@
+"""Whether a word that lets a rover go counts: what holds beats every older one.
+
+A word is older than a halt if its first copy came before it, if its sender's numbers show that it
+had left before it, if it names another epoch than the present one, or if it waited while the server
+stood still. Who is refused may send it anew; that is told.
+"""
+
+from enum import Enum, auto
+from math import isfinite
+
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
+from mav_tasks.services.command_receiver import Command, command_of
+from mav_tasks.services.persona import Persona
+from mav_tasks.tasks.lifecycle import TaskReason
+
+#: where a word names the epoch that its sender was shown: which of the parameters, from 0
+EPOCH_IN: dict[int, int] = {
+    MavCmd.DO_PAUSE_CONTINUE: 1,
+    MavCmd.TASK_RELEASE: 2,
+    MavCmd.MISSION_START: 2,
+}
+EPOCHS = 1 << 24  # that a float32 tells apart
+AGAIN = "if you still mean it, send it again in 4 s"
+
+
+class Kind(Enum):
+    """What a word does to a rover."""
+
+    #: makes it stand
+    HALT = auto()
+    #: lets it move: by a task, in a mode, by arming, by what was held
+    GO = auto()
+    OTHER = auto()
+
+
+def kind_of(command: Command, persona: Persona, *, runs_goals_now: bool) -> Kind:
+    """Return what a command does; ``runs_goals_now``: a "go to" comes before what runs."""
+    match command.command:
+        case MavCmd.TASK_STOP | MavCmd.TASK_CANCEL | MavCmd.TASK_CLEAR:
+            return Kind.HALT
+        case MavCmd.DO_PAUSE_CONTINUE | MavCmd.COMPONENT_ARM_DISARM:
+            return Kind.HALT if command.params[0] == 0.0 else Kind.GO
+        case MavCmd.DO_SET_MODE:
+            is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
+            return Kind.HALT if is_hold else Kind.GO
+        case MavCmd.DO_REPOSITION if runs_goals_now and reposition_flags(command) & CHANGE_MODE:
+            return Kind.GO
+        case MavCmd.TASK_RELEASE | MavCmd.MISSION_START | MavCmd.DO_SET_STANDARD_MODE:
+            return Kind.GO
+        case _:
+            return Kind.OTHER
+
+
+def kind_of_message(message: Message | None, persona: Persona) -> Kind:
+    """Return what a client's message does, as far as its order within a moment matters."""
+    if isinstance(message, SetMode):
+        return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
+    if isinstance(message, CommandLong | CommandInt):
+        return kind_of(command_of(message), persona, runs_goals_now=True)
+    return Kind.OTHER
+
+
+def require_newer(asked: Asked, *, is_old: bool, now: float) -> None:
+    """Raise Rejection (STALE) for a word that lets go and is older than what holds the rover.
+
+    ``is_old``: it may have waited while the server stood still.
+    """
+    halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
+    halts.was_asked_to_go_on()
+    number = sender.line.number_of(packet.seq)
+    sent_by = sender.line.sent_by(number, now=now)
+    named = _epoch_in(asked.command)
+    content = (asked.command.target, asked.command.command, repr(asked.command.params))
+    first = sender.first_epoch(content, packet, now=now)
+    # its sender has said the last halt itself, and before this
+    follows = halts.by is sender and number > halts.number
+    if follows and asked.command.confirmation == 0:
+        epoch = halts.epoch
+    else:
+        epoch = halts.epoch if halts.at < sent_by else halts.epoch - 1
+        epoch = epoch if first is None else min(epoch, first)
+    if named:
+        epoch = halts.epoch if named == halts.epoch % EPOCHS else halts.epoch - 1
+    if is_old:
+        epoch = min(epoch, halts.epoch - 1)
+    sender.says(content, packet, epoch=epoch, now=now)
+    if epoch == halts.epoch:
+        return
+    if is_old:
+        words = f"it waited while the server stood still: {AGAIN}"
+    elif named:
+        words = f"{halts.words} came since what you were shown: look again"
+    else:
+        words = f"{halts.words} came since: {AGAIN}"
+    raise Rejection(TaskReason.STALE, words)
+
+
+def note_halt(asked: Asked, *, before: int) -> None:
+    """Note whose word the last halt was, if there was one since the epoch ``before``."""
+    halts = asked.vehicle.tasks.halts
+    if halts.epoch != before:
+        sender = asked.sender
+        halts.was_said_by(sender, sender.line.number_of(asked.packet.seq))
+
+
+def _epoch_in(command: Command) -> int:
+    """Return the epoch that a command names, 0 if it names none."""
+    place = EPOCH_IN.get(command.command)
+    value = 0.0 if place is None else command.params[place]
+    return int(value) if isfinite(value) and value > 0.0 else 0

@@ -1,0 +1,64 @@
+"""The 8-bit sequence numbers of one sender, counted on: how late a packet is, by what came before.
+
+A sender counts its packets upwards. One with a lower number than the last was overtaken on the way:
+it had left before the packet that came first, however late it comes.
+"""
+
+BEHIND = 0x80  # of 256 numbers; one that is farther behind looks as if it were ahead
+#: s and packets, one after the other and all behind, after which the sender has begun anew
+ANEW_AFTER, ANEW = 2.0, 3
+
+
+class NumberLine:
+    """The numbers of one sender."""
+
+    def __init__(self) -> None:
+        self.last = -1  #: the highest number so far, counted on beyond 255; -1: none has come
+        self._passed = [0.0] * 256  # s, when each number came, or a higher one
+        self._behind: list[tuple[int, float]] = []  # number and s, of those since the last ahead
+
+    def __repr__(self) -> str:
+        return f"NumberLine({self.last})"
+
+    def place(self, seq: int, *, now: float) -> int:
+        """Take a packet in; return its number, counted on. It is late if that is below ``last``."""
+        if self.last < 0:
+            return self._move_on(seq, 256, now)
+        ahead = self.number_of(seq) - self.last
+        if ahead > 0:
+            return self._move_on(self.last + ahead, ahead, now)
+        if ahead < 0 and self._begins_anew(self.last + ahead, now):
+            forward = ahead & 0xFF
+            return self._move_on(self.last + forward, forward, now)
+        return self.last + ahead
+
+    def number_of(self, seq: int) -> int:
+        """Return the number, counted on, of a packet that was taken in."""
+        return self.last + (seq - self.last + BEHIND & 0xFF) - BEHIND
+
+    def sent_by(self, number: int, *, now: float) -> float:
+        """Return the latest time in s at which the packet of this number can have left.
+
+        The last number again says nothing: some senders do not count.
+        """
+        return now if number >= self.last else self._passed[(number + 1) & 0xFF]
+
+    def _move_on(self, number: int, by: int, now: float) -> int:
+        for each in range(number, number - min(by, 256), -1):
+            self._passed[each & 0xFF] = now
+        self._passed[number & 0xFF] = now
+        self._behind.clear()
+        self.last = number
+        return number
+
+    def _begins_anew(self, number: int, now: float) -> bool:
+        """Whether nothing but rising lower numbers has come for a while: it counts from 0 again.
+
+        What a net delivers late comes at once, or between newer packets.
+        """
+        behind = self._behind
+        if behind and number <= behind[-1][0]:
+            behind.clear()
+        behind.append((number, now))
+        del behind[1 : max(1, len(behind) - ANEW)]
+        return len(behind) > ANEW - 1 and now - behind[0][1] >= ANEW_AFTER

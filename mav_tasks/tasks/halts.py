@@ -1,0 +1,62 @@
+"""What made a vehicle stand last. By it a word that lets go is newer than that, or older.
+
+Each halt raises the epoch, whatever it was: STOP, HOLD, a pause, disarming, a takeover, a loss.
+"""
+
+from collections.abc import Hashable
+from math import inf
+
+from mav_tasks.tasks.events import SERVER
+from mav_tasks.tasks.lifecycle import TaskReason, words_of
+
+SAME = 0.2  # s, in which the same halt by the same one is one: five a second of a flood
+
+_WORDS = {
+    TaskReason.OPERATOR: "a pause",
+    TaskReason.STOPPED: "STOP",
+    TaskReason.TAKEOVER: "a takeover",
+    TaskReason.CANCELLED: "a cancel",
+    TaskReason.RESTARTED: "a restart of the server",
+    TaskReason.FRAME_RESET: "a change of its position reference",
+    TaskReason.DISARMED: "disarming",
+}
+
+
+class Halts:
+    """The halts of one vehicle: how many there were, and the last."""
+
+    def __init__(self, *, epoch: int = 1) -> None:
+        self.epoch = epoch
+        self.at = -inf  #: s, when the last came
+        self.by: Hashable = None  #: whose word it was; None: nobody's
+        self.number = -1  #: of that word, among those of its sender
+        self._reason, self._actor = TaskReason.NONE, ""
+        self._was_asked = False  # to go on, since the last
+
+    def __repr__(self) -> str:
+        return f"Halts({self.epoch}, {self.words})"
+
+    @property
+    def words(self) -> str:
+        """The last halt, and who said it."""
+        what = _WORDS.get(self._reason) or words_of(self._reason)
+        who = self._actor.partition("@")[0]  # the endpoint says nothing to people
+        return what if self._actor in ("", SERVER) else f"{what} by {who}"
+
+    def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
+        """Count a halt. Return False if it is the last one again, and is not counted."""
+        is_same = (reason, actor) == (self._reason, self._actor)
+        if is_same and now - self.at < SAME and not self._was_asked:
+            return False
+        self.epoch += 1
+        self.at, self.by, self.number = now, None, -1
+        self._reason, self._actor, self._was_asked = reason, actor, False
+        return True
+
+    def was_said_by(self, sender: Hashable, number: int) -> None:
+        """Note whose word the last halt was, and its number among the sender's."""
+        self.by, self.number = sender, number
+
+    def was_asked_to_go_on(self) -> None:
+        """Note that a word that lets go has come, whatever became of it."""
+        self._was_asked = True

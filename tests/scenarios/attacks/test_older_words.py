@@ -1,0 +1,247 @@
+"""What holds beats every older word that lets go: attacks D1 and D2, and the way back for people.
+
+A continue, a start, a mode, an arming that was sent before a halt does not undo it, however often
+its copies come and by whatever way; the person who means it sends it anew, and is told so.
+"""
+
+from collections.abc import Callable
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import (
+    ACCEPTED,
+    ARM,
+    AUTO,
+    GUIDED,
+    HOLD,
+    PAUSE_CONTINUE,
+    RTL,
+    SET_MODE,
+    TEMPORARILY_REJECTED,
+    FakeClient,
+    Message,
+    command_long,
+    set_mode,
+)
+from tests.kit.mission import Item, Upload
+from tests.kit.world import World, at
+
+STALE = (TEMPORARILY_REJECTED, R.STALE)
+MISSION_START, WAYPOINT = 300, 16
+CONTINUE = command_long(PAUSE_CONTINUE, 1)
+
+#: what makes the rover stand, said by another than who let it go
+HALTS: dict[str, Callable[[World, FakeClient], object]] = {
+    "STOP": lambda _, other: other.stop(),
+    "HOLD": lambda _, other: other.mode(HOLD),
+    "SET_MODE": lambda _, other: other.send(set_mode(HOLD)),
+    "pause": lambda _, other: other.pause(),
+    "disarm": lambda _, other: other.arm(False),
+    "cancel": lambda _, other: other.command(54010, 0),
+    "mode switch": lambda world, _: world.operator_mode(Mode.HOLD),
+    "disarmed at the rover": lambda world, _: world.operator_arm(False),
+}
+
+
+def copies(client: FakeClient, message: Message, count: int, world: World, *, each: float) -> None:
+    """Send a word again and again, counted, as a client does that hears no answer."""
+    for confirmation in range(1, count + 1):
+        world.run(each)
+        if hasattr(message, "confirmation"):
+            message.confirmation = confirmation
+        client.send(message)
+
+
+def driven_since(world: World, seconds: float) -> float:
+    """Return how far the rover really gets from where it stands now."""
+    before = world.pose()
+    world.run(seconds)
+    after = world.pose()
+    return abs(after[0] - before[0]) + abs(after[1] - before[1])
+
+
+@pytest.mark.parametrize("halt", HALTS)
+def test_copies_of_a_continue_undo_no_newer_halt(world: World, halt: str) -> None:
+    """D1: what a script repeats for 10 s is older than what a person has done in between."""
+    script, person = world.add_client("script", system_id=245), world.add_client("person")
+    script.move(10)
+    world.until_state(1, S.EXECUTING)
+    person.pause()
+    world.run(4)
+    message = command_long(PAUSE_CONTINUE, 1)
+    script.send(message)
+    world.run(0.2)
+    assert script.acks_of(PAUSE_CONTINUE)[-1][0] == ACCEPTED
+    world.run(1.5)
+    HALTS[halt](world, person)
+    world.run(0.3)
+    copies(script, message, 20, world, each=0.5)
+    assert driven_since(world, 3) < 0.001
+    assert world.stands()
+    if halt != "cancel":  # which leaves the queue to go on
+        assert set(script.acks_of(PAUSE_CONTINUE)[-15:]) == {STALE}
+
+
+@pytest.mark.parametrize("halt", ["HOLD", "pause", "disarm", "mode switch"])
+@pytest.mark.parametrize("way", ["MISSION_START", "DO_SET_MODE", "SET_MODE"])
+def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str) -> None:
+    """D1: ground stations repeat the start of a mission, and the mode for it, without an answer."""
+    station, person = world.client, world.add_client("person")
+    plan = (Item(WAYPOINT, frame=0, current=1), Item(WAYPOINT, **at(6.0, 0.0)))
+    upload = Upload(station, plan, target=(1, 1))
+    world.until(lambda: upload.result is not None, within=5)
+    word = {
+        "MISSION_START": command_long(MISSION_START, target=(1, 1)),
+        "DO_SET_MODE": command_long(SET_MODE, 1, AUTO, target=(1, 1)),
+        "SET_MODE": set_mode(AUTO),
+    }[way]
+    station.send(word)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    station.send(word)
+    world.run(0.5)
+    HALTS[halt](world, person)
+    world.run(1.5)
+    copies(station, word, 6, world, each=1.0)
+    assert driven_since(world, 2) < 0.001
+
+
+@pytest.mark.parametrize(("mode", "target"), [(GUIDED, (1, 1)), (RTL, (1, 1))])
+def test_copies_of_a_mode_undo_no_newer_hold(
+    world: World, mode: int, target: tuple[int, int]
+) -> None:
+    station, person = world.client, world.add_client("person")
+    station.arm()
+    world.run(1)
+    word = command_long(SET_MODE, 1, mode, target=target)
+    station.send(word)
+    world.run(1)
+    person.mode(HOLD)
+    world.run(1)
+    copies(station, word, 4, world, each=1.0)
+    world.run(1)
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_copies_of_an_arming_do_not_arm_what_was_disarmed_since(world: World) -> None:
+    station, person = world.client, world.add_client("person")
+    word = command_long(ARM, 1, target=(1, 1))
+    station.send(word)
+    world.run(1)
+    person.arm(False)
+    world.run(1)
+    copies(station, word, 5, world, each=1.0)
+    world.run(1)
+    assert not world.rover.autopilot.armed
+
+
+def test_a_copy_that_the_net_delivers_20_s_late_undoes_nothing(world: World) -> None:
+    """Its sender's numbers show that it had left long before."""
+    script, person = world.add_client("script", system_id=245), world.add_client("person")
+    script.move(20)
+    world.until_state(1, S.EXECUTING)
+    person.pause()
+    world.run(4)
+    late = script.packed(command_long(PAUSE_CONTINUE, 1, confirmation=3))
+    script.send(command_long(PAUSE_CONTINUE, 1))
+    world.run(3)
+    person.pause()
+    world.run(20)
+    script.send_raw(late)
+    assert driven_since(world, 3) < 0.001
+    assert world.paused() is R.OPERATOR
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.02, 5.0])
+@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+def test_a_continue_that_its_senders_own_halt_has_overtaken_does_not_count(
+    world: World, halt: str, apart: float
+) -> None:
+    """D2: the net put them in the wrong order, their sender did not."""
+    client = world.client
+    client.move(20)
+    world.until_state(1, S.EXECUTING)
+    world.add_client("person").pause()
+    world.run(4)
+    overtaken = client.packed(CONTINUE)
+    client.send(command_long(512, 148))  # takes the next number: as if that had been the continue
+    HALTS[halt](world, client)
+    world.run(apart)
+    client.send_raw(overtaken)
+    assert driven_since(world, 3) < 0.001
+    assert world.paused() is (R.STOPPED if halt == "STOP" else R.OPERATOR)
+
+
+def test_halts_of_one_moment_come_first_whatever_link_they_came_on(world: World) -> None:
+    script, person = world.add_client("script", system_id=245), world.add_client("person")
+    script.move(20)
+    world.until_state(1, S.EXECUTING)
+    person.pause()
+    world.run(4)
+    for first, second in ((script, person), (person, script)):
+        for client in (first, second):
+            client.send(CONTINUE if client is script else command_long(54003))
+        assert driven_since(world, 3) < 0.001
+        assert world.paused() is R.STOPPED
+
+
+# people are not locked out
+
+
+def test_who_held_it_may_go_on_at_once(world: World) -> None:
+    world.client.move(20)
+    world.until_state(1, S.EXECUTING)
+    for _ in range(5):
+        world.client.pause()
+        world.run(0.3)
+        going = world.client.proceed()
+        world.run(0.7)
+        assert going.answer == (ACCEPTED, 1)
+
+
+def test_a_refusal_says_what_came_and_what_to_do_and_4_s_later_it_counts(world: World) -> None:
+    script, person = world.add_client("script", system_id=245), world.add_client("person")
+    script.move(20)
+    world.until_state(1, S.EXECUTING)
+    person.pause()
+    world.run(4)
+    script.proceed()
+    world.run(1)
+    person.pause()
+    world.run(0.2)
+    refused = script.proceed()
+    world.run(0.2)
+    assert refused.answer == STALE
+    words = "a pause by 255/190 came since: if you still mean it, send it again in 4 s"
+    assert script.texts()[-1] == words
+    world.run(4)
+    going = script.proceed()
+    world.run(0.2)
+    assert going.answer == (ACCEPTED, 1)
+
+
+def test_a_word_that_names_the_present_epoch_counts_and_one_that_names_another_does_not(
+    world: World,
+) -> None:
+    script, person = world.add_client("script", system_id=245), world.add_client("person")
+    script.move(20)
+    world.until_state(1, S.EXECUTING)
+    person.pause()
+    world.run(4)
+    script.request_status(1)
+    world.run(0.2)
+    shown = script.statuses(1)[-1].halt_epoch
+    assert shown > 1
+    person.pause()  # again, to be sure
+    world.run(0.5)
+    stale = script.command(PAUSE_CONTINUE, 1, shown)
+    world.run(0.2)
+    assert stale.answer == STALE
+    assert script.texts()[-1] == "a pause by 255/190 came since what you were shown: look again"
+    script.request_status(1)
+    world.run(0.2)
+    going = script.command(PAUSE_CONTINUE, 1, script.statuses(1)[-1].halt_epoch)
+    world.run(0.2)
+    assert going.answer == (ACCEPTED, 1)

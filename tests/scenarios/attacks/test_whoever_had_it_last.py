@@ -1,0 +1,79 @@
+"""Who drives by hand, or set HOLD, is obeyed until somebody who may lets the tasks go on.
+
+D7: a "go to" of another program behind the same router undid an operator's HOLD. D10: a person who
+parked a rover by HOLD, after driving it by hand, had it drive off with what waited.
+"""
+
+from math import nan
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Roles, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED
+from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
+
+CHANGE_MODE = 1  # of DO_REPOSITION
+
+
+def drive_by_hand(world: World) -> None:
+    """Let a person at the rover arm it and drive it by hand for a while."""
+    world.operator_mode(Mode.MANUAL)
+    world.operator_arm(True)
+    world.run(20)
+
+
+@pytest.mark.parametrize("when", ["before", "meanwhile"])
+def test_a_rover_that_a_person_parks_does_not_drive_off_with_what_waits(
+    world: World, when: str
+) -> None:
+    if when == "before":
+        world.client.command(54000, 3, 0, 0, 0, 0, 15, 5)  # begins in 15 s
+    drive_by_hand(world)
+    if when == "meanwhile":
+        world.client.move(3)
+    world.run(2)
+    world.operator_mode(Mode.HOLD)
+    before = world.pose()
+    world.run(20)
+    assert world.pose() == pytest.approx(before, abs=0.001)
+    assert world.paused() is R.TAKEOVER
+    assert world.state(1)[0] is S.QUEUED
+    going = world.client.proceed()
+    world.until_state(1, S.COMPLETED)
+    assert going.result == ACCEPTED
+
+
+def test_what_is_submitted_when_it_is_parked_begins(world: World) -> None:
+    drive_by_hand(world)
+    world.operator_mode(Mode.HOLD)
+    world.run(2)
+    world.client.move(1)
+    world.until_state(1, S.COMPLETED)
+
+
+def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(
+    make_world: MakeWorld,
+) -> None:
+    roles = Roles(addresses={"245/190": "submitter"})
+    world = make_world(persona=PROMPT_PX4, settings=Settings(roles=roles))
+    world.client.move(20, speed=0.5)
+    world.until(lambda: world.truth.forward_speed > 0.45, within=20)
+    ask_mode(world.client, HOLD)
+    world.run(0.3)
+    router_packs_as_another = common.MAVLink(None, 245, 190)
+    go_to = common.MAVLink_command_int_message(
+        1, 1, 6, REPOSITION, 0, 0, -1, CHANGE_MODE, 0, nan, *at(5.0, 0.0).values(), 0
+    )
+    world.client.send_raw(go_to.pack(router_packs_as_another))
+    world.run(6)
+    before = world.pose()
+    world.run(5)
+    assert world.pose() == pytest.approx(before, abs=0.01)
+    assert world.paused() is R.OPERATOR
+    assert [task.goal for task in world.tasks()][1:], "the goal itself is queued"

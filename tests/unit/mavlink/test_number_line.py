@@ -1,0 +1,65 @@
+"""How late a packet is, told by the numbers of its sender."""
+
+from mav_tasks.mavlink.number_line import NumberLine
+
+
+def line_of(*arrivals: tuple[int, float]) -> NumberLine:
+    """Give a line that has taken in these numbers at these times."""
+    line = NumberLine()
+    for seq, at in arrivals:
+        line.place(seq, now=at)
+    return line
+
+
+def test_numbers_are_counted_on_beyond_255() -> None:
+    line = line_of((254, 0.0), (255, 1.0))
+    assert line.place(0, now=2.0) == 256
+    assert line.place(3, now=3.0) == 259
+    assert line.last == 259
+
+
+def test_one_that_was_overtaken_had_left_before_what_overtook_it() -> None:
+    line = line_of((10, 1.0), (12, 2.0), (13, 3.0))
+    number = line.place(11, now=20.0)
+    assert number == 11
+    assert line.sent_by(number, now=20.0) == 2.0
+    assert line.last == 13
+
+
+def test_a_sender_that_does_not_count_is_taken_at_its_word() -> None:
+    line = line_of((0, 1.0), (0, 2.0))
+    assert line.sent_by(line.place(0, now=20.0), now=20.0) == 20.0
+
+
+def test_what_was_lost_in_between_was_passed_by_what_came_after_it() -> None:
+    line = line_of((250, 1.0), (5, 2.0))
+    for seq in (251, 255, 0, 4):
+        assert line.sent_by(line.place(seq, now=9.0), now=9.0) == 2.0
+
+
+def test_the_newest_may_have_left_just_now() -> None:
+    line = line_of((10, 1.0))
+    assert line.sent_by(line.place(11, now=5.0), now=5.0) == 5.0
+
+
+def test_a_sender_that_counts_from_0_again_is_believed_after_a_while() -> None:
+    line = line_of((100, 0.0))
+    assert line.place(0, now=10.0) == 0
+    assert line.place(1, now=11.0) == 1
+    number = line.place(2, now=12.0)
+    assert number > 100
+    assert line.place(3, now=13.0) == number + 1
+
+
+def test_a_burst_of_late_ones_is_none_that_begins_anew() -> None:
+    line = line_of((100, 0.0))
+    assert [line.place(seq, now=10.0) for seq in (60, 61, 62, 63)] == [60, 61, 62, 63]
+    assert line.place(101, now=10.1) == 101
+
+
+def test_late_ones_between_newer_ones_are_none_that_begins_anew() -> None:
+    line = line_of((100, 0.0))
+    for number in range(5):
+        assert line.place(50 + number, now=10.0 + number) == 50 + number
+        line.place(101 + number, now=10.5 + number)
+    assert line.last == 105
