@@ -90,7 +90,15 @@ async def pause(common: Common) -> None:
 
 
 @command
-async def resume(common: Common) -> None:
+async def resume(
+    common: Common,
+    epoch: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Only if nothing came since: halt_epoch of 'queue --json'."
+        ),
+    ] = None,
+) -> None:
     """Go on after a pause, a STOP or a takeover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.cli.words import line_of  # noqa: PLC0415
@@ -99,7 +107,7 @@ async def resume(common: Common) -> None:
 
     words = "goes on"
     async with opened(common) as client:
-        await client.resume()
+        await client.resume(epoch=epoch)
         with suppress(ClientError):  # it is resumed all the same
             first = (await client.queue(limit=0)).current
             if first is not None and first.state is TaskState.HELD:

@@ -156,6 +156,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
         "running": queue.running,
         "next": queue.next,
         "paused": None if queue.paused is None else queue.paused.name.lower(),
+        "halt_epoch": queue.halt_epoch,
         "waiting_count": queue.waiting_count,
         "capacity": queue.capacity,
         "counts": {state.name.lower(): count for state, count in queue.counts.items()},

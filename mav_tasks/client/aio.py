@@ -58,7 +58,9 @@ STOP_AGAIN = 0.1  # s
 STOP_WITHIN = 3.0  # s
 KILL = 1.0  # param2 of TASK_CANCEL
 RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
+EPOCHS = 1 << 24  # that a float32 tells apart
 PAGE = 16  # waiting tasks that one request shows
+OVERTAKEN = "a STOP has overtaken this: ask for it again if it is still meant"
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
 
 
@@ -99,6 +101,7 @@ class Client:
         self._served = asyncio.Event()
         self._tasks: WeakValueDictionary[Followed, Task] = WeakValueDictionary()
         self._submissions = Submissions()
+        self._halts = 0  # STOPs and pauses that were asked for here
 
     def __repr__(self) -> str:
         return f"Client({self._link}, {'closed' if self._connection is None else 'open'})"
@@ -269,13 +272,22 @@ class Client:
             await self._start_at(task_id, at, self._which(vehicle))
 
     async def release(
-        self, task_id: int | None, how: Release, *, vehicle: int | None = None
+        self,
+        task_id: int | None,
+        how: Release,
+        *,
+        epoch: int | None = None,
+        vehicle: int | None = None,
     ) -> int:
-        """Decide about a held task, None: the held one; gives its id."""
+        """Decide about a held task, None: the held one; gives its id. ``epoch`` as of ``resume``.
+
+        While the queue is paused the task goes on when that is resumed.
+        """
         if how not in RELEASES:
             raise ValueError(f"{how!r}: expected one of {', '.join(RELEASES)}")
-        value = RELEASES[how]
-        return await self._control(vehicle, MavCmd.TASK_RELEASE, float(task_id or 0), value)
+        seen = await self._seen(vehicle, epoch)
+        params = float(task_id or 0), RELEASES[how], seen
+        return await self._control(vehicle, MavCmd.TASK_RELEASE, *params)
 
     # the queue and the rovers
 
@@ -308,6 +320,7 @@ class Client:
         open link, ten times a second until it is answered, for ``within`` seconds. Refused
         (VEHICLE_SILENT) means that it stays in force, and reaches the rover when it is heard again.
         """
+        self._halts += 1
         command = m.CommandLong(
             vehicle or 0, 0, MavCmd.TASK_STOP, 0, float(clear), 0, 0, 0, 0, 0, 0
         )
@@ -317,17 +330,23 @@ class Client:
                 and other.param1 == RESUME
                 and vehicle in (None, 0, other.target_system)
             ),
-            "a STOP has overtaken this: ask for it again if it is still meant",
+            OVERTAKEN,
         )
         await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
 
     async def pause(self, *, vehicle: int | None = None) -> None:
         """Stop the rover where it is, so that its task can go on."""
+        self._halts += 1
         await self._control(vehicle, MavCmd.DO_PAUSE_CONTINUE, 0.0, is_urgent=True)
 
-    async def resume(self, *, vehicle: int | None = None) -> None:
-        """Go on after a pause, a STOP or a takeover. Refused says what is in the way."""
-        await self._control(vehicle, MavCmd.DO_PAUSE_CONTINUE, RESUME)
+    async def resume(self, *, epoch: int | None = None, vehicle: int | None = None) -> None:
+        """Go on after a pause, a STOP or a takeover. Refused says what is in the way.
+
+        ``epoch`` is the ``halt_epoch`` of the status that you have seen, None: of now. Whatever
+        makes the rover stand after that is not undone: Refused (STALE), however long this took.
+        """
+        seen = await self._seen(vehicle, epoch)
+        await self._control(vehicle, MavCmd.DO_PAUSE_CONTINUE, RESUME, seen)
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Give the rovers of the server, as they were heard last."""
@@ -381,9 +400,13 @@ class Client:
             items = wire.with_home(items)
         return await self._submit_plan(items, system_id, None, component=AUTOPILOT)
 
-    async def start_mission(self, *, vehicle: int | None = None) -> Task:
-        """Start the mission that waits there, or the last one again, as another task."""
-        task_id = await self._control(vehicle, MavCmd.MISSION_START)
+    async def start_mission(self, *, epoch: int | None = None, vehicle: int | None = None) -> Task:
+        """Start the mission that waits there, or the last one again, as another task.
+
+        ``epoch`` as of ``resume``.
+        """
+        seen = await self._seen(vehicle, epoch)
+        task_id = await self._control(vehicle, MavCmd.MISSION_START, 0.0, 0.0, seen)
         return await self.task(task_id, vehicle=self._which(vehicle))
 
     async def mission(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
@@ -481,6 +504,18 @@ class Client:
         filled = (*params, *(0.0,) * (6 - len(params)), float(self._submissions.nonce()))
         message = m.CommandLong(self._which(vehicle), AUTOPILOT, command, 0, *filled)
         return await self._ask.ask(message, command.name, is_urgent=is_urgent, fits=fits)
+
+    async def _seen(self, vehicle: int | None, epoch: int | None) -> float:
+        """Return what names an epoch in a command; None: the present one.
+
+        Raise ClientError if this client itself has asked for a STOP or a pause since.
+        """
+        if epoch is None:
+            halts = self._halts
+            epoch = (await self._ask.overview(self._which(vehicle))).halt_epoch
+            if halts != self._halts:
+                raise ClientError(OVERTAKEN)
+        return float(epoch % EPOCHS)
 
     async def _cancel(self, task_id: int | None, how: float, vehicle: int | None) -> int:
         if task_id is None:  # by its id: a command that is repeated must not call off the next one

@@ -335,9 +335,16 @@ class SyncClient:
             )
         )
 
-    def release(self, task_id: int | None, how: Release, *, vehicle: int | None = None) -> int:
+    def release(
+        self,
+        task_id: int | None,
+        how: Release,
+        *,
+        epoch: int | None = None,
+        vehicle: int | None = None,
+    ) -> int:
         """Decide about a held task, None: the held one; gives its id."""
-        return self._call(lambda client: client.release(task_id, how, vehicle=vehicle))
+        return self._call(lambda client: client.release(task_id, how, epoch=epoch, vehicle=vehicle))
 
     def queue(self, *, vehicle: int | None = None, limit: int = 100) -> QueueStatus:
         """Ask what a rover does and what waits."""
@@ -353,9 +360,9 @@ class SyncClient:
         """Stop the rover where it is, so that its task can go on."""
         self._call(lambda client: client.pause(vehicle=vehicle))
 
-    def resume(self, *, vehicle: int | None = None) -> None:
+    def resume(self, *, epoch: int | None = None, vehicle: int | None = None) -> None:
         """Go on after a pause, a STOP or a takeover."""
-        self._call(lambda client: client.resume(vehicle=vehicle))
+        self._call(lambda client: client.resume(epoch=epoch, vehicle=vehicle))
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Give the rovers of the server, as they were heard last."""
@@ -400,9 +407,9 @@ class SyncClient:
         """Upload a mission to where it waits until it is started."""
         return self._task(lambda client: client.stage_mission(plan, vehicle=vehicle))
 
-    def start_mission(self, *, vehicle: int | None = None) -> SyncTask:
+    def start_mission(self, *, epoch: int | None = None, vehicle: int | None = None) -> SyncTask:
         """Start the mission that waits there, or the last one again."""
-        return self._task(lambda client: client.start_mission(vehicle=vehicle))
+        return self._task(lambda client: client.start_mission(epoch=epoch, vehicle=vehicle))
 
     def mission(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
         """Fetch the mission as it was uploaded."""

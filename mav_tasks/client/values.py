@@ -28,7 +28,8 @@ class TaskStatus:
 
     ``progress`` is 0 to 1, ``remaining`` in ``unit``, times in seconds; None is "not known".
     ``position`` counts the tasks that run before it; only answers to a question have it. ``step``
-    of ``steps`` is the item of a plan that is being driven. ``version`` grows with each change.
+    of ``steps`` is the item of a plan that is being driven. ``version`` grows with each change,
+    ``halt_epoch`` with all that makes its rover stand.
     """
 
     id: int
@@ -51,6 +52,7 @@ class TaskStatus:
     steps: int
     submitter: str
     version: int
+    halt_epoch: int = 0
 
     @property
     def is_over(self) -> bool:
@@ -73,7 +75,8 @@ class QueueStatus:
     """A rover's queue. ``paused`` says why nothing runs, None: it does.
 
     ``counts`` are its tasks by state; ``waiting`` are those asked for, in the order in which they
-    run, those that wait for a time or another task after them.
+    run, those that wait for a time or another task after them. ``halt_epoch`` grows with all that
+    makes the rover stand.
     """
 
     vehicle: int
@@ -85,6 +88,7 @@ class QueueStatus:
     waiting: tuple[TaskStatus, ...]
     current: TaskStatus | None
     version: int
+    halt_epoch: int = 0
 
     @property
     def waiting_count(self) -> int:
@@ -165,6 +169,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         steps=message.step_count,
         submitter=f"{message.submitter_system}/{message.submitter_component}",
         version=message.version,
+        halt_epoch=message.halt_epoch,
     )
 
 
@@ -202,6 +207,7 @@ def queue_status_of(
         waiting=waiting,
         current=current,
         version=message.version,
+        halt_epoch=message.halt_epoch,
     )
 
 

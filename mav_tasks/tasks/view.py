@@ -19,7 +19,9 @@ class ModeKind(Enum):
     HOLD = auto()
     #: a person drives
     MANUAL = auto()
-    #: anything else: its own mission, return, or a mode that somebody else set
+    #: takes our setpoints, but it was somebody else who set it
+    THEIRS = auto()
+    #: anything else: its own mission, return, or a mode in which somebody drives
     OTHER = auto()
 
 

@@ -303,6 +303,34 @@ def test_a_stop_goes_out_at_once_and_no_earlier_resume_undoes_it(world: RoverWor
     world.run(script())
 
 
+def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld) -> None:
+    """Attack D1: its copies go on for 10 s, and a person pauses in between."""
+
+    async def script() -> None:
+        async with world.client() as client, world.client() as person:
+            await client.submit(Move(20.0))
+            await asyncio.sleep(4.0)
+            await client.pause()
+            seen = await client.queue()
+            await person.pause()
+            with pytest.raises(Refused, match="since what you were shown") as refused:
+                await client.resume(epoch=seen.halt_epoch)
+            assert refused.value.reason == TaskReason.STALE
+            with world.lossy_link(loss=0.3, delay=1.0):
+                resuming = asyncio.create_task(client.resume())
+                await asyncio.sleep(4.0)
+                await person.stop()
+                with suppress(MavTasksError):
+                    await resuming
+            await asyncio.sleep(15.0)
+            assert world.rovers[0].stands
+            assert (await person.queue()).paused is TaskReason.STOPPED
+            await person.resume()
+            assert (await person.queue()).paused is None
+
+    world.run(script())
+
+
 def begin_anew(world: RoverWorld) -> None:
     """Kill the server and start it on an empty store: its ids begin at 1 again."""
     world.server.kill()
