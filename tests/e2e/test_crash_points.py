@@ -332,8 +332,8 @@ def status(story: Story, task: int) -> tuple[S, R] | None:
             if message.command == REQUEST and message.result != 0:
                 return None
             continue
-        data = bytes(message.get_msgbuf()[10:-2]).ljust(104, b"\0")
-        fields = struct.unpack("<5I4f4H10B50s", data)
+        data = bytes(message.get_msgbuf()[10:-2]).ljust(108, b"\0")[:108]
+        fields = struct.unpack("<5I4f4H10B50sI", data)
         if fields[1] == task:
             return S(fields[15]), R(fields[16])
 

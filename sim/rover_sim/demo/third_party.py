@@ -160,8 +160,8 @@ class ThirdParty:
         )
 
     def _take_status(self, message: Any) -> None:
-        payload = bytes(message.get_msgbuf()[10:-2]).ljust(104, b"\0")
-        fields = struct.unpack("<5I4f4H10B50s", payload)
+        payload = bytes(message.get_msgbuf()[10:-2]).ljust(108, b"\0")[:108]
+        fields = struct.unpack("<5I4f4H10B50sI", payload)
         task_id, execution_time, position = fields[1], fields[8], fields[10]
         state, progress = fields[15], fields[18]
         text = fields[23].split(b"\0")[0].decode("utf-8", "replace")

@@ -224,10 +224,11 @@ class TestHeldTasks:
         assert rig.states() == [S.PAUSED, S.HELD]
         self.release(rig, rover, again=True, task_id=2)
         run(rig, rover, seconds=1.0)
+        assert rig.states() == [S.PAUSED, S.HELD], "the queue is paused"
+        rig.tasks.proceed(rover.view(rig.now), actor=BY, now=rig.now)
+        run(rig, rover, seconds=1.0)
         assert rig.states() == [S.PAUSED, S.EXECUTING]
         rig.cancel(2)
-        run(rig, rover, seconds=1.0)
-        rig.tasks.proceed(rover.view(rig.now), actor=BY, now=rig.now)
         run(rig, rover, seconds=1.0)
         assert rig.states() == [S.EXECUTING, S.CANCELLED]
 
