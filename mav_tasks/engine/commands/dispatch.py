@@ -36,8 +36,8 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
-from mav_tasks.services.command_sender import Answered
-from mav_tasks.settings import Settings
+from mav_tasks.services.command_sender import Answered, Standing
+from mav_tasks.settings import ROLES, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
@@ -307,6 +307,11 @@ class Commands:
             if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
                 result = MavResult.UNSUPPORTED  # as some say that they have no such message
             answer = Answer(command, result, ack.result_param2, asker.answering)
+        elif not answered.was_sent:
+            reason = int(R.RATE_LIMITED)
+            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
+            words = f"command {command}: rover {vehicle.system_id} is busy, ask again"
+            client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         elif command == MavCmd.REQUEST_MESSAGE:
             answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
         else:
@@ -407,4 +412,11 @@ def _relay(asked: Asked, *, now: float) -> None:
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
     asker = _Asker(asked.client.key, asked.packet.source, answering)
-    asked.vehicle.relay(asked.packet, command.message, asker, command=command.command, now=now)
+    asked.vehicle.relay(
+        asked.packet,
+        command.message,
+        asker,
+        command=command.command,
+        standing=Standing(asked.client.key, ROLES.index(asked.rights.role)),
+        now=now,
+    )
