@@ -11,7 +11,7 @@ from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.clients.rights import OPERATOR, SAFETY
+from mav_tasks.engine.clients.rights import OPERATOR, SAFETY, SUBMITTER
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import (
     CHANGE_MODE,
@@ -239,7 +239,16 @@ class Commands:
             return
         else:  # also to a component never heard of: an autopilot does what that is told
             _check_relay(asked, now=now)
+            self._check_question(asked, now=now)
             _relay(asked, now=now)
+
+    def _check_question(self, asked: Asked, *, now: float) -> None:
+        """Refuse an observer's question that is too much for the link to the rover."""
+        if asked.command.command in ASKING and not asked.rights.reach(SUBMITTER):
+            message = asked.command.message
+            why_not = self._vehicles.why_not_asked(asked.vehicle, asked.packet, message, now=now)
+            if why_not is not None:
+                raise asked.rights.refusal(why_not, R.RATE_LIMITED)
 
     def _refuse_unknown(self, asked: Asked, *, now: float) -> None:
         words = f"command {asked.command.command}: not supported in this version"
