@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
 from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import REQUEST, SET_INTERVAL, FakeClient, command_long
@@ -62,6 +63,30 @@ class Meter:
         return sum(message_id in (None, data[7]) for data in self.came) / seconds
 
 
+class Buffer:
+    """A radio of 57,600 baud with a buffer of 16 KB: what is too much comes late, or not at all."""
+
+    def __init__(self, world: World) -> None:
+        self._world, self._send = world, world.watched.send
+        self._free_at = 0.0
+        self.delays: list[float] = []
+        world.watched.send = self._through  # type: ignore[method-assign]
+
+    def _through(self, source: str, target: str, data: bytes) -> None:
+        if (source, target) != ("rover1", VEHICLE_LINK):
+            self._send(source, target, data)
+            return
+        net = self._world.watched
+        waits = max(self._free_at - net.now, 0.0)
+        if waits * CAPACITY + len(data) > 16_000:
+            return
+        self._free_at = net.now + waits + len(data) / CAPACITY
+        self.delays.append(self._free_at - net.now)
+        usual, net.conditions = net.conditions, Conditions(delay=self._free_at - net.now)
+        self._send(source, target, data)
+        net.conditions = usual
+
+
 def radio(world: World) -> World:
     """Let the way to the rover be a serial line from now on."""
     change = LinkChanged(
@@ -98,6 +123,21 @@ def test_an_observer_does_not_fill_a_radio(make_world: MakeWorld) -> None:
     assert meter.rate(10.0) < OWN
     wish_for_all(world, join(world, OBSERVER))
     assert meter.rate(10.0) < BUDGET
+
+
+def test_telemetry_over_a_radio_with_a_buffer_stays_fresh(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer, buffer = join(world, OBSERVER), Buffer(world)
+    wish_for_all(world, observer)
+    observer.stream(common.MAVLink_param_request_list_message(1, 1), rate=10)
+    observer.stream(command_long(REQUEST, 148, target=(1, 1)), rate=100)
+    task = world.client.move(8.0, speed=1.0)
+    world.run(1.0)
+    buffer.delays.clear()
+    world.until_state(task.task_id, S.COMPLETED)
+    print(f"longest delay {max(buffer.delays):.3f} s")
+    assert max(buffer.delays) < 0.2
+    assert abs(world.truth.north - 8.0) < 0.1
 
 
 def test_nor_do_ten_of_them(make_world: MakeWorld) -> None:
