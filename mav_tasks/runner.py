@@ -24,7 +24,7 @@ from mav_tasks.engine.inputs import (
     Shutdown,
     WallClock,
 )
-from mav_tasks.links.base import TEND_PERIOD, Link, PeerChange, PeerState, StreamLink
+from mav_tasks.links.base import TEND_PERIOD, Link, PacedLink, PeerChange, PeerState, StreamLink
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.pump import Pump
@@ -61,6 +61,7 @@ def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> 
         is_stream=link.is_stream,
         takes_unsigned=policy.takes_unsigned,
         key=policy.key,
+        capacity=link.capacity if isinstance(link, PacedLink) else None,
     )
 
 

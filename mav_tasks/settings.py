@@ -99,6 +99,9 @@ class Clients:
     stream_interval: float = 0.1  # s, between telemetry messages of one id, unless asked otherwise
     text_rate: float = 10.0  # STATUSTEXT per second to one client; beyond they are only counted
     packet_rate: float = 2_000.0  # datagrams per second of one client; beyond: not looked at
+    #: bytes per second that vehicles behind one endpoint are asked to stream; of a serial line no
+    #: more than it carries. Less where a radio is behind a UDP or TCP link
+    telemetry_budget: float = 50_000.0
     status_rate: float = 50.0  # pushed TASK_STATUS per second to one client; beyond: coalesced
     #: priority of the standard commands of a client, 0–10, by its MAVLink address, "255/190", or by
     #: address and endpoint, "255/190@127.0.0.1:14550"; of others 5

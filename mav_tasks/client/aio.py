@@ -39,6 +39,7 @@ from mav_tasks.mavlink.enums import (
     MavResult,
     TaskProperty,
 )
+from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import (
     PlanFile,
@@ -188,8 +189,8 @@ class Client:
         ``priority`` 0 to 10, 10 runs first. ``after`` names a task that must complete first.
         ``delay`` in seconds is waited before it runs, ``deadline`` in seconds is when it must have
         begun (0: neither); ``at`` is a start at a time of day, with its time zone. It is sent until
-        it is answered, and is one task however often it arrives: ``nonce`` (1 to 16,777,215, random
-        if 0) is its mark, for a second try after NoAnswer.
+        it is answered, and is one task however often it arrives: ``nonce`` (1 to 1,065,353,215, 0:
+        one by chance) is its mark, for a second try after NoAnswer.
         """
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
@@ -260,14 +261,14 @@ class Client:
         named: tuple[tuple[TaskProperty, float | None], ...] = (
             (TaskProperty.PRIORITY, priority),
             (TaskProperty.DEADLINE, deadline),
-            (TaskProperty.RUN_AFTER, None if after is None else _id_of(after)),
+            (TaskProperty.RUN_AFTER, None if after is None else to_param(_id_of(after))),
             (TaskProperty.PREEMPTIBLE, preemptible),
             (TaskProperty.PREEMPTIVE, preemptive),
             (TaskProperty.START_DELAY, delay),
         )
         changes += [(name, float(value)) for name, value in named if value is not None]
         for name, value in changes:
-            await self._control(vehicle, MavCmd.TASK_MODIFY, float(task_id), float(name), value)
+            await self._control(vehicle, MavCmd.TASK_MODIFY, to_param(task_id), float(name), value)
         if at is not None:
             await self._start_at(task_id, at, self._which(vehicle))
 
@@ -286,7 +287,7 @@ class Client:
         if how not in RELEASES:
             raise ValueError(f"{how!r}: expected one of {', '.join(RELEASES)}")
         seen = await self._seen(vehicle, epoch)
-        params = float(task_id or 0), RELEASES[how], seen
+        params = to_param(task_id or 0), RELEASES[how], seen
         return await self._control(vehicle, MavCmd.TASK_RELEASE, *params)
 
     # the queue and the rovers
@@ -501,7 +502,7 @@ class Client:
     ) -> int:
         # An unused parameter marks each call as one of its own: the server takes an equal command
         # that follows within 2.5 s for a copy, and so a resume before a STOP for the one after it.
-        filled = (*params, *(0.0,) * (6 - len(params)), float(self._submissions.nonce()))
+        filled = (*params, *(0.0,) * (6 - len(params)), to_param(self._submissions.nonce()))
         message = m.CommandLong(self._which(vehicle), AUTOPILOT, command, 0, *filled)
         return await self._ask.ask(message, command.name, is_urgent=is_urgent, fits=fits)
 
@@ -526,7 +527,7 @@ class Client:
         await self._control(
             vehicle,
             MavCmd.TASK_CANCEL,
-            float(task_id),
+            to_param(task_id),
             how,
             is_urgent=how == KILL,
             fits=lambda ack: ack.result_param2 == task_id,
@@ -542,7 +543,7 @@ class Client:
             MavCmd.TASK_MODIFY,
             0,
             0,
-            float(task_id),
+            to_param(task_id),
             float(TaskProperty.START_UTC),
             nan,
             nan,

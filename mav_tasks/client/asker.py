@@ -14,6 +14,7 @@ from mav_tasks.errors import ClientError, NoAnswer, Refused
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType, MavSeverity
+from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.services.mission_item import Item, message_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
@@ -137,7 +138,7 @@ class Asker:
 
     async def status(self, task_id: int, vehicle: int) -> TaskStatus:
         """Ask how a task is."""
-        request = request_message(vehicle, m.TaskStatus.id, float(task_id))
+        request = request_message(vehicle, m.TaskStatus.id, to_param(task_id))
         with self._future(TaskStatus) as future:
 
             def take(status: TaskStatus) -> None:
@@ -149,7 +150,7 @@ class Asker:
 
     async def timing(self, task_id: int, vehicle: int) -> TaskTiming:
         """Ask how evenly the setpoints of a task left; 0: of the running one."""
-        request = request_message(vehicle, m.TaskTiming.id, float(task_id))
+        request = request_message(vehicle, m.TaskTiming.id, to_param(task_id))
         with self._future(TaskTiming) as future:
 
             def take(timing: TaskTiming) -> None:

@@ -33,7 +33,7 @@ class Task:
 
     @property
     def id(self) -> int:
-        """Its number, which the server never gives again."""
+        """Its number, which the server gives to no other while it may be asked for."""
         return self._followed.id
 
     @property

@@ -26,6 +26,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, MavState
+from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import text_receiver
 from mav_tasks.services.heartbeat import HeartbeatSender, component_heartbeat
@@ -262,7 +263,7 @@ class Session:
                 self.watch.lose(followed)
                 self.on_news(followed)
 
-        request = request_message(vehicle, m.TaskStatus.id, float(followed.id))
+        request = request_message(vehicle, m.TaskStatus.id, to_param(followed.id))
         self.call(request, done, now=now, within=FOLLOWED_AGAIN)
         interval = self.watch.stream_of(vehicle)
         if interval is not None and followed.status is not None and followed.status.is_active:

@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from random import SystemRandom
 
 from mav_tasks.client import wire
-from mav_tasks.tasks.task import MAX_TASK_ID
+from mav_tasks.tasks.task import MAX_NONCE
 
 LATE_ACK = 3.0  # s, in which a copy of an ack may still come
 REMEMBERED_IDS = 10_000
@@ -17,17 +17,21 @@ class Submissions:
     def __init__(self) -> None:
         self._nonces: dict[int, tuple[int, float]] = {}  # by task id; when that was
         self._delays: dict[int, float] = {}  # by nonce, of starts at a time of day
-        self._last_nonce = SystemRandom().randrange(MAX_TASK_ID)
+        self._last_nonce = SystemRandom().randrange(MAX_NONCE)
 
     def __repr__(self) -> str:
         return f"Submissions({len(self._nonces)} remembered)"
 
     def nonce(self, wished: int = 0) -> int:
-        """Give the nonce wished for, or one not used yet: from a random one on, each once."""
+        """Give the nonce wished for, or one not used yet: from a random one on, each once.
+
+        All scripts of an address share one set of nonces. The server takes one for a copy until 10
+        minutes after its task is over: two processes rarely draw the same of 10⁹ by then.
+        """
         wire.check_nonce(wished)
         if wished:
             return wished
-        self._last_nonce = self._last_nonce % MAX_TASK_ID + 1
+        self._last_nonce = self._last_nonce % MAX_NONCE + 1
         return self._last_nonce
 
     def note(self, task_id: int, nonce: int, *, now: float) -> None:

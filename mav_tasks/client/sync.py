@@ -100,7 +100,7 @@ class SyncTask:
 
     @property
     def id(self) -> int:
-        """Its number, which the server never gives again."""
+        """Its number, which the server gives to no other while it may be asked for."""
         return self._task.id
 
     @property

@@ -11,6 +11,7 @@ from math import degrees, isfinite
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.plan_files.values import PlanItem
 from mav_tasks.services.mission_item import Item
 from mav_tasks.tasks.goal import (
@@ -24,7 +25,7 @@ from mav_tasks.tasks.goal import (
     Rotate,
     Wait,
 )
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_TASK_ID
 
 #: what a client can ask for; angles in radians
 Goal = Move | Rotate | Drive | GoTo | Face | Wait
@@ -58,7 +59,7 @@ class WishedTerms:
 
 def check_nonce(nonce: int) -> None:
     """Raise ValueError for what is no nonce, and not 0 for none."""
-    _whole("nonce", nonce, 0, MAX_TASK_ID)
+    _whole("nonce", nonce, 0, MAX_NONCE)
 
 
 def is_command(goal: Goal) -> bool:
@@ -78,8 +79,8 @@ def command_of(
         first,
         second,
         third,
-        float(nonce),
-        float(terms.after),
+        to_param(nonce),
+        to_param(terms.after),
         terms.delay,
         float(terms.priority),
     )
@@ -140,7 +141,7 @@ def options_of(terms: WishedTerms, *, nonce: int) -> Item:
         float(terms.priority),
         terms.delay,
         terms.deadline,
-        float(terms.after),
+        to_param(terms.after),
         nonce,
         0,
         0.0,

@@ -23,6 +23,7 @@ from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands.asked import AskedByMessage
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.mode_requests import ModeRequests
@@ -140,7 +141,12 @@ class Engine:
             settings,
         )
         self._publisher = Publisher(
-            self._gcs, self._vehicles, self._book, self._displays, self._submissions
+            self._gcs,
+            self._vehicles,
+            self._book,
+            self._displays,
+            self._submissions,
+            TelemetryRates(self._gcs, self._vehicles),
         )
         self._passing = Passing(self._vehicles, self._vehicles.our_address, refusals)
         self._requests = RequestLimit(self._vehicles, refusals)

@@ -35,7 +35,8 @@ class LinkChanged:
     ``is_local``: nobody beyond this machine can be on it. ``is_stream``: what it gives may be cut
     anywhere, and it tells by PeerChanged who is there. ``takes_unsigned``: so is what nobody has
     signed; ``key`` is the name of the key that signs what goes to whoever has not signed yet, and
-    on a vehicle link the only one that counts.
+    on a vehicle link the only one that counts. ``capacity``: bytes a second that it carries, None
+    where that is not known.
     """
 
     link: str
@@ -46,6 +47,7 @@ class LinkChanged:
     is_stream: bool = False
     takes_unsigned: bool = True
     key: str = ""
+    capacity: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,4 +79,12 @@ class StreamLink(Link, Protocol):
         ...
 
 
+@runtime_checkable
+class PacedLink(Link, Protocol):
+    """A link that knows how much it carries."""
+
+    #: bytes a second, each way
+    capacity: float
+
+
 TEND_PERIOD = 0.05  # s

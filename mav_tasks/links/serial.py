@@ -40,6 +40,7 @@ class SerialLink:
 
     def __init__(self, url: SerialUrl, *, way: WayOut) -> None:
         self.name = str(url)
+        self.capacity = url.baud / BITS
         self._url = url
         self._way = way
         self._selector = selectors.DefaultSelector()

@@ -157,8 +157,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["packets", now, link, pairs]
         case LinkChanged():
             peers = [_peer_to_json(peer) for peer in item.peers]
-            end = [peers, item.is_local, item.is_stream, item.takes_unsigned, item.key]
-            return ["link", now, item.link, item.side.name, item.up, *end]
+            end = [item.is_local, item.is_stream, item.takes_unsigned, item.key, item.capacity]
+            return ["link", now, item.link, item.side.name, item.up, peers, *end]
         case KeysChanged(keys=keys):
             told = [[key.name, key.role, key.fingerprint, bool(key.secret)] for key in keys]
             return ["keys", now, told]

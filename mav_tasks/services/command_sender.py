@@ -6,14 +6,19 @@ answered or given up, and for a while after it was given up a late ack is taken 
 and dropped. Urgent commands (disarm, HOLD) never wait; the answer to one is for all clients that
 ask for it. DEVIATION: our own repeats keep
 ``confirmation`` 0, because a vehicle carries each copy out whatever it says.
+
+A lane is shared fairly: our own commands go first, then those of higher ranks, then those of
+clients that have fewer before them. Clients that ask for the same message share one request.
 """
 
-from collections import deque
+from bisect import insort
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from math import inf
+from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavResult
+from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.retry import Retry
@@ -21,18 +26,37 @@ from mav_tasks.services.retry import Retry
 REPEAT = 0.25  # s, between our own repeats
 LATE = 0.4  # s, during which acks of a command given up are still expected
 KEPT_LANES = 16  # beyond these, idle ones are forgotten
-MAX_WAITING = 16  # commands of one id; more are answered "busy" at once
+MAX_WAITING = 16  # commands of one id; beyond, the last in order is answered "busy" at once
+LEFT_TO_ANSWER = 0.5  # of the time that a question waits: sent later, it seemed unanswered
+MAX_EACH = 4  # commands of one id and one client, so that one alone does not fill a lane
+
+#: commands that only ask: one answer is enough for all clients that ask the same
+SHARED = frozenset({MavCmd.REQUEST_MESSAGE})
 
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """A command is over: ``ack`` is the vehicle's answer, None if it gave none in time."""
+    """A command is over: ``ack`` is the vehicle's answer, None if it gave none in time.
+
+    ``was_sent`` is False if the command never left, because others were before it.
+    """
 
     origin: Hashable  # who asked; None: ourselves
     component: int
     command: int
     ack: CommandAck | None
     request: Message
+    was_sent: bool
+
+
+class Standing(NamedTuple):
+    """Whose command it is, and how that client ranks: a higher rank goes first."""
+
+    client: Hashable
+    rank: float
+
+
+OURS = Standing(None, inf)
 
 
 _LaneKey = tuple[int, int]  # component, command id
@@ -45,8 +69,21 @@ class _Request:
     message: Message
     packet: Packet | None  # a client's, forwarded as it came; None: ours, to be encoded
     retry: Retry
+    standing: Standing = OURS
     is_urgent: bool = False
+    turn: int = 0  # commands of the same client that were before it in the lane
     joined: list["_Request"] = field(default_factory=list)  # of other clients, the same wish
+
+    @property
+    def wait_until(self) -> float:
+        """When it is given up unsent: a client's question leaves the vehicle time to answer."""
+        is_question = self.standing is not OURS and self.lane[1] in SHARED
+        return self.retry.give_up_at - LEFT_TO_ANSWER * self.retry.interval * is_question
+
+    @property
+    def order(self) -> tuple[float, int]:
+        """What the commands that wait are sorted by."""
+        return -self.standing.rank, self.turn
 
 
 @dataclass(slots=True)
@@ -54,10 +91,15 @@ class _Lane:
     """All commands of one id."""
 
     in_flight: _Request | None = None
-    waiting: deque[_Request] = field(default_factory=deque)
+    waiting: list[_Request] = field(default_factory=list)  # in the order in which they are sent
     owed: int = 0  # acks still to come of commands that an urgent one has pushed aside
     owed_until: float = 0.0
     quiet_until: float = 0.0  # late acks may still come; nothing is sent meanwhile
+
+    @property
+    def requests(self) -> list[_Request]:
+        """What is in flight and what waits."""
+        return [*([self.in_flight] if self.in_flight else []), *self.waiting]
 
 
 class CommandSender:
@@ -97,13 +139,15 @@ class CommandSender:
         *,
         component: int,
         command: int,
+        standing: Standing,
         now: float,
         give_up_after: float,
         urgent: bool = False,
     ) -> None:
         """Forward a client's command once; its answer, or its lack of one, comes from ``take``."""
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
-        request = _Request(origin, (component, command), message, packet, retry, urgent)
+        lane = (component, command)
+        request = _Request(origin, lane, message, packet, retry, standing, urgent)
         self._enqueue(request, now=now, urgent=urgent)
 
     def withdraw(self, component: int, command: int) -> None:
@@ -111,7 +155,7 @@ class CommandSender:
         lane = self._lanes.get((component, command))
         if lane is None:
             return
-        lane.waiting = deque(request for request in lane.waiting if request.origin is not None)
+        lane.waiting = [request for request in lane.waiting if request.origin is not None]
         if lane.in_flight is not None and lane.in_flight.origin is None:
             lane.quiet_until = lane.in_flight.retry.next_at - REPEAT + LATE
             lane.in_flight = None
@@ -135,8 +179,7 @@ class CommandSender:
         lane = self._lanes.get((component, command))
         if lane is None:
             return False
-        requests = [*lane.waiting, *([lane.in_flight] if lane.in_flight else [])]
-        return any(request.origin is None for request in requests)
+        return any(request.origin is None for request in lane.requests)
 
     def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
         """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
@@ -167,7 +210,7 @@ class CommandSender:
                 lane.in_flight = None
                 lane.quiet_until = now + LATE
                 self._answer(flying, None)
-            for request in [r for r in lane.waiting if r.retry.is_over(now)]:
+            for request in [r for r in lane.waiting if now >= r.wait_until]:
                 lane.waiting.remove(request)
                 self._answer(request, None)
             self._advance(lane, now=now)
@@ -188,7 +231,7 @@ class CommandSender:
                 deadlines.append(lane.in_flight.retry.next_deadline())
                 deadlines += [request.retry.give_up_at for request in lane.in_flight.joined]
             if lane.waiting:
-                deadlines.append(min(request.retry.give_up_at for request in lane.waiting))
+                deadlines.append(min(request.wait_until for request in lane.waiting))
                 if lane.in_flight is None:
                     deadlines.append(lane.quiet_until)
         return min(deadlines, default=None)
@@ -222,15 +265,31 @@ class CommandSender:
             lane.in_flight = request
             self._send(request, now=now)
             return
-        if len(lane.waiting) >= MAX_WAITING:
-            self._answer(request, None)
+        if request.standing is not OURS and not self._takes(lane, request):
             return
-        lane.waiting.append(request)
+        insort(lane.waiting, request, key=lambda each: each.order)
+        if len(lane.waiting) > MAX_WAITING:
+            self._answer(lane.waiting.pop(), None)
         self._advance(lane, now=now)
+
+    def _takes(self, lane: _Lane, request: _Request) -> bool:
+        """Whether a client's command is to wait; else it has joined another, or is answered."""
+        client = request.standing.client
+        before = [each for one in lane.requests for each in (one, *one.joined)]
+        request.turn = sum(each.standing.client == client for each in before)
+        if request.turn >= MAX_EACH:
+            self._answer(request, None)
+            return False
+        if request.lane[1] in SHARED:
+            for other in lane.requests:
+                if other.standing is not OURS and _asks_the_same(other, request):
+                    other.joined.append(request)
+                    return False
+        return True
 
     def _advance(self, lane: _Lane, *, now: float) -> None:
         if lane.in_flight is None and lane.waiting and now >= lane.quiet_until:
-            lane.in_flight = lane.waiting.popleft()
+            lane.in_flight = lane.waiting.pop(0)
         flying = lane.in_flight
         if flying is not None and flying.retry.is_due(now):
             self._send(flying, now=now)
@@ -240,17 +299,19 @@ class CommandSender:
         self._outgoing.append(request.message if request.packet is None else request.packet)
 
     def _answer(self, request: _Request, ack: CommandAck | None) -> None:
+        was_sent = request.retry.sent > 0
         for each in (*request.joined, request):
-            self._answers.append(Answered(each.origin, *each.lane, ack, each.message))
+            answered = Answered(each.origin, *each.lane, ack, each.message, was_sent)
+            self._answers.append(answered)
 
 
 def _is_same_wish(one: _Request, other: _Request) -> bool:
     """Whether two commands of clients ask for the same urgent thing."""
-    return (
-        one.is_urgent
-        and None not in (one.packet, other.packet)
-        and all(
-            getattr(one.message, name) == getattr(other.message, name)
-            for name in ("param1", "param2", "param3", "param4")
-        )
+    return one.is_urgent and None not in (one.packet, other.packet) and _asks_the_same(one, other)
+
+
+def _asks_the_same(one: _Request, other: _Request) -> bool:
+    return all(
+        getattr(one.message, name) == getattr(other.message, name)
+        for name in ("target_component", "param1", "param2", "param3", "param4")
     )

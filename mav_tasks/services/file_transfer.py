@@ -15,11 +15,17 @@ FILE_NOT_FOUND = 10
 READING = frozenset({0, 1, 3, 4, 5, 14, 15})
 #: offsets in the payload: session after a 16-bit sequence number, then the opcode
 SESSION, OPCODE = 2, 3
+BURST_READ = 15  # a whole file, unasked for each piece
 
 
 def reads(request: m.FileTransferProtocol) -> bool:
     """Whether a request changes no file."""
     return request.payload[OPCODE] in READING
+
+
+def is_burst(request: m.FileTransferProtocol) -> bool:
+    """Whether one request is answered by many packets."""
+    return bool(request.payload[OPCODE] == BURST_READ)
 
 
 def refusal(request: m.FileTransferProtocol, *, to: Address) -> m.FileTransferProtocol | None:

@@ -6,6 +6,7 @@ out of what is forwarded to it.
 """
 
 from mav_tasks.mavlink import messages as m
+from mav_tasks.services.interval_requester import WANTED
 from mav_tasks.services.stretch import Stretch
 
 #: Messages that vehicles send as streams, by id: only these are thinned. Everything else is an
@@ -72,11 +73,30 @@ class Thinner:
         #: s between messages that the client has no wish for
         self.default_interval = default_interval
         self._intervals: dict[int, dict[int, float | None]] = {}  # by system and message
+        #: whether somebody who may command wished it, by system and message: of what the vehicle
+        #: itself is asked for
+        self._asked: dict[int, dict[int, bool]] = {}
         self._last: dict[tuple[int, int, int], float] = {}
         self.stretch = Stretch()
 
-    def set_interval(self, system_id: int, message_id: int, interval_us: float) -> None:
-        """Take a client's wish: microseconds, STOPPED or DEFAULT."""
+    def set_interval(
+        self, system_id: int, message_id: int, interval_us: float, *, commands: bool = True
+    ) -> None:
+        """Take a client's wish: microseconds, STOPPED or DEFAULT.
+
+        ``commands``: whoever sent it may command vehicles, and is no observer.
+        """
+        self._thin(system_id, message_id, interval_us)
+        self._ask(system_id, message_id, commands=commands)
+
+    def _ask(self, system_id: int, message_id: int, *, commands: bool) -> None:
+        asked = self._asked.setdefault(system_id, {})
+        if message_id in self._intervals[system_id]:
+            asked[message_id] = commands
+        else:  # back to the default, or one wish too many
+            asked.pop(message_id, None)
+
+    def _thin(self, system_id: int, message_id: int, interval_us: float) -> None:
         wishes = self._intervals.setdefault(system_id, {})
         if interval_us == DEFAULT:
             wishes.pop(message_id, None)
@@ -87,24 +107,39 @@ class Thinner:
         else:
             wishes[message_id] = min(interval_us, LONGEST_US) / 1e6
 
-    def set_group(self, system_id: int, group: int, rate: float) -> None:
+    def set_group(self, system_id: int, group: int, rate: float, *, commands: bool = True) -> None:
         """Take a client's wish for a MAV_DATA_STREAM: messages a second of each kind, 0 for none.
 
-        The latest wish for a message counts, by whatever means.
+        The latest wish for a message counts, by whatever means. The vehicle is asked only for what
+        it is known to have: it says no aloud to anything else.
         """
         interval_us = 1e6 / rate if rate > 0 else STOPPED
         for message_id in GROUPS.get(group, ()):
-            self.set_interval(system_id, message_id, interval_us)
+            self._thin(system_id, message_id, interval_us)
+            if message_id in WANTED:
+                self._ask(system_id, message_id, commands=commands)
 
     def interval_us(self, system_id: int, message_id: int) -> int:
         """Give the interval in force, in microseconds; STOPPED if none."""
         interval = self._interval(system_id, message_id)
         return STOPPED if interval is None else round(interval * 1e6)
 
-    def wishes(self, system_id: int) -> dict[int, float]:
-        """Give the intervals, in seconds by message id, that the client asked for."""
+    def wishes(self, system_id: int, *, commands: bool = True) -> dict[int, float]:
+        """Return the intervals, in seconds by message id, that the vehicle is to be asked for.
+
+        Those of the client where it may command, or else those of an observer.
+        """
         wishes = self._intervals.get(system_id, {})
-        return {number: interval for number, interval in wishes.items() if interval is not None}
+        return {
+            number: interval
+            for number, has in self._asked.get(system_id, {}).items()
+            if has is commands and (interval := wishes.get(number)) is not None
+        }
+
+    @property
+    def has_wishes(self) -> bool:
+        """Whether the client ever asked for an interval."""
+        return bool(self._asked)
 
     def passes(self, system_id: int, component_id: int, message_id: int, *, now: float) -> bool:
         """Whether a message that just came is sent on to the client."""

@@ -311,6 +311,11 @@ _CLIENTS = (
         Number(100, 1e6, "1/s"),
         "datagrams of one client; beyond, they are not looked at, but for STOP",
     ),
+    _key(
+        "clients.telemetry_budget",
+        Number(1000, 1e7, "bytes/s"),
+        "streamed by the rovers behind one endpoint, as clients wish; less for a radio behind UDP",
+    ),
     _key("clients.text_rate", Number(1, 1000, "1/s"), "texts to one client at the most"),
     _key("clients.status_rate", Number(1, 1000, "1/s"), "task states to one client at the most"),
     _key(

@@ -22,6 +22,7 @@ from mav_tasks.tasks.events import (
     VehicleIdentified,
     VehicleSpeedSet,
 )
+from mav_tasks.tasks.task import following
 
 
 class Batch:
@@ -42,7 +43,7 @@ class Batch:
     ) -> None:
         self.first = first
         self.last = first + len(events) - 1
-        self.next_id = 0  # one above the highest task id, 0 if there is none
+        self.next_id: int | None = None  # the one after the last task's, None if there is none
         self.tasks: list[tuple[Any, ...]] = []  # id, number, vehicle, state, changed_at, submitted
         self.journal: list[tuple[Any, ...]] = []  # number, utc, kind, task_id, vehicle, body
         self.changed: dict[int, tuple[Any, ...]] = {}  # state, changed_at, changed, id
@@ -71,7 +72,7 @@ class Batch:
             body = dumps(row)
             if type(event) is TaskSubmitted:
                 task = event.task
-                self.next_id = max(self.next_id, task.id + 1)
+                self.next_id = following(task.id)
                 self.tasks.append(
                     (task.id, number, task.vehicle, task.state, event.at + offset, body)
                 )

@@ -21,7 +21,9 @@ from typing import Any, NewType, Union, get_args, get_origin, get_type_hints
 __all__ = ["MONOTONIC", "Decoder", "Encoder", "Unreadable", "dumps", "format_of", "loads"]
 
 #: fields in monotonic seconds, wherever they are
-MONOTONIC = frozenset({"at", "submitted_at", "start_at", "deadline", "booted_at", "heard_at"})
+MONOTONIC = frozenset(
+    {"at", "submitted_at", "changed_at", "start_at", "deadline", "booted_at", "heard_at"}
+)
 
 #: class name -> paths of its fields, in their order
 Format = Mapping[str, tuple[str, ...]]

@@ -85,11 +85,16 @@ class Database:
         """Make a batch durable, all of it or nothing."""
         connection = self._connection
         with transaction(connection):
+            # ids go round: where what is over is kept for ever, one may still be there
             _insert(
-                connection, "tasks (id, number, vehicle, state, changed_at, submitted)", batch.tasks
+                connection,
+                "OR REPLACE INTO tasks (id, number, vehicle, state, changed_at, submitted)",
+                batch.tasks,
             )
             _insert(
-                connection, "journal (number, utc, kind, task_id, vehicle, body)", batch.journal
+                connection,
+                "INTO journal (number, utc, kind, task_id, vehicle, body)",
+                batch.journal,
             )
             if batch.changed:  # a statement for nothing takes its time, too
                 connection.executemany(
@@ -123,7 +128,7 @@ class Database:
             if batch.signatures:
                 _keep_signatures(connection, batch.signatures)
             connection.execute(
-                "UPDATE meta SET next_id = max(next_id, ?), last_number = ?, last_write = ?,"
+                "UPDATE meta SET next_id = ifnull(?, next_id), last_number = ?, last_write = ?,"
                 " signed_until = max(signed_until, ?)",
                 (batch.next_id, batch.last, utc, batch.signed_until),
             )
@@ -255,7 +260,7 @@ def _insert(connection: sqlite3.Connection, into: str, rows: list[tuple[Any, ...
         chunk = rows[done : done + size]
         marks = f"({','.join('?' * len(chunk[0]))})"
         connection.execute(
-            f"INSERT INTO {into} VALUES {','.join([marks] * size)}",
+            f"INSERT {into} VALUES {','.join([marks] * size)}",
             [value for row in chunk for value in row],
         )
         done += size

@@ -45,7 +45,7 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
             "SELECT next_id, signed_until FROM meta"
         ).fetchone()
         found = connection.execute(
-            "SELECT submitted, changed, modified, advanced FROM tasks ORDER BY id"
+            "SELECT submitted, changed, modified, advanced FROM tasks ORDER BY number"
         )
         tasks: list[Task] = []
         while chunk := found.fetchmany(CHUNK):
@@ -121,7 +121,7 @@ def _changed(task: Task, rows: Rows, texts: Sequence[str | None], offset: float)
     for event in sorted(latest, key=lambda event: event.version):
         new: dict[str, Any] = {name: getattr(event, name) for name in _OF_TASK[type(event)]}
         if isinstance(event, TaskChanged):
-            new["state"] = event.new
+            new["state"], new["changed_at"] = event.new, event.at
         task = replace(task, **new)
     return task
 

@@ -8,7 +8,6 @@ from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import replace
 
-from mav_tasks.errors import Rejection
 from mav_tasks.tasks.events import (
     Event,
     StepReached,
@@ -20,7 +19,7 @@ from mav_tasks.tasks.events import (
     TaskWithdrawn,
 )
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
-from mav_tasks.tasks.task import MAX_TASK_ID, Draft, Progress, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, following
 from mav_tasks.tasks.timing import Timing
 
 KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
@@ -76,14 +75,16 @@ class TaskBook:
                 self._note_live(task)
 
     def submit(self, draft: Draft, *, state: TaskState = TaskState.QUEUED, now: float) -> Task:
-        """Turn a draft into a task with an id never used before.
+        """Turn a draft into a task with an id of its own.
 
-        Rejection(QUOTA) when there are none left: a float32 parameter could not name it.
+        After MAX_TASK_ID they begin at 1 again: whatever had such an id is long forgotten, and one
+        that is still kept is passed over.
         """
-        if self._next_id > MAX_TASK_ID:
-            raise Rejection(TaskReason.QUOTA, "no task id is left")
+        task_id = TaskId(self._next_id)
+        while task_id in self._tasks:
+            task_id = following(task_id)
         task = Task(
-            id=TaskId(self._next_id),
+            id=task_id,
             vehicle=draft.vehicle,
             command=draft.command,
             goal=draft.goal,
@@ -93,7 +94,7 @@ class TaskBook:
             terms=draft.terms,
             state=state,
         )
-        self._next_id += 1
+        self._next_id = following(task_id)
         self._tasks[task.id] = task
         self._count(task, 1)
         self._note_live(task)
@@ -126,6 +127,7 @@ class TaskBook:
             version=old.version + 1,
             progress=old.progress if progress is None else progress,
             timing=timing.final if timing and new in TERMINAL else timing,
+            changed_at=now,
         )
         self._tasks[task_id] = task
         self._count(old, -1)

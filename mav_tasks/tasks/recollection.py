@@ -14,7 +14,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.frames import to_local
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
 SAME_PACKET = 5.0  # s, the very same packet again (rule 1)
@@ -22,6 +22,10 @@ CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters (rule 3)
 SAME_GOAL = 5.0  # s, equal absolute goals (rule 4)
 NEAR = 1.0  # m between two places that mean the same (rule 4)
 SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
+#: s after the end of its task, in which a nonce means that task. Copies come within half a minute
+#: of the first (a client repeats for 10 s, a net is late by 20 s), and over a restart of the server
+#: within its time; who was not answered tries again by hand within minutes
+NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
 PACKETS = 1_000  # of each client, for rule 1; while the server runs its receiver has its own
 SPARE = 1_000  # nonces of tasks that are not kept any more
@@ -63,7 +67,7 @@ class _Client:
 
 
 class Recollection:
-    """What each client submitted lately, and every nonce of a task that is still kept."""
+    """What each client submitted lately, and the nonces of tasks that are not long over."""
 
     def __init__(self, book: TaskBook) -> None:
         self._book = book
@@ -89,7 +93,7 @@ class Recollection:
         when the nonce was used for something else.
         """
         if draft.marks.nonce:
-            return self._by_nonce(draft)
+            return self._by_nonce(draft, now=now)
         client = self._clients.get(draft.submitter)
         if client is None:
             return None
@@ -166,11 +170,11 @@ class Recollection:
             del client.goals[task.vehicle]
         client.packets.pop(task.marks.packet, None)
 
-    def _by_nonce(self, draft: Draft) -> Known | None:
+    def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
         key = _key(draft.submitter, draft.marks.nonce)
         task_id = self._nonces.get(key)
         task = None if task_id is None else self._book.get(task_id)
-        if task_id is None or task is None:  # the task is not kept any more
+        if task_id is None or task is None or _is_long_over(task, now=now):
             self._nonces.pop(key, None)
             return None
         if task.marks.payload != draft.marks.payload:
@@ -189,6 +193,12 @@ class Recollection:
             del self._clients[submitter]
         while len(self._clients) >= MANY_CLIENTS:
             del self._clients[next(iter(self._clients))]
+
+
+def _is_long_over(task: Task, *, now: float) -> bool:
+    """Whether a nonce of a task that is over may be another submission's by now."""
+    ended_at = task.submitted_at if task.changed_at is None else task.changed_at
+    return task.state in TERMINAL and now - ended_at > NONCE_KEPT
 
 
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:

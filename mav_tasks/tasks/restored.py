@@ -12,11 +12,11 @@ from mav_tasks.tasks.task import Task
 class Restored:
     """The state of an earlier run. All times are monotonic seconds of the present one.
 
-    ``tasks`` are in the order of their ids, ``next_id`` was never given to any. ``paused`` are the
-    queues that stood, with the reason, ``uids`` the vehicles' unique ids, ``speeds`` their default
-    speeds in m/s, ``homes`` where they return to and ``halt_epochs`` how often they were halted,
-    each by system id; ``plans`` by system id and kind are (id, source) as PlanStored has them,
-    ``parameters`` the last value of each by name, ``signatures`` and ``signed_until`` what
+    ``tasks`` are in the order of their submission, ``next_id`` is the id of the next. ``paused``
+    are the queues that stood, with the reason, ``uids`` the vehicles' unique ids, ``speeds`` their
+    default speeds in m/s, ``homes`` where they return to and ``halt_epochs`` how often they were
+    halted, each by system id; ``plans`` by system id and kind are (id, source) as PlanStored has
+    them, ``parameters`` the last value of each by name, ``signatures`` and ``signed_until`` what
     SignaturesSeen had said. ``ended_well``: the last run closed its store; ``idle`` is the seconds
     since it last wrote. ``wall_offset`` is UTC less monotonic time.
     """

@@ -8,7 +8,15 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.timing import Timing
 
 TaskId = NewType("TaskId", int)
-MAX_TASK_ID = 16_777_215  # 2**24 - 1: exact in a float32 command parameter
+#: the largest that a parameter can name (``mavlink.float_param``): 34 years of a task a second
+MAX_TASK_ID = 0x3F7FFFFF
+MAX_NONCE = MAX_TASK_ID
+
+
+def following(task_id: int) -> TaskId:
+    """Return the id that is given after this one."""
+    return TaskId(task_id % MAX_TASK_ID + 1)
+
 
 DEFAULT_PRIORITY = 5
 MAX_PRIORITY = 10  # 10 runs first
@@ -194,7 +202,8 @@ class Progress:
 class Task:
     """One task as its events have left it; ``version`` counts them.
 
-    ``timing`` is that of its setpoints, as of the last time that it stopped being driven.
+    ``timing`` is that of its setpoints, as of the last time that it stopped being driven;
+    ``changed_at`` is when its state changed last, monotonic seconds, None if it never did.
     """
 
     id: TaskId
@@ -210,6 +219,7 @@ class Task:
     version: int = 1
     progress: Progress = Progress()
     timing: Timing | None = None
+    changed_at: float | None = None
 
     @property
     def priority(self) -> int:

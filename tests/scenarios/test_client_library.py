@@ -203,7 +203,7 @@ def test_a_rover_that_cannot_be_does_not_swallow_the_next_stop(world: RoverWorld
         assert world.now - began < 0.6
 
 
-@pytest.mark.parametrize("nonce", [-1, 2**24, 1.5])
+@pytest.mark.parametrize("nonce", [-1, 2**30, 1.5])
 def test_what_is_no_nonce_is_said_before_anything_is_sent(world: RoverWorld, nonce: Any) -> None:
     with world.sync_client() as client, pytest.raises(ValueError, match="nonce"):
         client.submit([Move(1.0)], nonce=nonce)
@@ -331,13 +331,41 @@ def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld
     world.run(script())
 
 
-def begin_anew(world: RoverWorld) -> None:
-    """Kill the server and start it on an empty store: its ids begin at 1 again."""
+def begin_anew(world: RoverWorld, *, next_id: int = 1) -> None:
+    """Kill the server and start it on an empty store: its ids begin at 1 again, or later."""
     world.server.kill()
     world.server._store, world.server._server = MemoryStore(), None
     world.server._earlier = []
     world.server._is_killed = False
     world.server.start()
+    assert world.server._server is not None
+    world.server._server.engine._book.restore((), next_id=next_id)
+
+
+def test_handles_work_with_ids_above_what_a_float32_counts(world: RoverWorld) -> None:
+    begin_anew(world, next_id=2**24 + 1)
+
+    async def script() -> None:
+        async with world.client() as client:
+            await client.pause()
+            first = await client.submit(Move(1.0))
+            second = await client.submit(Move(1.0), after=first)
+            third = await client.submit([Move(1.0), Wait(1.0)], after=second)
+            assert [task.id for task in (first, second, third)] == [2**24 + n for n in (1, 2, 3)]
+            assert [(await task.refresh()).after for task in (second, third)] == [
+                first.id,
+                second.id,
+            ]
+            await second.modify(priority=7, after=0)
+            assert (await client.status(second.id)).priority == 7
+            assert (await third.timing()).id == third.id
+            await first.cancel()
+            with pytest.raises(TaskFailed, match=f"task {first.id} cancelled"):
+                await first.done()
+            await client.resume()
+            await second.done()
+
+    world.run(script())
 
 
 def test_after_the_store_was_lost_old_handles_end_and_new_ones_are_new(world: RoverWorld) -> None:

@@ -62,6 +62,7 @@ def test_every_setting_is_known_by_name() -> None:
             "stream_interval",
             "text_rate",
             "packet_rate",
+            "telemetry_budget",
             "status_rate",
             "priorities",
         ],

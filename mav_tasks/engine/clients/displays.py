@@ -5,13 +5,13 @@ from math import isfinite
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import SUBMITTER
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.services.interval_requester import WANTED
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -33,7 +33,7 @@ class Displays:
         self._book = book
 
     def set_interval(self, asked: Asked, *, now: float) -> None:
-        """SET_MESSAGE_INTERVAL: thin for this client, and see that enough comes."""
+        """SET_MESSAGE_INTERVAL: thin for this client; see ``TelemetryRates`` for what comes."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         message_id, interval_us = translate.message_id_of(command), command.params[1]
         if message_id < 0:
@@ -45,21 +45,17 @@ class Displays:
             interval = interval_us / 1e6 if interval_us > 0 else None
             client.statuses.set_interval(vehicle.system_id, interval, now=now)
             return
-        client.thinner.set_interval(vehicle.system_id, message_id, interval_us)
-        for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
-            vehicle.requests.intervals.wish(wished_id, interval)
+        commands = asked.rights.reach(SUBMITTER)
+        client.thinner.set_interval(vehicle.system_id, message_id, interval_us, commands=commands)
 
     def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
-        """REQUEST_DATA_STREAM: as SET_MESSAGE_INTERVAL for each message of the group.
-
-        The vehicle is asked only for what it is known to have: it says no aloud to anything else.
-        """
+        """REQUEST_DATA_STREAM: as SET_MESSAGE_INTERVAL for each message of the group."""
         rate = message.req_message_rate if message.start_stop else 0
+        commands = client.rights.reach(SUBMITTER)
         for vehicle in self._vehicles.addressed_by(message.target_system):
-            client.thinner.set_group(vehicle.system_id, message.req_stream_id, rate)
-            for wished_id, interval in client.thinner.wishes(vehicle.system_id).items():
-                if wished_id in WANTED:
-                    vehicle.requests.intervals.wish(wished_id, interval)
+            client.thinner.set_group(
+                vehicle.system_id, message.req_stream_id, rate, commands=commands
+            )
 
     def show_interval(self, asked: Asked) -> None:
         """GET_MESSAGE_INTERVAL: what this client gets."""

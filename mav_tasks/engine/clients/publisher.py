@@ -10,6 +10,7 @@ from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.summary import summary_of
+from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -33,12 +34,14 @@ class Publisher:
         book: TaskBook,
         displays: Displays,
         submissions: Submissions,
+        rates: TelemetryRates,
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
         self._displays = displays
         self._submissions = submissions
+        self._rates = rates
         self._ended: set[TaskId] = set()  # not durably yet
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
@@ -111,6 +114,7 @@ class Publisher:
         """Send the task servers' heartbeats and the statuses that are due."""
         if self._gcs.heartbeat.is_due(now=now):
             self._gcs.forget_silent(awaits=self._awaits, now=now)
+            self._rates.update(now=now)
             self._send_heartbeats(now=now)
             for client in self._gcs:
                 client.tell_what_was_left_out(now=now)

@@ -11,7 +11,7 @@ from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.clients.rights import OPERATOR, SAFETY
+from mav_tasks.engine.clients.rights import OPERATOR, SAFETY, SUBMITTER
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import (
     CHANGE_MODE,
@@ -37,8 +37,8 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
-from mav_tasks.services.command_sender import Answered
-from mav_tasks.settings import Settings
+from mav_tasks.services.command_sender import Answered, Standing
+from mav_tasks.settings import ROLES, Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
@@ -248,7 +248,16 @@ class Commands:
             return
         else:  # also to a component never heard of: an autopilot does what that is told
             _check_relay(asked, now=now)
+            self._check_question(asked, now=now)
             _relay(asked, now=now)
+
+    def _check_question(self, asked: Asked, *, now: float) -> None:
+        """Refuse an observer's question that is too much for the link to the rover."""
+        if asked.command.command in ASKING and not asked.rights.reach(SUBMITTER):
+            message = asked.command.message
+            why_not = self._vehicles.why_not_asked(asked.vehicle, asked.packet, message, now=now)
+            if why_not is not None:
+                raise asked.rights.refusal(why_not, R.RATE_LIMITED)
 
     def _refuse_unknown(self, asked: Asked, *, now: float) -> None:
         words = f"command {asked.command.command}: not supported in this version"
@@ -319,6 +328,11 @@ class Commands:
             if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
                 result = MavResult.UNSUPPORTED  # as some say that they have no such message
             answer = Answer(command, result, ack.result_param2, asker.answering)
+        elif not answered.was_sent:
+            reason = int(R.RATE_LIMITED)
+            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
+            words = f"command {command}: rover {vehicle.system_id} is busy, ask again"
+            client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         elif command == MavCmd.REQUEST_MESSAGE:
             answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
         else:
@@ -424,5 +438,6 @@ def _relay(asked: Asked, *, now: float) -> None:
         asker,
         command=command.command,
         actor=asked.actor,
+        standing=Standing(asked.client.key, ROLES.index(asked.rights.role)),
         now=now,
     )

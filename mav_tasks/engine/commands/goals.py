@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import (
@@ -50,10 +51,12 @@ MAX_DELAY = 31_536_000.0  # s, a year
 #: command ids set aside for tasks
 OUR_COMMANDS = range(54000, 54050)
 CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
-MAX_FLAGS = 0xFFFFFF  # of a bit mask in a float32
+MAX_FLAGS = EXACT  # of a bit mask in a float32
 MIN_SPEED = 0.01  # m/s; slower, a drive of a metre takes minutes and is taken for being stuck
 MIN_RATE = 0.1  # deg/s, the same of turning
 HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own time-out of a setpoint
+
+INTEGERS = (5, 6)  # x and y of COMMAND_INT
 
 _MARK = Struct("<BBHh7d")
 
@@ -84,8 +87,8 @@ def wish_of(
     if command.command not in OURS:
         refuse_infinite(command)
         return Wish(goal, Terms(priority=priority), marks_of(command, packet))
-    marks = marks_of(command, packet, nonce=whole(command, 4, "nonce", high=MAX_TASK_ID))
-    after = whole(command, 5, "run after", high=MAX_TASK_ID)
+    marks = marks_of(command, packet, nonce=identifier(command, 4, "nonce"))
+    after = identifier(command, 5, "run after")
     delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
     named = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
     start_at = now + delay if delay > 0 else None
@@ -162,6 +165,18 @@ def whole(
         words = f"param{index} {name} {value:.8g} is not a whole number"
         raise bad(words, param=index)
     return int(value)
+
+
+def identifier(
+    command: Command, index: int, name: str, *, low: int = 0, default: int | None = 0
+) -> int:
+    """Return a task id or a nonce: a whole number that may be larger than a float32 holds."""
+    is_integer = command.frame is not None and index in INTEGERS
+    large = None if is_integer else large_number(command.params[index - 1])
+    if large is not None:
+        return large
+    high = MAX_TASK_ID if is_integer else EXACT
+    return whole(command, index, name, low=low, high=high, default=default)
 
 
 def flag(command: Command, index: int, name: str, *, default: int | None = 0) -> bool:

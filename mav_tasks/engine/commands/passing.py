@@ -5,7 +5,7 @@ What the server does not claim goes to the link on which the target was seen, if
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY
+from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTER
 from mav_tasks.engine.commands.motion_gate import may_pass, passed, withheld
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.missions.plans import MISSION
@@ -70,6 +70,7 @@ class Passing:
             if message is not None and packet.message_id not in TELLING:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
+        is_observers = not client.rights.reach(SUBMITTER)
         behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
         for vehicle in self._vehicles.addressed_by(target.system_id):
             if target != vehicle.server_address:
@@ -83,6 +84,14 @@ class Passing:
             refusing = [
                 v for v in vehicles if not may_pass(v, client.key, packet, message, is_old=is_old)
             ]
+            too_much = (
+                self._vehicles.why_not_asked(vehicles[0], packet, message, now=now)
+                if is_observers and message is not None
+                else None
+            )
+            if too_much is not None:
+                self._refuse_question(client, vehicles[0], packet, too_much, now=now)
+                continue
             if not refusing:
                 for vehicle in vehicles:
                     passed(vehicle, client.key, packet, message, now=now)
@@ -95,6 +104,14 @@ class Passing:
             for vehicle in refusing:
                 why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client))
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
+
+    def _refuse_question(
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, why: str, *, now: float
+    ) -> None:
+        """Refuse an observer's question, in a text as well: MAVLink has no answer for that."""
+        refusal = client.rights.refusal(why, R.RATE_LIMITED)
+        client.tell_refusal(refusal.text, vehicle.server_address, now=now)
+        self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
 
     def _why_not(
         self, client: GcsClient, packet: Packet, message: m.Message | None

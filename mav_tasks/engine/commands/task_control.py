@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import MAX_DELAY, flag, number, whole
+from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number, whole
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
@@ -15,7 +15,7 @@ from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
-from mav_tasks.tasks.task import MAX_PRIORITY, MAX_TASK_ID, Submitter, Task, Terms
+from mav_tasks.tasks.task import MAX_PRIORITY, Submitter, Task, Terms
 
 R, P = TaskReason, TaskProperty
 
@@ -75,7 +75,7 @@ class TaskControl:
         if first is not None:
             words = "refused a moment ago; if you still want it, send it again"
             raise Rejection(R(first.result_param2), words)
-        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
+        task_id = identifier(asked.command, 1, "task", default=None)
         kill = flag(asked.command, 2, "kill")
         begun = asked.vehicle.tasks.begun
         if task_id == 0 and begun is None:
@@ -98,7 +98,7 @@ class TaskControl:
             words = f"task {copy.result_param2}: that was decided a moment ago"
             asked.tell(words, MavSeverity.INFO, now=now)
             return copy.result_param2
-        task_id = whole(asked.command, 1, "task", high=MAX_TASK_ID, default=None)
+        task_id = identifier(asked.command, 1, "task", default=None)
         how = whole(asked.command, 2, "how", high=SKIP, default=None)
         begun = asked.vehicle.tasks.begun
         if task_id == 0 and (begun is None or begun.state is not TaskState.HELD):
@@ -149,7 +149,7 @@ class TaskControl:
 
 
 def _task_id(command: Command) -> int:
-    return whole(command, 1, "task", low=1, high=MAX_TASK_ID, default=None)
+    return identifier(command, 1, "task", low=1, default=None)
 
 
 def _words(task: Task) -> str:
@@ -174,9 +174,7 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
             deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY)
             return replace(terms, deadline=now + deadline if deadline else None)
         case P.RUN_AFTER:
-            return replace(
-                terms, after=whole(command, 3, "run after", high=MAX_TASK_ID, default=None)
-            )
+            return replace(terms, after=identifier(command, 3, "run after", default=None))
         case P.PREEMPTIBLE:
             return replace(terms, is_preemptible=flag(command, 3, "pre-emptible", default=None))
         case P.PREEMPTIVE:

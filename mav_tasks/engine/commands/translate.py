@@ -8,6 +8,7 @@ from math import isfinite, nan
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.book import TaskBook
@@ -237,7 +238,9 @@ def message_id_of(command: Command) -> int:
 
 def task_id_of(command: Command) -> int:
     """Give the task id in param2 of REQUEST_MESSAGE for what is about tasks; -1 for nonsense."""
-    return _whole(command.params[1])
+    large = large_number(command.params[1])
+    number = _whole(command.params[1]) if large is None else large
+    return number if large is not None or number <= EXACT else -1
 
 
 def first_index_of(command: Command) -> int:

@@ -19,6 +19,7 @@ from mav_tasks.engine.commands.goals import (
     bad,
     becomes_task,
     goal_of,
+    identifier,
     number,
     refuse_infinite,
     whole,
@@ -46,7 +47,7 @@ from mav_tasks.tasks.goal import (
     Wait,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Terms
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, Terms
 
 R = TaskReason
 
@@ -183,7 +184,7 @@ def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
 def _nonce_of(items: Sequence[Item]) -> int:
     """Give the client's mark in the options; what can be none is not looked at."""
     marks = [item.x for item in items if item.command == MavCmd.TASK_OPTIONS]
-    return marks[-1] if marks and 0 < marks[-1] <= MAX_TASK_ID else 0
+    return marks[-1] if marks and 0 < marks[-1] <= MAX_NONCE else 0
 
 
 def _options(command: Command, *, now: float) -> Terms:
@@ -191,7 +192,7 @@ def _options(command: Command, *, now: float) -> Terms:
     deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY, default=0.0)
     return Terms(
         priority=whole(command, 1, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY),
-        after=whole(command, 4, "run after", high=MAX_TASK_ID),
+        after=identifier(command, 4, "run after"),
         start_at=now + delay if delay else None,
         deadline=now + deadline if deadline else None,
     )

@@ -29,6 +29,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_sender import Standing
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.identity import identity_of
 from mav_tasks.services.offboard import Phase, Refused
@@ -517,6 +518,7 @@ class Vehicle:
         *,
         command: int,
         actor: str,
+        standing: Standing,
         now: float,
     ) -> None:
         """Forward a client's command; its answer comes from ``requests``."""
@@ -539,7 +541,14 @@ class Vehicle:
             if is_driven and not self.persona.has_loss_failsafe:
                 self.requests.send_zero()
         self.requests.relay(
-            packet, message, origin, component=target, command=command, urgent=disarms, now=now
+            packet,
+            message,
+            origin,
+            component=target,
+            command=command,
+            standing=standing,
+            urgent=disarms,
+            now=now,
         )
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:

@@ -13,7 +13,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.command_sender import Answered, CommandSender, Standing
 from mav_tasks.services.cruise_speed import CruiseSpeed
 from mav_tasks.services.interval_requester import IntervalRequester
 from mav_tasks.services.loss_failsafe import LossFailsafe
@@ -115,6 +115,7 @@ class VehicleRequests:
         *,
         component: int,
         command: int,
+        standing: Standing,
         urgent: bool,
         now: float,
     ) -> None:
@@ -125,6 +126,7 @@ class VehicleRequests:
             origin,
             component=component,
             command=command,
+            standing=standing,
             now=now,
             give_up_after=self._watch.forward_answer,
             urgent=urgent,

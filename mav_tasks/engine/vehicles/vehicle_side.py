@@ -12,6 +12,7 @@ from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicles.agenda import Agenda
+from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -63,6 +64,7 @@ DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 @dataclass(slots=True)
 class _Link:
     is_local: bool
+    capacity: float | None
     heartbeat: HeartbeatSender
     outlets: dict[Peer, Outlet] = field(default_factory=dict)
 
@@ -99,6 +101,8 @@ class VehicleSide:
         #: where nobody is any more: whoever was there may be back at once, anywhere
         self._left: set[Place] = set()
         self._vehicles: dict[int, Vehicle] = {}
+        #: by endpoint; made again when a link, a setting or who is where changes
+        self._budgets: dict[Place, LinkBudget] = {}
 
     def __iter__(self) -> Iterator[Vehicle]:
         """Give every vehicle, to be looked at only."""
@@ -141,6 +145,28 @@ class VehicleSide:
             tasks.stop(clear=clear, actor=actor, now=now)
         return [tasks.vehicle for tasks in unheard]
 
+    def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
+        """Return what the way to a vehicle carries, shared with the others behind its endpoint."""
+        place = vehicle.requests.place
+        budget = self._budgets.get(place)
+        if budget is None:
+            link = self._links.get(place[0])
+            budget = self._budgets[place] = LinkBudget(
+                budget=self._settings.clients.telemetry_budget,
+                capacity=None if link is None else link.capacity,
+                vehicles=sum(each.requests.place == place for each in self),
+                now=now,
+            )
+        return budget
+
+    def why_not_asked(
+        self, vehicle: Vehicle, packet: Packet, message: m.Message, *, now: float
+    ) -> str | None:
+        """Return why an observer's question is too much for a vehicle's link, None if it is not."""
+        budget, place = self.link_budget(vehicle, now=now), vehicle.requests.place
+        is_driven = any(v.tasks.is_driving for v in self if v.requests.place == place)
+        return budget.why_not(packet, message, is_driven=is_driven, now=now)
+
     def settle(self) -> list[Vehicle]:
         """Look at what became of those to which something was done; gives them."""
         return self._agenda.settle()
@@ -168,7 +194,8 @@ class VehicleSide:
         if not change.up:
             self._links.pop(change.link, None)
             return
-        link = _Link(change.is_local, HeartbeatSender(now=now))
+        link = _Link(change.is_local, change.capacity, HeartbeatSender(now=now))
+        self._budgets.clear()
         places = [self._router.place_of(vehicle.system_id) for vehicle in self]
         known = [place[1] for place in places if place is not None and place[0] == change.link]
         for peer in (*change.peers, *known):
@@ -198,6 +225,7 @@ class VehicleSide:
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
+        self._budgets.clear()
         for vehicle in self:
             vehicle.apply(settings)
             self._agenda.touch(vehicle)  # its deadlines may be others
@@ -333,6 +361,7 @@ class VehicleSide:
             now=now,
         )
         self._vehicles[packet.system_id] = vehicle
+        self._budgets.clear()
         self._agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
@@ -366,6 +395,7 @@ class VehicleSide:
         del self._rivals[rival]
         vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
         self._router.learn(vehicle.system_id, (link, peer))
+        self._budgets.clear()
         self._forget_if_empty(old)
         self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
         return True

@@ -159,7 +159,7 @@ def test_a_jump_goes_one_further_behind_a_home() -> None:
         (lambda: WishedTerms(priority=11), "priority 11"),
         (lambda: WishedTerms(priority=True), "priority True"),
         (lambda: WishedTerms(priority=5.0), "priority 5.0"),  # type: ignore[arg-type]
-        (lambda: WishedTerms(after=2**24), "after 16777216"),
+        (lambda: WishedTerms(after=2**30), "after 1073741824"),
         (lambda: WishedTerms(delay=-1.0), "delay -1.0"),
         (lambda: WishedTerms(deadline=nan), "deadline nan"),
         (lambda: wire.items_of_goals([Move(nan)]), "distance"),

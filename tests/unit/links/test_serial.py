@@ -8,14 +8,17 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.engine.inputs import LinkSide
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links import serial
 from mav_tasks.links.attempts import RETRY
 from mav_tasks.links.base import PeerChange, PeerState, StreamLink
+from mav_tasks.links.memory import MemoryNet
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.serial import LEAD, USED, SerialLink
 from mav_tasks.links.url import SerialUrl
 from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
+from mav_tasks.runner import link_changed
 from tests.kit.lines import Device, device, read_from
 
 BAUD = 57_600
@@ -67,6 +70,11 @@ def test_it_is_a_stream_link_and_not_local(link: SerialLink, line: Device) -> No
     assert (link.name, link.peers, link.is_local) == (f"serial:{line.path}:{BAUD}", (), False)
     assert link.take_changes() == [PeerChange(str(line.path), PeerState.UP, "is up")]
     assert repr(link) == f"SerialLink({link.name}, up, OutQueue(0 bytes wait, 0 packets dropped))"
+
+
+def test_the_server_is_told_how_much_it_carries(link: SerialLink) -> None:
+    assert link_changed(link, LinkSide.VEHICLES).capacity == BAUD / 10
+    assert link_changed(MemoryNet().link("m"), LinkSide.VEHICLES).capacity is None
 
 
 def test_bytes_pass_both_ways_as_they_are(link: SerialLink, line: Device) -> None:

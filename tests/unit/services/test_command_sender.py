@@ -4,7 +4,15 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandLong, Message
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_sender import LATE, MAX_WAITING, REPEAT, Answered, CommandSender
+from mav_tasks.services.command_sender import (
+    LATE,
+    MAX_EACH,
+    MAX_WAITING,
+    REPEAT,
+    Answered,
+    CommandSender,
+    Standing,
+)
 
 ARM = MavCmd.COMPONENT_ARM_DISARM
 MODE = MavCmd.DO_SET_MODE
@@ -61,6 +69,7 @@ class Rig:
         *,
         what: int = ARM,
         param1: float = 1.0,
+        rank: float = 0,
         urgent: bool = False,
     ) -> None:
         self.sender.relay(
@@ -69,6 +78,7 @@ class Rig:
             origin,
             component=AUTOPILOT,
             command=what,
+            standing=Standing(origin, rank),
             now=now,
             give_up_after=0.4,
             urgent=urgent,
@@ -177,6 +187,7 @@ def test_commands_of_other_ids_and_components_do_not_wait() -> None:
         "carol",
         component=154,
         command=ARM,
+        standing=Standing("carol", 0),
         now=0.0,
         give_up_after=0.4,
     )
@@ -244,6 +255,78 @@ def test_what_waits_is_bounded_and_the_rest_is_answered_at_once() -> None:
         rig.relay(number, f"client {number}", 0.0)
     assert rig.times == [0.0]
     assert rig.results == [(0.0, f"client {MAX_WAITING + n}", None) for n in (1, 2)]
+
+
+def sent_numbers(rig: Rig) -> list[int]:
+    return [item.raw[0] for _, item in rig.sent if isinstance(item, Packet)]
+
+
+def test_one_client_has_no_more_than_its_share_of_what_waits() -> None:
+    rig = Rig()
+    for number in range(MAX_EACH + 3):
+        rig.relay(number, "alice", 0.0)
+    rig.relay(99, "bob", 0.0)
+    assert rig.results == [(0.0, "alice", None)] * 3
+    rig.receive(ack(), 0.1)
+    assert sent_numbers(rig) == [0, 99], "whoever has nothing before it is next"
+
+
+def test_what_was_not_sent_is_told_from_what_was_not_answered() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0)
+    rig.relay(2, "bob", 0.0)
+    rig.run(1.0)
+    assert {answer.origin: answer.was_sent for _, answer in rig.answers} == {
+        "alice": True,
+        "bob": False,
+    }
+
+
+def test_a_question_is_sent_only_while_the_vehicle_has_time_to_answer() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0, what=MavCmd.REQUEST_MESSAGE)
+    rig.relay(2, "bob", 0.0, what=MavCmd.REQUEST_MESSAGE, param1=2.0)
+    rig.run(0.2)
+    assert rig.results == [(0.2, "bob", None)]
+
+
+def test_a_higher_rank_goes_first_and_displaces_the_last_of_a_full_lane() -> None:
+    rig = Rig()
+    for number in range(MAX_WAITING + 1):
+        rig.relay(number, f"client {number}", 0.0)
+    rig.relay(99, "operator", 0.0, rank=2)
+    assert rig.results == [(0.0, f"client {MAX_WAITING}", None)]
+    rig.receive(ack(), 0.1)
+    assert sent_numbers(rig) == [0, 99]
+
+
+def test_our_own_command_goes_before_those_of_clients() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0)
+    rig.relay(2, "bob", 0.0, rank=3)
+    rig.request(command(), 0.0)
+    rig.receive(ack(), 0.1)
+    assert isinstance(rig.sent[-1][1], CommandLong)
+
+
+def test_clients_that_ask_for_the_same_message_share_one_request() -> None:
+    rig = Rig()
+    for number, name in enumerate(("alice", "bob", "carol")):
+        rig.relay(number, name, 0.01 * number, what=MavCmd.REQUEST_MESSAGE, param1=148.0)
+    rig.relay(9, "dave", 0.03, what=MavCmd.REQUEST_MESSAGE, param1=147.0)
+    rig.receive(ack(MavCmd.REQUEST_MESSAGE), 0.1)
+    assert sorted(rig.results) == [
+        (0.1, name, MavResult.ACCEPTED) for name in ("alice", "bob", "carol")
+    ]
+    assert sent_numbers(rig) == [0, 9]
+
+
+def test_equal_commands_that_do_something_are_each_carried_out() -> None:
+    rig = Rig()
+    rig.relay(1, "alice", 0.0)
+    rig.relay(2, "bob", 0.0)
+    rig.receive(ack(), 0.1)
+    assert sent_numbers(rig) == [1, 2]
 
 
 def test_every_command_is_answered_exactly_once() -> None:

@@ -3,10 +3,13 @@
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.services.interval_requester import (
+    CHANGES,
+    CHANGES_AT_ONCE,
     CHECK,
     MAX_WANTED,
     OPTIONAL,
     SHORTEST,
+    TRIES,
     WANTED,
     IntervalRequester,
 )
@@ -96,11 +99,10 @@ def test_after_a_restart_of_the_vehicle_everything_is_asked_for_again() -> None:
     assert asked(requester, now=0.5) == list(WANTED)
 
 
-def test_a_client_can_make_a_rate_higher_but_not_lower() -> None:
+def test_wishes_can_make_a_rate_higher_but_not_lower() -> None:
     requester = IntervalRequester(now=0.0)
     asked(requester, now=0.0)
-    requester.wish(m.Attitude.id, 0.025)
-    requester.wish(m.LocalPositionNed.id, 1.0)
+    requester.set_wishes({m.Attitude.id: 0.025, m.LocalPositionNed.id: 1.0})
     request = requester.next_request(now=0.1)
     assert request is not None
     assert (request.param1, request.param2) == (m.Attitude.id, 25_000)
@@ -108,17 +110,49 @@ def test_a_client_can_make_a_rate_higher_but_not_lower() -> None:
     assert requester.next_request(now=0.1) is None
 
 
-def test_a_client_can_wish_for_what_was_not_wanted() -> None:
+def test_what_nobody_wishes_any_more_goes_back() -> None:
     requester = IntervalRequester(now=0.0)
     asked(requester, now=0.0)
-    requester.wish(105, 0.5)
-    assert asked(requester, now=0.1) == [105]
+    requester.set_wishes({m.Attitude.id: 0.025, 105: 0.5})
+    asked(requester, now=0.1)
+    requester.set_wishes({})
+    intervals = {}
+    while (request := requester.next_request(now=0.2)) is not None:
+        intervals[request.param1] = request.param2
+        requester.answered(accepted=True)
+    assert intervals == {m.Attitude.id: 40_000, 105: 0}, "what we need, and the vehicle's default"
 
 
-def test_no_client_can_ask_for_more_than_a_vehicle_gives() -> None:
+def test_that_something_is_to_come_less_often_is_said_again_until_it_is_answered() -> None:
     requester = IntervalRequester(now=0.0)
     asked(requester, now=0.0)
-    requester.wish(m.Attitude.id, 1e-6)
+    requester.set_wishes({105: 0.5})
+    asked(requester, now=0.1)
+    requester.set_wishes({})
+    assert asked(requester, now=0.2, accepted=None) == [105] * (1 + TRIES)
+
+
+def test_wishes_that_stay_are_asked_for_once() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    for number in range(3):
+        requester.set_wishes({105: 0.5})
+        assert asked(requester, now=0.1) == ([105] if number == 0 else [])
+
+
+def test_wishes_that_change_all_the_time_are_asked_for_once_a_second() -> None:
+    requester = IntervalRequester(now=0.0)
+    count = 0
+    for tick in range(600):
+        requester.set_wishes({105: 0.5 + 0.1 * (tick % 3)})
+        count += len([each for each in asked(requester, now=tick * 0.1) if each == 105])
+    assert count <= CHANGES_AT_ONCE + 60 * CHANGES
+
+
+def test_no_wish_is_for_more_than_a_vehicle_gives() -> None:
+    requester = IntervalRequester(now=0.0)
+    asked(requester, now=0.0)
+    requester.set_wishes({m.Attitude.id: 1e-6})
     request = requester.next_request(now=0.1)
     assert request is not None
     assert request.param2 == SHORTEST * 1e6
@@ -127,7 +161,7 @@ def test_no_client_can_ask_for_more_than_a_vehicle_gives() -> None:
 def test_a_wish_that_the_vehicle_refuses_does_not_cost_what_the_server_needs() -> None:
     requester = IntervalRequester(now=0.0)
     asked(requester, now=0.0)
-    requester.wish(m.Attitude.id, SHORTEST)
+    requester.set_wishes({m.Attitude.id: SHORTEST})
     intervals = []
     for accepted in (False, True):
         request = requester.next_request(now=0.1)
@@ -135,20 +169,26 @@ def test_a_wish_that_the_vehicle_refuses_does_not_cost_what_the_server_needs() -
         intervals.append(request.param2 / 1e6)
         requester.answered(accepted=accepted)
     assert intervals == [SHORTEST, WANTED[m.Attitude.id]]
+    requester.set_wishes({m.Attitude.id: SHORTEST})
+    assert requester.next_request(now=0.2) is None, "it is known that this is refused"
 
 
 def test_wishes_are_bounded() -> None:
     requester = IntervalRequester(now=0.0)
-    for message_id in range(1000, 2000):
-        requester.wish(message_id, 1.0)
-    assert len(asked(requester, now=0.0)) == MAX_WANTED
+    requester.set_wishes(dict.fromkeys(range(1000, 2000), 1.0))
+    ids = asked(requester, now=0.0) + asked(requester, now=1000.0)
+    assert len(set(ids)) == len(WANTED) + 2 * CHANGES_AT_ONCE
+    for second in range(1001, 1100):
+        ids += asked(requester, now=float(second))
+    assert len(set(ids)) == MAX_WANTED
 
 
 def test_wishes_for_what_no_vehicle_has_do_not_use_up_the_room() -> None:
     requester = IntervalRequester(now=0.0)
     asked(requester, now=0.0)
-    for message_id in range(1000, 2000):
-        requester.wish(message_id, 1.0)
-    asked(requester, now=0.0, accepted=False)
-    requester.wish(m.VfrHud.id + 1, 1.0)
-    assert asked(requester, now=0.0) == [m.VfrHud.id + 1]
+    wishes = dict.fromkeys(range(1000, 1064), 1.0)
+    for second in range(200):
+        requester.set_wishes(wishes)
+        asked(requester, now=float(second), accepted=False)
+    requester.set_wishes({**wishes, m.VfrHud.id + 1: 1.0})
+    assert m.VfrHud.id + 1 in asked(requester, now=300.0)

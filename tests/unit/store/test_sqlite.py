@@ -27,7 +27,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Frame, Pose, Progress, TaskId, Terms
+from mav_tasks.tasks.task import MAX_TASK_ID, Frame, Pose, Progress, TaskId, Terms
 from tests.unit.store.samples import (
     OFFSET,
     finish,
@@ -82,6 +82,24 @@ def test_what_comes_back_is_what_the_book_has(path: Path) -> None:
         assert [event for _, event in store.journal()] == events + later
         assert [number for number, _ in store.journal()] == list(range(1, 10))
         assert store.load().next_id == 5
+
+
+def test_ids_that_begin_again_take_the_place_of_what_is_over(path: Path) -> None:
+    old, new = TaskBook(), TaskBook(next_id=MAX_TASK_ID)
+    old.submit(draft(), now=1.0)
+    finish(old, 1, now=2.0)
+    for now in (3.0, 4.0):
+        new.submit(draft(priority=9), now=now)
+    before, after = old.take_events(), new.take_events()
+    with opened(path) as store:
+        store.append(before)
+        wait_for(store, len(before))
+    with opened(path) as store:
+        store.append(after)
+        wait_for(store, len(after))
+        found = store.load()
+        assert (found.tasks, found.next_id) == (new.all(), 2)
+        assert [task.id for task in found.tasks] == [MAX_TASK_ID, 1]
 
 
 def test_new_terms_and_a_new_state_both_count(path: Path) -> None:

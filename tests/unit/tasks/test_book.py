@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mav_tasks.errors import IllegalTransition, Rejection
+from mav_tasks.errors import IllegalTransition
 from mav_tasks.tasks import book as book_module
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted, TaskWithdrawn
@@ -132,12 +132,12 @@ def test_tasks_are_given_oldest_first_and_counted_by_vehicle_and_state() -> None
     assert (book.counts(1), sum(book.counts(2)), sum(book.counts(9))) == (counts, 1, 0)
 
 
-def test_when_the_ids_are_used_up_nothing_more_is_taken() -> None:
-    book = TaskBook(next_id=MAX_TASK_ID)
-    assert book.submit(draft(), now=0.0).id == MAX_TASK_ID
-    with pytest.raises(Rejection) as refusal:
-        book.submit(draft(), now=0.0)
-    assert refusal.value.reason == TaskReason.QUOTA
+def test_after_the_last_id_those_come_again_that_no_task_has() -> None:
+    book = TaskBook(next_id=2)
+    kept = book.submit(draft(), now=0.0)
+    again = TaskBook()
+    again.restore([kept], next_id=MAX_TASK_ID)
+    assert [again.submit(draft(), now=0.0).id for _ in range(3)] == [MAX_TASK_ID, 1, 3]
 
 
 def test_the_oldest_finished_are_forgotten_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,9 +8,11 @@ from mav_tasks.errors import Rejection
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import GlobalPlace, Goal, GoTo, LocalPlace, Move
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.recollection import (
     CONFIRMED,
     MANY_CLIENTS,
+    NONCE_KEPT,
     SAME_GOAL,
     SAME_PACKET,
     SAME_PAYLOAD,
@@ -74,7 +76,15 @@ class TestThePacket:
 
 
 class TestANonce:
-    def test_makes_equal_payloads_one_as_long_as_the_task_is_kept(self) -> None:
+    def test_counts_for_a_while_after_the_end_of_its_task(self) -> None:
+        rig = Rig()
+        task = rig.submit(rig.draft("a", nonce=7))
+        rig.book.change(task.id, S.CANCELLED, reason=TaskReason.CANCELLED, actor="", now=5000.0)
+        again = rig.draft("a", nonce=7)
+        assert rig.known(again, now=5000.0 + NONCE_KEPT) == Known(task.id, Rule.NONCE)
+        assert rig.known(again, now=5000.0 + NONCE_KEPT + EPSILON) is None
+
+    def test_makes_equal_payloads_one_as_long_as_the_task_is_not_over(self) -> None:
         rig = Rig()
         task = rig.submit(rig.draft("a", nonce=7))
         assert rig.known(rig.draft("a", nonce=7), now=1e6) == Known(task.id, Rule.NONCE)

@@ -1,0 +1,68 @@
+"""What the way to the vehicles behind one endpoint carries, and what observers may ask over it.
+
+An observer's questions are answered by the vehicle, over its link: a list of all parameters, or a
+hundred small questions a second, would delay the telemetry that a task is driven by.
+"""
+
+from math import inf
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import file_transfer
+from mav_tasks.services.rate_budget import OBSERVERS_SHARE, size_of, spare_of
+from mav_tasks.services.token_bucket import TokenBucket
+
+LIST = 37_000.0  # bytes: a thousand parameters, as an ArduPilot has
+LIST_SHARE = 0.3  # of the link, that an ArduPilot uses for a list
+SLOW_LIST = 5.0  # s; a link that takes longer for one is narrow
+LEAST = 100.0  # bytes/s for questions on the narrowest link: one or two
+WITHIN = 5.0  # s, of which the questions may come at once
+
+
+class LinkBudget:
+    """The way to one endpoint; ``budget`` as configured and ``capacity`` in bytes a second."""
+
+    def __init__(self, *, budget: float, capacity: float | None, vehicles: int, now: float) -> None:
+        self._carries = budget if capacity is None else min(budget, capacity)
+        #: bytes a second that each vehicle may be asked for beyond the server's own needs
+        self.spare = spare_of(budget, capacity, vehicles=vehicles)
+        rate = max(LEAST, OBSERVERS_SHARE * self.spare * vehicles)
+        self._questions = TokenBucket(rate=rate, burst=WITHIN * rate, now=now)
+        self._listed_until = -inf
+
+    def __repr__(self) -> str:
+        return f"LinkBudget({self._carries:g} bytes/s, {self.spare:g} to spare)"
+
+    def why_not(
+        self, packet: Packet, message: m.Message, *, is_driven: bool, now: float
+    ) -> str | None:
+        """Return why an observer's question may not be passed on now, None if it may."""
+        if not _asks_for_much(message):
+            size = len(packet.raw) + _size_of_answer(message)
+            is_too_much = not self._questions.take(tokens=size, now=now)
+            return "may ask so much, and no more, over a narrow link" if is_too_much else None
+        takes = LIST / (LIST_SHARE * self._carries)
+        if is_driven and takes > SLOW_LIST:
+            return "may not ask for a list over a narrow link while a task drives"
+        if now < self._listed_until:
+            return "may ask for one list at a time over a narrow link"
+        self._listed_until = now + takes
+        return None
+
+
+def _asks_for_much(message: m.Message) -> bool:
+    is_file = isinstance(message, m.FileTransferProtocol) and file_transfer.is_burst(message)
+    return is_file or isinstance(message, m.ParamRequestList | m.MissionRequestList)
+
+
+def _size_of_answer(message: m.Message) -> int:
+    """Return the bytes of what a vehicle says to a question, at the most."""
+    match message:
+        case m.CommandLong() | m.CommandInt():
+            shown = message.param1
+            asked = size_of(int(shown)) if 0 <= shown < 2**24 else 0
+            return size_of(m.CommandAck.id) + asked
+        case m.ParamRequestRead():
+            return size_of(m.ParamValue.id)
+        case _:
+            return size_of(message.id)

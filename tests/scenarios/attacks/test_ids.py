@@ -1,0 +1,101 @@
+"""Attack S7: whoever submits tasks for days must not use up the ids of all others.
+
+A float32 names 16,777,215 of them exactly: 47 hours at the rate that a submitter may have.
+"""
+
+from struct import pack, unpack
+
+import pytest
+
+from mav_tasks.store import MemoryStore
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import MAX_TASK_ID
+from tests.kit.client import ACCEPTED, DENIED, MOVE, REQUEST, TASK_STATUS
+from tests.kit.world import World
+
+CANCEL, MODIFY = 54010, 54012
+PRIORITY, RUN_AFTER = 1, 4  # TASK_PROPERTY
+LAST_EXACT = 2**24 - 1
+A_DAY = 86_400
+TEN_YEARS = 3652 * A_DAY  # of a task a second
+SUBMITTERS_RATE = 99.0  # tasks a second for good, as measured
+
+
+def param(number: int) -> float:
+    """Return a large number as dialects/README.md has it in a float32."""
+    value: float = unpack("<f", pack("<I", number | 0x80000000))[0]
+    return value
+
+
+def after_so_many(world: World, count: int) -> World:
+    """Return a world whose server has given so many ids before."""
+    world.end_server()
+    world.start_server(MemoryStore(), Restored(next_id=count % MAX_TASK_ID + 1))
+    world.run(5.0)
+    return world
+
+
+@pytest.mark.parametrize("count", [LAST_EXACT, TEN_YEARS, MAX_TASK_ID])
+def test_tasks_are_taken_after_as_many_as_there_may_ever_be(world: World, count: int) -> None:
+    after_so_many(world, count)
+    first, second = world.client.move(0.3, nonce=1), world.client.move(0.2, nonce=2)
+    world.run(0.3)
+    expected = (1, 2) if count == MAX_TASK_ID else (count + 1, count + 2)
+    assert (first.task_id, second.task_id) == expected
+    world.until_state(second.task_id, S.COMPLETED)
+
+
+def test_an_id_above_what_a_float32_counts_is_named_by_its_bits(world: World) -> None:
+    after_so_many(world, LAST_EXACT + 1)
+    world.client.pause()
+    world.run(0.2)
+    first = world.client.move(1.0, nonce=1)
+    world.run(0.2)
+    number = first.task_id
+    assert number == LAST_EXACT + 2, "odd, so that no float32 is it"
+    after = world.client.command(MOVE, 1.0, 0, 0, 2, param(number))
+    world.run(0.2)
+    assert world.task(after.task_id).terms.after == number
+    asked = world.client.command(REQUEST, TASK_STATUS, param(number))
+    modified = world.client.command(MODIFY, param(number), PRIORITY, 7)
+    world.run(0.2)
+    assert (asked.result, modified.answer) == (ACCEPTED, (ACCEPTED, number))
+    assert world.client.statuses(number)[-1].priority == 7
+    later = world.client.command(MODIFY, param(after.task_id), RUN_AFTER, 0)
+    world.run(0.2)
+    assert later.answer == (ACCEPTED, after.task_id)
+    cancelled = world.client.command(CANCEL, param(number))
+    world.run(0.2)
+    assert cancelled.answer == (ACCEPTED, number)
+    assert world.state(number)[0] is S.CANCELLED
+
+
+def test_a_float32_that_was_rounded_names_no_task(world: World) -> None:
+    after_so_many(world, LAST_EXACT)
+    world.client.pause()
+    world.run(0.2)
+    task = world.client.move(1.0)
+    world.run(0.2)
+    assert task.task_id == 2**24
+    cancelled = world.client.command(CANCEL, 2.0**24)
+    world.run(0.2)
+    assert cancelled.answer == (DENIED, R.BAD_PARAMETER)
+    assert world.state(task.task_id)[0] is S.QUEUED
+
+
+def test_a_nonce_may_be_as_large(world: World) -> None:
+    world.client.pause()
+    world.run(0.2)
+    number = 1_000_000_001
+    for _ in range(2):
+        sent = world.client.command(MOVE, 1.0, 0, 0, param(number))
+        world.run(5.0)
+        assert sent.task_id == 1
+    assert world.client.statuses(1)[-1].nonce == number
+
+
+def test_ids_last_for_ten_years_and_a_flood_of_a_submitter_for_months() -> None:
+    assert MAX_TASK_ID > 3 * TEN_YEARS
+    assert MAX_TASK_ID / SUBMITTERS_RATE > 120 * A_DAY

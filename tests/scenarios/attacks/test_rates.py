@@ -1,0 +1,284 @@
+"""Attacks S1 and D5 by an observer: it must not fill the way between the server and a rover.
+
+What a rover streams is what the server needs, and what the clients wish that are there; together no
+more than the link carries. A radio that is fed too much delays the telemetry that a task is driven
+by.
+"""
+
+from math import hypot
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.engine.inputs import LinkChanged, LinkSide
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Conditions
+from mav_tasks.settings import Roles, Settings
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import REQUEST, SET_INTERVAL, FakeClient, command_long
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+OBSERVER, OTHER, OPERATOR = 9, 10, 12  # system ids
+SETTINGS = Settings(
+    roles=Roles(addresses={"9/190": "observer", "10/190": "observer", "12/190": "operator"})
+)
+BAUD = 57_600
+CAPACITY = BAUD / 10  # bytes/s, of a radio on a serial line
+BUDGET = 0.7 * CAPACITY  # of it, for what is streamed
+OWN = 3_300.0  # bytes/s, that the server asks for by itself, and heartbeats
+#: all that ArduPilot streams
+STREAMED = (1, 24, 26, 27, 29, 30, 32, 33, 36, 62, 65, 74, 116, 125, 129, 147, 152, 163, 178, 193)
+ATTITUDE = 30
+PARAM_REQUEST_LIST, PARAM_VALUE = 21, 22
+FASTEST = 20_000  # µs
+
+
+class Meter:
+    """What goes over the link of the first rover, from now on."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.came: list[bytes] = []
+        self.went: list[bytes] = []
+        world.watched.loses = self._look
+
+    def _look(self, source: str, target: str, data: bytes) -> bool:
+        if (source, target) == ("rover1", VEHICLE_LINK):
+            self.came.append(data)
+        elif (source, target) == (VEHICLE_LINK, "rover1"):
+            self.went.append(data)
+        return False
+
+    def rate(self, seconds: float) -> float:
+        """Let time pass; give the bytes that came from the rover, each second."""
+        self.came.clear()
+        self.went.clear()
+        self._world.run(seconds)
+        return sum(map(len, self.came)) / seconds
+
+    def hertz(self, seconds: float, message_id: int | None = None) -> float:
+        """Let time pass; give how often a message came, or any."""
+        self.rate(seconds)
+        return sum(message_id in (None, data[7]) for data in self.came) / seconds
+
+
+class Buffer:
+    """A radio of 57,600 baud with a buffer of 16 KB: what is too much comes late, or not at all."""
+
+    def __init__(self, world: World) -> None:
+        self._world, self._send = world, world.watched.send
+        self._free_at = 0.0
+        self.delays: list[float] = []
+        world.watched.send = self._through  # type: ignore[method-assign]
+
+    def _through(self, source: str, target: str, data: bytes) -> None:
+        if (source, target) != ("rover1", VEHICLE_LINK):
+            self._send(source, target, data)
+            return
+        net = self._world.watched
+        waits = max(self._free_at - net.now, 0.0)
+        if waits * CAPACITY + len(data) > 16_000:
+            return
+        self._free_at = net.now + waits + len(data) / CAPACITY
+        self.delays.append(self._free_at - net.now)
+        usual, net.conditions = net.conditions, Conditions(delay=self._free_at - net.now)
+        self._send(source, target, data)
+        net.conditions = usual
+
+
+def radio(world: World) -> World:
+    """Let the way to the rover be a serial line from now on."""
+    change = LinkChanged(
+        VEHICLE_LINK, LinkSide.VEHICLES, up=True, peers=("rover1",), capacity=CAPACITY
+    )
+    world.server.pump.handle(change, now=world.now)
+    world.server.pump.turn(now=world.now)
+    world.run(3.0)
+    return world
+
+
+def join(world: World, system_id: int) -> FakeClient:
+    client = world.add_client(f"client {system_id}", system_id=system_id)
+    world.run(2.0)
+    return client
+
+
+def wish_for_all(world: World, client: FakeClient, interval_us: float = FASTEST) -> None:
+    """Ask for everything as often as can be."""
+    for message_id in STREAMED:
+        client.send(command_long(SET_INTERVAL, message_id, interval_us, target=(1, 1)))
+        world.run(0.02)
+    client.send(common.MAVLink_request_data_stream_message(1, 1, 0, 50, 1))
+    world.run(25.0)  # changes are asked for one by one, to spare the radio
+
+
+def leave(client: FakeClient) -> None:
+    client.heartbeats = False
+
+
+def test_an_observer_does_not_fill_a_radio(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    meter = Meter(world)
+    assert meter.rate(10.0) < OWN
+    wish_for_all(world, join(world, OBSERVER))
+    assert meter.rate(10.0) < BUDGET
+
+
+def test_telemetry_over_a_radio_with_a_buffer_stays_fresh(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer, buffer = join(world, OBSERVER), Buffer(world)
+    wish_for_all(world, observer)
+    observer.stream(common.MAVLink_param_request_list_message(1, 1), rate=10)
+    observer.stream(command_long(REQUEST, 148, target=(1, 1)), rate=100)
+    task = world.client.move(8.0, speed=1.0)
+    world.run(1.0)
+    buffer.delays.clear()
+    world.until_state(task.task_id, S.COMPLETED)
+    print(f"longest delay {max(buffer.delays):.3f} s")
+    assert max(buffer.delays) < 0.2
+    assert abs(world.truth.north - 8.0) < 0.1
+
+
+def test_nor_do_ten_of_them(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    for number in range(10):
+        client = world.add_client(f"observer {number}", system_id=OBSERVER)
+        world.run(1.0)
+        wish_for_all(world, client)
+    assert Meter(world).rate(10.0) < BUDGET
+
+
+def test_on_a_wide_link_its_wishes_stay_modest(make_world: MakeWorld) -> None:
+    world = make_world(settings=SETTINGS)
+    meter = Meter(world)
+    before = meter.rate(10.0)
+    wish_for_all(world, join(world, OBSERVER))
+    assert meter.rate(10.0) < before + 5_000
+
+
+def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None:
+    world = make_world(settings=SETTINGS)
+    meter = Meter(world)
+    before = meter.hertz(10.0)
+    observer = join(world, OBSERVER)
+    wish_for_all(world, observer)
+    raised = meter.hertz(10.0)
+    leave(observer)
+    world.run(110.0)
+    after = meter.hertz(10.0)
+    print(f"packets/s: {before:.0f} before, {raised:.0f} with it, {after:.0f} after it")
+    assert after == pytest.approx(before, rel=0.02)
+
+
+def test_an_operators_wish_ends_with_it_too(make_world: MakeWorld) -> None:
+    world = make_world(settings=SETTINGS)
+    meter = Meter(world)
+    before = meter.hertz(10.0)
+    operator = join(world, OPERATOR)
+    wish_for_all(world, operator)
+    assert meter.hertz(10.0) > 2 * before
+    leave(operator)
+    world.run(110.0)
+    assert meter.hertz(10.0) == pytest.approx(before, rel=0.02)
+
+
+def test_an_observer_takes_nothing_from_an_operators_wish(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    meter = Meter(world)
+    operator = join(world, OPERATOR)
+    operator.command(SET_INTERVAL, ATTITUDE, 1e6 / 35, target=(1, 1))
+    world.run(5.0)
+    before = meter.hertz(10.0, ATTITUDE)
+    assert before > 30
+    wish_for_all(world, join(world, OBSERVER))
+    assert meter.hertz(10.0, ATTITUDE) >= before - 0.2
+
+
+def test_it_is_shown_what_is_there_anyway(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer = join(world, OBSERVER)
+    wish_for_all(world, observer)
+    seen = [p for p in observer.received if p.message_id == ATTITUDE and p.at > world.now - 10]
+    assert len(seen) / 10 >= 24
+
+
+def test_wishes_that_change_all_the_time_are_not_all_passed_on(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer, meter = join(world, OBSERVER), Meter(world)
+    for number in range(400):
+        for message_id in STREAMED[:5]:
+            interval = FASTEST + 50_000 * (number % 7)
+            observer.send(command_long(SET_INTERVAL, message_id, interval, target=(1, 1)))
+        world.run(0.1)
+    asked = [data for data in meter.went if data[7] == 76]
+    assert len(asked) < 40 * 1.5, f"{len(asked)} in 40 s"
+
+
+def list_of(client: FakeClient) -> None:
+    client.send(common.MAVLink_param_request_list_message(1, 1))
+
+
+def lists_towards(meter: Meter) -> int:
+    return sum(data[7] == PARAM_REQUEST_LIST for data in meter.went)
+
+
+def test_an_observers_parameter_list_does_not_fill_the_radio_of_a_rover_that_drives(
+    make_world: MakeWorld,
+) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer, operator = join(world, OBSERVER), join(world, OPERATOR)
+    task = world.client.move(5.0)
+    world.run(0.2)
+    world.until_state(task.task_id, S.EXECUTING)
+    meter = Meter(world)
+    list_of(observer)
+    world.run(1.0)
+    assert lists_towards(meter) == 0
+    assert any("narrow" in text for text in observer.texts()), observer.texts()
+    list_of(operator)
+    world.run(1.0)
+    assert lists_towards(meter) == 1
+
+
+def test_lists_of_observers_come_one_at_a_time(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    first, second = join(world, OBSERVER), join(world, OTHER)
+    meter = Meter(world)
+    for _ in range(20):
+        list_of(first)
+        list_of(second)
+        world.run(0.5)
+    assert lists_towards(meter) == 1
+    world.run(30.0)
+    list_of(second)
+    world.run(0.5)
+    assert lists_towards(meter) == 2
+
+
+def test_questions_of_an_observer_do_not_fill_a_radio(make_world: MakeWorld) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer = join(world, OBSERVER)
+    meter = Meter(world)
+    before = meter.rate(10.0)
+    observer.stream(command_long(REQUEST, 148, target=(1, 1)), rate=60)
+    observer.stream(common.MAVLink_ping_message(0, 1, 1, 1), rate=60)
+    observer.stream(common.MAVLink_param_request_read_message(1, 1, b"CRUISE_SPEED", -1), rate=60)
+    world.run(10.0)
+    assert meter.rate(10.0) < before + 0.1 * CAPACITY
+    assert sum(map(len, meter.went)) / 10 < 0.1 * CAPACITY
+
+
+@pytest.mark.parametrize("attacks", [False, True])
+def test_a_task_ends_where_it_would_have_ended(make_world: MakeWorld, attacks: bool) -> None:
+    world = radio(make_world(settings=SETTINGS))
+    observer = join(world, OBSERVER)
+    task = world.client.move(3.0)
+    world.run(0.2)
+    if attacks:
+        for message_id in STREAMED:
+            observer.send(command_long(SET_INTERVAL, message_id, FASTEST, target=(1, 1)))
+        observer.stream(common.MAVLink_param_request_list_message(1, 1), rate=10)
+        observer.stream(command_long(REQUEST, 148, target=(1, 1)), rate=100)
+    world.until_state(task.task_id, S.COMPLETED)
+    assert hypot(world.truth.north - 3.0, world.truth.east) < 0.03
