@@ -344,6 +344,8 @@ class Engine:
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
+        for refused in self.signatures.take_refused():
+            self._book.record(refused)
         times = self.signatures.take_times()
         if times is not None:
             self._book.record(times)

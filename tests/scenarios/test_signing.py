@@ -224,7 +224,7 @@ def test_a_sender_whose_clock_hardly_goes_on_is_heard_all_the_same(world: World)
 def test_a_sender_who_is_ahead_is_answered_in_his_own_time(world: World) -> None:
     """Or else he would take the answers for old ones. Nobody else's time is changed by him."""
     put(world, ALICE, BOB)
-    ahead = signing(world, ALICE, behind=-3600.0, name="ahead")
+    ahead = signing(world, ALICE, behind=1.0 - MINUTE, name="ahead")
     other = signing(world, BOB, name="other")
     world.run(1.0)
     sent = ahead.move(1.0), other.move(2.0)
