@@ -122,6 +122,36 @@ def test_nor_after_a_restart_on_what_the_store_has() -> None:
     assert again.admit(CLIENTS, "p", packet(timestamp=NOW + 1)) == ANNA
 
 
+@pytest.mark.parametrize(
+    ("kind", "within"), [("heartbeat", 60.0), ("setpoint", 1.0), ("command", 0.0)]
+)
+def test_a_time_is_kept_as_soon_as_its_packet_could_do_harm_again(kind: str, within: float) -> None:
+    it = signatures()
+    it.admit(CLIENTS, "p", packet())
+    it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
+    it.take_times()  # of its own times it keeps a reserve, at once
+    it.admit(CLIENTS, "p", packet(kind=kind, timestamp=NOW + 1))
+    assert it.next_deadline() == within
+    it.now = within - 0.1
+    assert it.take_times() is None
+    it.now = within
+    seen = it.take_times()
+    assert seen is not None
+    assert [time.timestamp for time in seen.times] == [NOW + 1]
+    assert it.next_deadline() is None
+
+
+def test_an_idle_station_is_written_down_once_a_minute() -> None:
+    it, written = signatures(), 0
+    for second in range(3600):
+        it.now = float(second)
+        beat = packet(kind="heartbeat", timestamp=NOW + second * 100_000)
+        assert it.admit(CLIENTS, "p", beat) == ANNA
+        it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
+        written += it.take_times() is not None
+    assert 55 <= written <= 62
+
+
 def test_who_signs_is_answered_with_his_key_and_in_his_time() -> None:
     it = signatures()
     ahead = NOW + 500
