@@ -171,7 +171,8 @@ class Engine:
                 clients = side is LinkSide.CLIENTS
                 (self._gcs if clients else self._vehicles).change_link(item, now=now)
             case KeysChanged():
-                self.signatures.change_keys(item)
+                gone = self.signatures.change_keys(item)
+                self._vehicles.pause_tasks_of(gone, now=now)
                 for link, peer in self._gcs.forget_unknown():
                     self._passing.end(link, peer, now=now)
             case PeerChanged():

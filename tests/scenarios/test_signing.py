@@ -183,7 +183,7 @@ def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: b
     assert again.task_id == task + 1
 
 
-def restart(world: World, path: Path, *, well: bool) -> None:
+def restart(world: World, path: Path, *, well: bool, keys: tuple[Key, ...] = (ALICE,)) -> None:
     store = world.server.store
     world.end_server()
     if well:
@@ -196,7 +196,7 @@ def restart(world: World, path: Path, *, well: bool) -> None:
     world.run(3.0)
     later = PromptSqliteStore(again, wall_offset=UTC)
     world.start_server(later, later.load())
-    put(world, ALICE)
+    put(world, *keys)
     world.run(2.5)
 
 

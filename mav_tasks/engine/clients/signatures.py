@@ -122,13 +122,24 @@ class Signatures:
         clock = self._clock()
         self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
 
-    def change_keys(self, change: KeysChanged) -> None:
-        """Take other keys; who has signed with one that is no more is unknown from here on."""
+    def change_keys(self, change: KeysChanged) -> set[str]:
+        """Take other keys; who has signed with one that is no more is unknown from here on.
+
+        Return the names of keys that count no more; the first time, of those that were revoked.
+        """
+        before, self._keys = self._keys, {key.name: key for key in change.keys if key.secret}
+        gone = {name for name, key in before.items() if not self._has_secret_of(key)}
+        if not self._has_ring:
+            gone = {key.name for key in change.keys if not key.secret}
         self._has_ring = True
-        self._keys = {key.name: key for key in change.keys if key.secret}
         for way, signer in list(self._signers.items()):
             if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
                 del self._signers[way]  # its role may be another one, too
+        return gone
+
+    def _has_secret_of(self, key: Key) -> bool:
+        there = self._keys.get(key.name)
+        return there is not None and there.fingerprint == key.fingerprint
 
     def _is_last_of_vehicles(self, link: str) -> bool:
         """Whether vehicles have lost their key, and no other is there: they hear nothing else.

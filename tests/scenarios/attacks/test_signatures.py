@@ -1,22 +1,26 @@
-"""S2, S3: what is signed well and must not count, and what must count all the same.
+"""S2, S3, S5: what is signed well and must not count, and what must count all the same.
 
-A packet held back, one meant for another server, a clock that is ahead.
+A packet held back, one meant for another server, a clock that is ahead, a key that is revoked
+while its task drives.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from mav_tasks.engine.inputs import WallClock
+from mav_tasks.engine.inputs import KeysChanged, WallClock
 from mav_tasks.mavlink.signing import timestamp_at
 from mav_tasks.tasks.events import SignaturesSeen, SignatureTime
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_signing import ALICE, BOB, UTC, put, restart, signing
+from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, restart, signing
 
+TASK_CANCEL = 54010
 HOUR, YEAR = 3600.0, 365 * 86_400.0
 
 
@@ -159,3 +163,72 @@ def test_nor_after_a_restart(make_world: MakeWorld, path: Path, poisoned: str) -
     world.run(0.3)
     assert sent.result == ACCEPTED
     assert world.paused() is R.STOPPED
+
+
+# S5
+
+
+def test_a_task_of_a_revoked_key_drives_no_further(world: World) -> None:
+    put(world, ALICE, BOB)
+    client, operator = signing(world, ALICE), signing(world, BOB, name="operator")
+    world.run(1.5)
+    driven, waiting = client.move(20.0), client.move(1.0)
+    world.until_state(1, S.EXECUTING)
+    world.until(lambda: world.truth.north > 0.5, within=10)
+    world.server.pump.handle(KeysChanged((REVOKED, BOB)), now=world.now)
+    north = world.truth.north
+    world.run(5.0)
+    assert world.truth.north - north < 0.5
+    assert world.stands()
+    assert world.state(driven.task_id) == (S.PAUSED, R.OPERATOR)
+    assert world.state(waiting.task_id)[0] is S.QUEUED
+    told = "Rover 1 is paused: key alice counts no more. Cancel its tasks 1, 2, or continue"
+    assert told in operator.texts()
+    operator.proceed()
+    world.until(lambda: world.state(driven.task_id)[0] is S.EXECUTING, within=10)
+
+
+def test_nor_do_those_of_others_that_would_let_it_begin(world: World) -> None:
+    """One that waits behind another's is not begun either: the queue stands."""
+    put(world, ALICE, BOB)
+    client, operator = signing(world, ALICE), signing(world, BOB, name="operator")
+    world.run(1.5)
+    driven = operator.move(1.0)
+    waiting = client.move(1.0)
+    world.until_state(1, S.EXECUTING)
+    world.server.pump.handle(KeysChanged((REVOKED, BOB)), now=world.now)
+    world.run(6.0)
+    assert world.state(driven.task_id) == (S.PAUSED, R.OPERATOR)
+    assert world.state(waiting.task_id)[0] is S.QUEUED
+    operator.command(TASK_CANCEL, waiting.task_id)
+    operator.proceed()
+    world.until_idle(tasks=2)
+    assert world.state(driven.task_id)[0] is S.COMPLETED
+    assert world.truth.north == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_key_that_came_or_has_another_role_pauses_nobody(world: World) -> None:
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    client.move(1.0)
+    world.until_state(1, S.EXECUTING)
+    for keys in ((ALICE, BOB), (replace(ALICE, role="observer"), BOB)):
+        world.server.pump.handle(KeysChanged(keys), now=world.now)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_nor_does_it_drive_where_the_key_was_revoked_while_the_server_was_away(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world = put(make_world(store=PromptSqliteStore(path, wall_offset=UTC)), ALICE, BOB)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    client.command(MOVE, 1.0, 0, 0, 0, 0, 10.0, 5)  # in 10 s
+    world.run(0.5)
+    restart(world, path, well=True, keys=(REVOKED, BOB))
+    world.run(15.0)
+    assert world.state(1)[0] is S.QUEUED
+    assert world.paused() is R.OPERATOR
+    assert world.truth.north == 0.0
