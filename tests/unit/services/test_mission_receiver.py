@@ -210,7 +210,8 @@ def test_what_is_being_decided_about_is_displaced_by_nobody() -> None:
 def test_an_upload_has_a_minute_and_half_a_second_for_each_item() -> None:
     """However often it is begun again meanwhile; its count is worth nothing."""
     rig = Rig().count(CAPACITY)
-    seen, items = [], 0
+    seen: list[tuple[float, str, int]] = []
+    items = 0
     while not any(what == "ack" for _, what, _ in seen):
         seen += rig.run(rig.now + 2.0)
         if items % 7 == 6:
