@@ -128,7 +128,9 @@ class Identity:
 class Signing:
     """What is asked of MAVLink 2 signatures; the keys are no settings."""
 
-    window: float = 60.0  # s, that a sender heard for the first time may be behind
+    #: s, that a sender heard for the first time may be behind the clock, anybody ahead of it, and a
+    #: packet of a known one late
+    window: float = 60.0
     #: SETUP_SIGNING of a client: "refuse", or "known": what goes to it is signed with that key
     #: from then on, if it is one of ours; nobody's rights change by it
     setup: str = "known"

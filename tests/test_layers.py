@@ -15,6 +15,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.setting_keys": frozenset({"mav_tasks.settings", "mav_tasks.errors"}),
     "mav_tasks.mavlink": frozenset({"mav_tasks.errors"}),
     "mav_tasks.whole_file": frozenset(),
+    "mav_tasks.folders": frozenset(),
     "mav_tasks.plan_files": frozenset(
         {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
     ),
@@ -32,7 +33,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         }
     ),
     "mav_tasks.links": frozenset({"mav_tasks.errors"}),
-    "mav_tasks.store": frozenset({"mav_tasks.tasks", "mav_tasks.settings", "mav_tasks.errors"}),
+    "mav_tasks.store": frozenset(
+        {"mav_tasks.tasks", "mav_tasks.settings", "mav_tasks.folders", "mav_tasks.errors"}
+    ),
     "mav_tasks.witness": frozenset({"mav_tasks.engine", "mav_tasks.tasks"}),
     "mav_tasks.recording": frozenset(
         {
@@ -43,6 +46,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.tasks",
             "mav_tasks.mavlink",
             "mav_tasks.settings",
+            "mav_tasks.folders",
             "mav_tasks.errors",
         }
     ),
@@ -101,11 +105,18 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.services",
             "mav_tasks.setting_keys",
             "mav_tasks.settings",
+            "mav_tasks.folders",
             "mav_tasks.errors",
         }
     ),
     "mav_tasks.key_ring": frozenset(
-        {"mav_tasks.config", "mav_tasks.mavlink", "mav_tasks.settings", "mav_tasks.errors"}
+        {
+            "mav_tasks.config",
+            "mav_tasks.mavlink",
+            "mav_tasks.settings",
+            "mav_tasks.folders",
+            "mav_tasks.errors",
+        }
     ),
     "mav_tasks.serve": frozenset(
         {

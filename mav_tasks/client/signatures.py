@@ -16,6 +16,7 @@ from mav_tasks.mavlink.signing import (
     Key,
     Signer,
     StreamTimes,
+    Window,
     is_signed_with,
     stream_of,
     timestamp_at,
@@ -68,10 +69,11 @@ class ClientSignatures:
             self.not_believed.unknown += 1
             return False
         stream, timestamp = stream_of(packet), timestamp_of(packet)
-        if not self._times.is_news(stream, timestamp, clock=timestamp_at(utc), window=WINDOW):
+        window = Window.since(timestamp_at(utc) - WINDOW)
+        if not self._times.is_news(stream, timestamp, window):
             self.not_believed.old += 1
             return False
-        self._times.note(stream, timestamp)
+        self._times.note(stream, timestamp, window)
         return True
 
     def why_silent(self) -> str:

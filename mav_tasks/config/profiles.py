@@ -15,6 +15,7 @@ from platformdirs import user_config_path
 
 from mav_tasks.config import toml_file
 from mav_tasks.errors import ConfigError, SettingError
+from mav_tasks.folders import make_private
 from mav_tasks.setting_keys.literals import literal
 from mav_tasks.setting_keys.shapes import HIGHEST_ID, Choice, Number, Shape, Text, Texts
 from mav_tasks.settings import Turning, VehicleProfile
@@ -143,7 +144,7 @@ def write(profile: VehicleProfile, output: str | None) -> Path:
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         if output is None:
-            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            make_private(path.parent)
         fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, MODE)
         try:
             with os.fdopen(fd, "w", encoding="utf-8") as file:

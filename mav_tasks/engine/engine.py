@@ -182,7 +182,8 @@ class Engine:
                 clients = side is LinkSide.CLIENTS
                 (self._gcs if clients else self._vehicles).change_link(item, now=now)
             case KeysChanged():
-                self.signatures.change_keys(item)
+                gone = self.signatures.change_keys(item)
+                self._vehicles.pause_tasks_of(gone, now=now)
                 for link, peer in self._gcs.forget_unknown():
                     self._passing.end(link, peer, now=now)
             case PeerChanged():
@@ -384,6 +385,8 @@ class Engine:
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
+        for refused in self.signatures.take_refused():
+            self._book.record(refused)
         times = self.signatures.take_times()
         if times is not None:
             self._book.record(times)

@@ -12,6 +12,7 @@ from platformdirs import user_config_path
 
 from mav_tasks.config.toml_file import LARGEST, decoded
 from mav_tasks.errors import ConfigError, KeyRingError
+from mav_tasks.folders import make_private
 from mav_tasks.key_ring.ring import KeyRing
 from mav_tasks.key_ring.toml_form import ring_of, text_of
 
@@ -74,7 +75,7 @@ def change(path: Path, to: Callable[[KeyRing], KeyRing]) -> None:
     """
     try:
         path = path.resolve()  # a link stays one
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_private(path.parent)
         with _locked(path.parent):
             ring = load(path).ring if path.exists() else KeyRing()
             _write(path, text_of(to(ring)))

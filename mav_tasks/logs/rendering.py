@@ -18,6 +18,7 @@ from mav_tasks.store.codec import MONOTONIC
 from mav_tasks.tasks.events import (
     Event,
     QueuePaused,
+    SignatureRefused,
     SignaturesSeen,
     SubmissionRefused,
     TaskProgressed,
@@ -63,8 +64,8 @@ def level_of(event: Event) -> int:
     """Give the log level of an event: what its operator should look at is a warning."""
     if isinstance(event, SignaturesSeen | TaskProgressed | VehicleHalted):
         return logging.DEBUG  # beside what else is told of it
-    noteworthy = isinstance(event, SubmissionRefused | VehicleNoted | QueuePaused)
-    return logging.WARNING if noteworthy else logging.INFO
+    noteworthy = SubmissionRefused | SignatureRefused | VehicleNoted | QueuePaused
+    return logging.WARNING if isinstance(event, noteworthy) else logging.INFO
 
 
 def utc_text(utc: float) -> str | None:

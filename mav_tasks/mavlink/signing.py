@@ -8,6 +8,7 @@ A signature is 13 bytes behind the CRC: link id, 48 bits of time in 10 µs since
 from dataclasses import dataclass, field
 from hashlib import sha256
 from hmac import compare_digest
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
@@ -83,44 +84,89 @@ def signed(raw: bytes, secret: bytes, *, link_id: int, timestamp: int) -> bytes:
     return told + sha256(secret + told).digest()[:DIGEST_LENGTH]
 
 
-class StreamTimes:
-    """The streams signed with one key: the time of each only goes on.
+class Window(NamedTuple):
+    """Which times are believed: of anybody those from ``oldest`` to ``newest``.
 
-    A stream that is not known yet may begin up to a window behind the clock, and behind the newest
-    time of this key: a sender's clock that is ahead is no reason to take older packets.
+    None is later than ``latest``, which is another time than ``newest`` only after our clock was
+    set back. ``width`` is what a packet may be late, ``now`` in seconds of a clock that is never
+    set. All else is in 10 µs.
+    """
+
+    oldest: int
+    newest: int
+    latest: int
+    width: int
+    now: float
+
+    @classmethod
+    def since(cls, oldest: int) -> "Window":
+        """Return that of an end which believes whatever clock goes on, as autopilots do."""
+        return cls(oldest, HIGHEST_TIMESTAMP, HIGHEST_TIMESTAMP, width=0, now=0.0)
+
+
+class _Heard(NamedTuple):
+    timestamp: int  # the last one that was accepted
+    at: float  # seconds, when; -inf: in an earlier run
+
+
+class StreamTimes:
+    """The streams signed with one key: the time of each only goes on, and about as fast as ours.
+
+    A stream begins within the window of the wall clock. From then on it may also be as far behind
+    as it was, because its sender's clock is, or either clock was set; but what comes a window later
+    after the packet before it than it was signed after that was held back. A sender that counts
+    packets instead of time is believed as long as it is not silent for that long.
+
+    A time beyond ``latest`` was kept by a version that believed every clock, or while ours was
+    wrong: its stream begins again, or else nobody whose clock is right could use it any more.
     """
 
     def __init__(self) -> None:
-        self._times: dict[Stream, int] = {}
-        self._newest = 0
+        self._times: dict[Stream, _Heard] = {}
         self._forgotten = 0  # the newest of the streams that are not remembered any more
 
     def __repr__(self) -> str:
-        return f"StreamTimes({len(self._times)} streams, newest {self._newest})"
+        return f"StreamTimes({len(self._times)} streams)"
 
-    def is_news(self, stream: Stream, timestamp: int, *, clock: int, window: int) -> bool:
-        """Whether a packet of this time is later than all before it. ``window`` is in 10 µs."""
+    def is_news(self, stream: Stream, timestamp: int, window: Window) -> bool:
+        """Return whether a packet is later than all before it, and neither old nor ahead."""
+        is_fresh = window.oldest <= timestamp <= window.newest
         known = self._times.get(stream)
-        if known is not None:
-            return timestamp > known
-        oldest = max(clock, self._newest) - window
-        is_full = len(self._times) >= MOST_STREAMS  # after a restart: what was forgotten was older
-        forgotten = min(self._times.values()) if is_full else self._forgotten
-        return timestamp >= oldest and timestamp > forgotten
+        if known is None or known.timestamp > window.latest:
+            return is_fresh and timestamp > self._least(window)
+        late = (window.now - known.at) * UNITS - (timestamp - known.timestamp)
+        goes_on = late <= window.width and timestamp <= window.latest
+        return timestamp > known.timestamp and (is_fresh or goes_on)
 
-    def note(self, stream: Stream, timestamp: int) -> Stream | None:
+    def _least(self, window: Window) -> int:
+        """Return the time that a stream must be later than to begin: it may be a forgotten one."""
+        believed = [heard.timestamp for heard in self._times.values()]
+        believed = [timestamp for timestamp in believed if timestamp <= window.latest]
+        is_full = len(believed) >= MOST_STREAMS  # after a restart: what was forgotten was older
+        return min(believed) if is_full else self._forgotten
+
+    def note(self, stream: Stream, timestamp: int, window: Window) -> Stream | None:
         """A packet was accepted: none that is not later is, from here on.
 
-        Gives the stream that is forgotten for it, if one is; what is not later than that was is no
-        news in any stream.
+        Return the stream that is forgotten for it, if one is; what is not later than that was is
+        no news in any stream.
         """
         gone = None
         if stream not in self._times and len(self._times) >= MOST_STREAMS:
-            gone = min(self._times, key=lambda each: self._times[each])
-            self._forgotten = max(self._forgotten, self._times.pop(gone))
-        self._times[stream] = timestamp
-        self._newest = max(self._newest, timestamp)
+            gone = min(self._times, key=lambda each: self._age(each, window))
+            forgotten = self._times.pop(gone).timestamp
+            if forgotten <= window.latest:
+                self._forgotten = max(self._forgotten, forgotten)
+        self._times[stream] = _Heard(timestamp, window.now)
         return gone
+
+    def _age(self, stream: Stream, window: Window) -> tuple[bool, int]:
+        timestamp = self._times[stream].timestamp
+        return timestamp <= window.latest, timestamp  # one that is not believed goes first
+
+    def restore(self, stream: Stream, timestamp: int) -> None:
+        """Take on what was accepted in an earlier run."""
+        self._times[stream] = _Heard(timestamp, -inf)
 
 
 class Signer:

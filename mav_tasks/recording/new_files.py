@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from mav_tasks.errors import RecordError
+from mav_tasks.folders import make_private
 
 FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC  # O_EXCL follows no symbolic link
 MOST_OF_A_NAME = 100_000
@@ -17,7 +18,7 @@ def prepared(folder: str) -> Path:
     except RuntimeError as error:  # of somebody who is not there
         raise RecordError(f"no records can be kept in {folder}: {error}") from error
     try:
-        path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_private(path)
     except FileExistsError as error:
         raise RecordError(f"no records can be kept in {path}: it is no folder") from error
     except OSError as error:

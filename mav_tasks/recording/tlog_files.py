@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from mav_tasks.folders import make_private
 from mav_tasks.recording.new_files import new_file, stamp, write_all
 
 SUFFIX = ".tlog"
@@ -75,7 +76,7 @@ class TlogFiles:
     def _begin(self, utc: float) -> None:
         self.close()
         self._start = self._start or stamp(utc)
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # may be gone meanwhile
+        make_private(self._folder)  # may be gone meanwhile
         self._fd, self._path, self._number = new_file(
             self._folder, self._start, self._number + 1, SUFFIX
         )

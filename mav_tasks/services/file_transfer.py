@@ -4,12 +4,16 @@ MAVLink guide, "File Transfer Protocol". There are no files here. MAVProxy looks
 component's parameters in a file first, and waits 11 s for an answer before it asks in another way.
 """
 
+from collections.abc import Hashable
+
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 
 NETWORK = 0
 ACK, NAK = 128, 129
 FILE_NOT_FOUND = 10
+TERMINATE_SESSION = 1
+GIVEN_UP = 10.0  # s without a request, after which an autopilot itself may end a session
 #: opcodes that change no file, nor end all sessions, in one of which somebody may write: none,
 #: TerminateSession, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and BurstReadFile
 READING = frozenset({0, 1, 3, 4, 5, 14, 15})
@@ -26,6 +30,33 @@ def reads(request: m.FileTransferProtocol) -> bool:
 def is_burst(request: m.FileTransferProtocol) -> bool:
     """Whether one request is answered by many packets."""
     return bool(request.payload[OPCODE] == BURST_READ)
+
+
+class Writers:
+    """Who writes files: a session is ended by its number, by anybody who says it.
+
+    One that reads may be: it is read again. But half a file that was written stays.
+    """
+
+    def __init__(self) -> None:
+        self._writing: dict[Hashable, float] = {}  # when each has written last
+
+    def __repr__(self) -> str:
+        return f"Writers({self._writing})"
+
+    def ends_anothers(self, request: m.FileTransferProtocol, who: Hashable, *, now: float) -> bool:
+        """Return whether a request may end what another client is writing."""
+        if request.payload[OPCODE] != TERMINATE_SESSION:
+            return False
+        return any(each != who and now - at < GIVEN_UP for each, at in self._writing.items())
+
+    def note(self, request: m.FileTransferProtocol, who: Hashable, *, now: float) -> None:
+        """Take note of a request that goes to a vehicle."""
+        if not reads(request):
+            self._writing = {each: at for each, at in self._writing.items() if now - at < GIVEN_UP}
+            self._writing[who] = now
+        elif request.payload[OPCODE] == TERMINATE_SESSION:
+            self._writing.pop(who, None)
 
 
 def refusal(request: m.FileTransferProtocol, *, to: Address) -> m.FileTransferProtocol | None:

@@ -19,6 +19,9 @@ from mav_tasks.services.mission_item import Item, item_of
 RequestForm = type[m.MissionRequest] | type[m.MissionRequestInt]
 ASK_AGAIN = 0.2  # s, between requests for one item; MAVSDK loses least between 0.1 and 0.2
 GIVE_UP = 2.3  # s without an item; MAVSDK gives up after 2.5
+LONGEST = 60.0  # s, that an upload takes, and so keeps others out, at the most, besides
+#: s for each item that has come: a radio of 57,600 baud that loses some takes 0.1 to 0.3
+EACH_ITEM = 0.5
 STEP_BACK = 3  # from so many requests for an item on each second one is for an earlier one
 QUIET = 0.3  # s that a packet is on its way at the most
 LATE = 2 * QUIET  # s after an upload has ended, in which items may still come that it asked for
@@ -34,6 +37,13 @@ PATIENCE_PLAIN = 1
 PATIENCE_INT = 4
 INT_SENDERS = 64  # clients remembered that know MISSION_ITEM_INT
 CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
+
+#: why the receiver itself ends an upload
+TAKEN = "another client is at it: wait"
+DISPLACED = "a client with more rights uploads instead: wait, then upload it again"
+TOO_MANY = f"more than {CAPACITY} items"
+SILENT = f"no item came for {GIVE_UP:g} s: upload it again"
+TOO_SLOW = f"it took more than {LONGEST:g} s, and {EACH_ITEM:g} s for each item: upload it again"
 
 #: mission type, number, item, count -> why not, or None
 Check = Callable[[int, int, Item, int], MavMissionResult | None]
@@ -57,10 +67,11 @@ class Upload(NamedTuple):
 
 
 class ToClient(NamedTuple):
-    """A message to a client."""
+    """A message to a client; ``why`` are words for an upload that the receiver itself has ended."""
 
     sender: Sender
     message: m.Message
+    why: str = ""
 
 
 @dataclass(slots=True)
@@ -71,6 +82,8 @@ class _Session:
     begun_at: float
     ask_at: float
     give_up_at: float
+    over_at: float
+    rank: int
     quiet_until: float  # until then come items of the upload before
     form: RequestForm  # that its client is known, or expected, to understand
     items: list[Item] = field(default_factory=list)
@@ -89,7 +102,7 @@ class _Answered(NamedTuple):
 
 
 class MissionReceiver:
-    """Takes in one upload; other clients are refused meanwhile.
+    """Takes in one upload; other clients are refused meanwhile, but for one of a higher rank.
 
     ``form``: how the autopilot at this address asks for items. Clients that wait for the other form
     only, as DroneKit for MISSION_REQUEST, are served by the repeats.
@@ -123,17 +136,24 @@ class MissionReceiver:
         uploads, self._uploads = self._uploads, []
         return outgoing, uploads
 
-    def count(self, message: m.MissionCount, sender: Sender, *, now: float) -> None:
-        """A client begins an upload, or begins it again."""
+    def count(self, message: m.MissionCount, sender: Sender, *, rank: int = 0, now: float) -> None:
+        """A client begins an upload, or begins it again; of a higher rank also instead of another.
+
+        One that begins again gets no more time by that.
+        """
         kind, session = message.mission_type, self._session
-        if session is not None and session.sender != sender:
-            self._send_ack(sender, kind, MavMissionResult.DENIED)
+        is_another = session is not None and session.sender != sender
+        if session is not None and is_another and (session.is_whole or session.rank >= rank):
+            self._send_ack(sender, kind, MavMissionResult.DENIED, why=TAKEN)
             return
+        if is_another:
+            self._end(MavMissionResult.DENIED, None, why=DISPLACED, now=now)
+            session = None
         if session is not None and session.is_whole:
             return  # it is being decided about
         if message.count > CAPACITY:
             self._session = None
-            self._send_ack(sender, kind, MavMissionResult.NO_SPACE)
+            self._send_ack(sender, kind, MavMissionResult.NO_SPACE, why=TOO_MANY)
             return
         # Also a count that only seems to come again may be of another plan of that length: never
         # items of one upload with those of another.
@@ -142,9 +162,17 @@ class MissionReceiver:
         began, ended = self._in_vain.get((sender, kind), (now, -inf))
         begun_at = began if now - ended <= ANOTHER_TRY else now
         quiet_until = self._quiet_until(sender, kind, now=now)
-        give_up_at = now + GIVE_UP
         self._session = _Session(
-            sender, kind, message.count, begun_at, quiet_until, give_up_at, quiet_until, self._form
+            sender,
+            kind,
+            message.count,
+            begun_at,
+            ask_at=quiet_until,
+            give_up_at=now + GIVE_UP,
+            over_at=now + LONGEST if session is None else session.over_at,
+            rank=rank,
+            quiet_until=quiet_until,
+            form=self._form,
         )
         self._answered = None
         self._advance(now=now)
@@ -177,6 +205,7 @@ class MissionReceiver:
         if isinstance(message, m.MissionItemInt):
             self._note_int(sender)
         session.asked, session.ask_at, session.give_up_at = 0, now, now + GIVE_UP
+        session.over_at += EACH_ITEM
         self._advance(now=now)
 
     def cancelled(self, message: m.MissionAck, sender: Sender, *, now: float) -> None:
@@ -201,15 +230,16 @@ class MissionReceiver:
         session = self._session
         if session is None or session.is_whole:
             return None
-        return min(session.ask_at, session.give_up_at)
+        return min(session.ask_at, session.give_up_at, session.over_at)
 
     def handle_deadline(self, *, now: float) -> None:
         """Ask again, and give up in the end."""
         session = self._session
         if session is None or session.is_whole:
             return
-        if now >= session.give_up_at:
-            self._end(MavMissionResult.OPERATION_CANCELLED, None, now=now)
+        if now >= min(session.give_up_at, session.over_at):
+            why = SILENT if now >= session.give_up_at else TOO_SLOW
+            self._end(MavMissionResult.OPERATION_CANCELLED, None, why=why, now=now)
         else:
             self._advance(now=now)
 
@@ -273,7 +303,13 @@ class MissionReceiver:
         return now if ended_at is None else max(now, min(now + QUIET, ended_at + LATE))
 
     def _end(
-        self, result: MavMissionResult, last: Item | None, *, opaque_id: int = 0, now: float
+        self,
+        result: MavMissionResult,
+        last: Item | None,
+        *,
+        opaque_id: int = 0,
+        why: str = "",
+        now: float,
     ) -> None:
         session = self._session
         assert session is not None, "an upload is under way"
@@ -281,7 +317,8 @@ class MissionReceiver:
         self._note_in_vain(session, now=now)
         if result == MavMissionResult.ACCEPTED:
             del self._in_vain[session.sender, session.mission_type]
-        ack = self._send_ack(session.sender, session.mission_type, result, opaque_id=opaque_id)
+        sender, kind = session.sender, session.mission_type
+        ack = self._send_ack(sender, kind, result, opaque_id=opaque_id, why=why)
         self._answered = _Answered(
             session.sender, session.mission_type, last, len(session.items), ack, now
         )
@@ -299,8 +336,14 @@ class MissionReceiver:
             self._outgoing.append(ToClient(sender, answered.ack))
 
     def _send_ack(
-        self, sender: Sender, mission_type: int, result: MavMissionResult, *, opaque_id: int = 0
+        self,
+        sender: Sender,
+        mission_type: int,
+        result: MavMissionResult,
+        *,
+        opaque_id: int = 0,
+        why: str = "",
     ) -> m.MissionAck:
         ack = m.MissionAck(*sender.address, result, mission_type, opaque_id)
-        self._outgoing.append(ToClient(sender, ack))
+        self._outgoing.append(ToClient(sender, ack, why))
         return ack

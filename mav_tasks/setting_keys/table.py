@@ -82,7 +82,7 @@ _SIGNING = (
     _key(
         "signing.window",
         _seconds(1, DAY),
-        "a sender that is heard for the first time may be so far behind the clock",
+        "so far a sender's clock may be off, and a packet of a known one be late",
         field="engine.signing.window",
     ),
     _key(

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from mav_tasks.errors import StoreError
+from mav_tasks.folders import make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store.base import Outcome
 from mav_tasks.store.database import Database
@@ -110,9 +111,7 @@ def _real_path(path: Path) -> Path:
         path = path.expanduser()
         _refuse_planted(path)
         path = path.resolve()
-        missing = [folder for folder in path.parents if not folder.is_dir()]
-        for folder in reversed(missing):
-            folder.mkdir(mode=0o700, exist_ok=True)
+        make_private(path.parent)
     except (OSError, RuntimeError, ValueError) as error:
         words = getattr(error, "strerror", None) or str(error)
         raise StoreError(f"store {path}: its folder cannot be made: {words}") from error

@@ -322,6 +322,25 @@ class SignaturesSeen:
 
 
 @dataclass(frozen=True, slots=True)
+class SignatureRefused:
+    """A packet that was signed well, for another time than the server's, was not looked at.
+
+    ``seconds`` is how long before the server's time it was signed; negative: after it.
+    """
+
+    actor: str
+    seconds: float
+    at: float
+
+    def __str__(self) -> str:
+        when = f"{abs(self.seconds):.0f} s {'before' if self.seconds > 0 else 'after'}"
+        return (
+            f"{self.actor} refused: signed {when} the time of this server. Set both clocks right;"
+            " if they are, it was held back or replayed"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleSeen:
     """A vehicle was found, is heard again, or has said something that is as it should be."""
 
@@ -381,6 +400,7 @@ Event = (
     | VehicleHomeSet
     | ParameterSet
     | SignaturesSeen
+    | SignatureRefused
     | VehicleSeen
     | VehicleNoted
     | ServerStopped

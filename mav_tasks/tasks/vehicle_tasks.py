@@ -174,6 +174,12 @@ class VehicleTasks:
         first = None if self.begun is not None else self._next()
         return first is not None and not self._book.is_durable(first)
 
+    @property
+    def unfinished(self) -> list[Task]:
+        """All tasks that are not over, in the order of their ids."""
+        begun = [] if self.begun is None else [self.begun.id]
+        return [self._book[task_id] for task_id in sorted([*begun, *self._aside, *self.waiting])]
+
     def page(self, first: int, count: int) -> list[TaskId]:
         """Give up to ``count`` waiting tasks from a position on."""
         if first + count <= len(self._queue):

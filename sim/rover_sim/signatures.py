@@ -9,6 +9,7 @@ from mav_tasks.mavlink.signing import (
     Key,
     Signer,
     StreamTimes,
+    Window,
     is_signed_with,
     stream_of,
     timestamp_at,
@@ -47,9 +48,10 @@ class RoverSignatures:
 
     def _is_news(self, packet: Packet, now: float) -> bool:
         stream, timestamp = stream_of(packet), timestamp_of(packet)
-        if not self._times.is_news(stream, timestamp, clock=self._clock(now), window=WINDOW):
+        window = Window.since(self._clock(now) - WINDOW)
+        if not self._times.is_news(stream, timestamp, window):
             return False
-        self._times.note(stream, timestamp)
+        self._times.note(stream, timestamp, window)
         self._signer.heard(timestamp)
         return True
 

@@ -191,19 +191,17 @@ def stamp(seconds_ago: float) -> int:
 
 
 @pytest.mark.parametrize(
-    ("seconds_ago", "is_taken"), [(30.0, True), (3600.0, False), (-3600.0, True)]
+    ("seconds_ago", "is_taken"), [(30.0, True), (3600.0, False), (-30.0, True), (-3600.0, False)]
 )
-def test_a_clock_may_be_a_minute_behind_and_any_time_ahead(
+def test_a_clock_may_be_a_minute_behind_or_ahead(
     connect: Callable[..., Signing],
     secrets: dict[str, bytes],
     seconds_ago: float,
     *,
     is_taken: bool,
 ) -> None:
-    # one of the key that nobody else uses when it is ahead: that key's time has gone on then
-    name = "other" if seconds_ago < 0 else "py"
     link_id = 100 + int(seconds_ago) % 100
-    client = connect(secrets[name], link_id=link_id, stamp=stamp(seconds_ago))
+    client = connect(secrets["py"], link_id=link_id, stamp=stamp(seconds_ago))
     if is_taken:
         client.hello()
         assert client.counts[1] == 0, "answered in its own time"

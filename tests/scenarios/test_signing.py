@@ -183,7 +183,7 @@ def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: b
     assert again.task_id == task + 1
 
 
-def restart(world: World, path: Path, *, well: bool) -> None:
+def restart(world: World, path: Path, *, well: bool, keys: tuple[Key, ...] = (ALICE,)) -> None:
     store = world.server.store
     world.end_server()
     if well:
@@ -196,7 +196,7 @@ def restart(world: World, path: Path, *, well: bool) -> None:
     world.run(3.0)
     later = PromptSqliteStore(again, wall_offset=UTC)
     world.start_server(later, later.load())
-    put(world, ALICE)
+    put(world, *keys)
     world.run(2.5)
 
 
@@ -224,7 +224,7 @@ def test_a_sender_whose_clock_hardly_goes_on_is_heard_all_the_same(world: World)
 def test_a_sender_who_is_ahead_is_answered_in_his_own_time(world: World) -> None:
     """Or else he would take the answers for old ones. Nobody else's time is changed by him."""
     put(world, ALICE, BOB)
-    ahead = signing(world, ALICE, behind=-3600.0, name="ahead")
+    ahead = signing(world, ALICE, behind=1.0 - MINUTE, name="ahead")
     other = signing(world, BOB, name="other")
     world.run(1.0)
     sent = ahead.move(1.0), other.move(2.0)

@@ -1,8 +1,8 @@
 """Every file that the server or a command writes: who may read it, and whose link it follows.
 
-Store, lock, telemetry log and record are their owner's alone, whatever the umask. Documents (plans,
-QGroundControl's actions, a sample of the configuration) are as the umask says, like any document,
-and are there as a whole or not at all.
+Store, lock, telemetry log, record, keys and profiles are their owner's alone, with the folders made
+for them, whatever the umask. Documents (plans, QGroundControl's actions, a sample of the
+configuration) are as the umask says, like any document, and are there as a whole or not at all.
 """
 
 import os
@@ -15,13 +15,17 @@ import pytest
 from typer.testing import CliRunner
 
 from mav_tasks.cli.app import app
+from mav_tasks.config import profiles
 from mav_tasks.errors import StoreError
+from mav_tasks.key_ring.ring import Entry
+from mav_tasks.key_ring.ring_file import change
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import PlanFile, read_plan, write_plan
 from mav_tasks.qgc_actions import ACTIONS, install
 from mav_tasks.recording.decisions import Decisions
 from mav_tasks.recording.new_files import prepared
 from mav_tasks.recording.tlog_files import TlogFiles
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.whole_file import write_whole
 from tests.unit.store.samples import opened, submitted, wait_for
@@ -64,7 +68,7 @@ def write_store(folder: Path) -> None:
 
 
 def write_tlog(folder: Path) -> None:
-    files = TlogFiles(prepared(str(folder / "records")), size=100, count=10)
+    files = TlogFiles(prepared(str(folder / "own" / "records")), size=100, count=10)
     files.write([b"x" * 90, b"x" * 90], utc=0.0)
     files.close()
 
@@ -74,8 +78,21 @@ def write_record(folder: Path) -> None:
     Decisions(made, Settings(), None, now=0.0, size=100_000).close()
 
 
+def write_ring(folder: Path) -> None:
+    anna = Entry("anna", "operator", Key("anna", bytes(range(32)), "operator"))
+    change(folder / ".config" / "mav-tasks" / "keys.toml", lambda ring: ring.with_added(anna))
+
+
+def write_profile(folder: Path) -> None:
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("XDG_CONFIG_HOME", str(folder / ".config"))
+        profiles.write(VehicleProfile(1), None)
+
+
 @UMASKS
-@pytest.mark.parametrize("write", [write_store, write_tlog, write_record])
+@pytest.mark.parametrize(
+    "write", [write_store, write_tlog, write_record, write_ring, write_profile]
+)
 def test_records_are_their_owners_alone_whatever_the_umask(
     tmp_path: Path, umask: int, write: Callable[[Path], None]
 ) -> None:

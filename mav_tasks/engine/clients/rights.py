@@ -43,9 +43,14 @@ class Rights(NamedTuple):
     role: str
     limits: Limits
 
+    @property
+    def rank(self) -> int:
+        """The place of the role among all roles: the higher, the more it may do."""
+        return ROLES.index(self.role)
+
     def reach(self, role: str) -> bool:
         """Whether they are at least those of a role."""
-        return ROLES.index(self.role) >= ROLES.index(role)
+        return self.rank >= ROLES.index(role)
 
     def require(self, role: str, what: str) -> None:
         """Raise Rejection unless they are at least those of a role."""

@@ -14,31 +14,40 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import MAGIC_V2, Packet
 from mav_tasks.mavlink.signing import (
     FROM_RADIOS,
+    HIGHEST_TIMESTAMP,
     UNITS,
     Key,
     Signer,
     Stream,
     StreamTimes,
+    Window,
     is_signed_with,
     stream_of,
     timestamp_at,
     timestamp_of,
 )
-from mav_tasks.tasks.events import SignaturesSeen, SignatureTime
+from mav_tasks.tasks.events import SignatureRefused, SignaturesSeen, SignatureTime
 
 #: who signs nothing, where that is allowed
 UNSIGNED = Key("", b"", fingerprint="-")
 
-#: what would do no harm a second time, or comes so often that its time is kept each second only
-FREQUENT = frozenset(
+#: what does nothing that could be done twice: a clock, a question, that somebody is there
+HARMLESS = frozenset({m.Heartbeat.id, m.Timesync.id, m.SystemTime.id, m.Ping.id})
+#: what comes so often while somebody drives that its time is kept each second only
+STREAMED = frozenset(
     {
-        *(m.Heartbeat.id, m.Timesync.id, m.SystemTime.id, m.Ping.id, m.ManualControl.id),
-        *(m.RcChannelsOverride.id, m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id),
-        *(m.SetAttitudeTarget.id, m.SetActuatorControlTarget.id),
+        *(m.ManualControl.id, m.RcChannelsOverride.id, m.SetPositionTargetLocalNed.id),
+        *(m.SetPositionTargetGlobalInt.id, m.SetAttitudeTarget.id),
+        m.SetActuatorControlTarget.id,
     }
 )
-KEPT_WITHIN = 1.0  # s, in which the time of one of those is on its way to the store
-RESERVE = int(60 * UNITS)  # of own times, so that each is new, even if the clock is set back
+#: s, in which a time is on its way to the store. A minute, because each write is some 13 kB on the
+#: disk: 1.1 GB a day for one idle station, were it each second
+HARMLESS_WITHIN, STREAMED_WITHIN = 60.0, 1.0
+RESERVE = int(120 * UNITS)  # of own times, so that each is new, even if the clock is set back
+#: a clock before 2020 was never set: of a computer without a battery for it, that has no network
+SET_SINCE = timestamp_at(1_577_836_800.0)
+TELL_EACH = 60.0  # s, at most one line for each key whose clock is wrong
 MOST_SIGNERS = 1024
 MOST_OWN = 4096  # streams of our own
 HIGHEST_LINK_ID = 255
@@ -50,7 +59,8 @@ class SignatureCounts:
 
     unsigned: int = 0  # where that is not allowed
     unverified: int = 0  # no key of ours, or changed on the way
-    old: int = 0  # signed well, and not later than one before: replayed, or overtaken
+    old: int = 0  # signed well, and not later than one before, or held back: replayed, overtaken
+    ahead: int = 0  # signed well, by a clock that is ahead of ours
 
 
 class _Link(NamedTuple):
@@ -79,6 +89,7 @@ class Signatures:
         self._times: dict[str, StreamTimes] = {}  # by fingerprint
         self._signers: dict[tuple[str, Peer], Signer] = {}
         self._offset: float | None = None  # UTC less ``now``
+        self._highest_offset = -inf  # in this run: a clock that is set back shuts nobody out
         #: times of what we have signed, by side, key, link id and source
         self._own: dict[tuple[bool, str, int, int, int], int] = {}
         self._heard: dict[tuple[str, Stream], int] = {}  # and not given to the store yet
@@ -87,12 +98,15 @@ class Signatures:
         self._signed_until = signed_until  # as the store has it
         self._highest = 0
         self._from = signed_until  # where own times begin, until the clock is known
+        self._known_until = signed_until  # up to where an earlier run has known the time
+        self._told: dict[str, float] = {}  # of wrong clocks, by key
+        self._refused: list[SignatureRefused] = []
         #: seconds: set before anything is signed or looked at
         self.now = 0.0
         self.counts = SignatureCounts()
-        for time in sorted(times, key=lambda time: time.timestamp):
+        for time in times:
             stream = Stream(time.link_id, Address(time.system_id, time.component_id))
-            self._times_of(time.key).note(stream, time.timestamp)
+            self._times_of(time.key).restore(stream, time.timestamp)
 
     def __repr__(self) -> str:
         return f"Signatures({sorted(self._keys)}, {self.counts})"
@@ -104,16 +118,28 @@ class Signatures:
     def set_wall(self, offset: float) -> None:
         """Take note of the time of the wall, UTC less ``now``."""
         self._offset = offset
+        self._highest_offset = max(self._highest_offset, offset)
         clock = self._clock()
         self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
 
-    def change_keys(self, change: KeysChanged) -> None:
-        """Take other keys; who has signed with one that is no more is unknown from here on."""
+    def change_keys(self, change: KeysChanged) -> set[str]:
+        """Take other keys; who has signed with one that is no more is unknown from here on.
+
+        Return the names of keys that count no more; the first time, of those that were revoked.
+        """
+        before, self._keys = self._keys, {key.name: key for key in change.keys if key.secret}
+        gone = {name for name, key in before.items() if not self._has_secret_of(key)}
+        if not self._has_ring:
+            gone = {key.name for key in change.keys if not key.secret}
         self._has_ring = True
-        self._keys = {key.name: key for key in change.keys if key.secret}
         for way, signer in list(self._signers.items()):
             if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
                 del self._signers[way]  # its role may be another one, too
+        return gone
+
+    def _has_secret_of(self, key: Key) -> bool:
+        there = self._keys.get(key.name)
+        return there is not None and there.fingerprint == key.fingerprint
 
     def _is_last_of_vehicles(self, link: str) -> bool:
         """Whether vehicles have lost their key, and no other is there: they hear nothing else.
@@ -191,18 +217,50 @@ class Signatures:
         if timestamp <= self._own.get(own, -1):
             self.counts.old += 1  # our own, sent back by who has overheard it
             return None
-        if not times.is_news(stream, timestamp, clock=self._clock(), window=self._window):
-            self.counts.old += 1
+        window = self._believed(there)
+        if not times.is_news(stream, timestamp, window):
+            self._refuse(key, peer, packet, window)
             return None
-        gone = times.note(stream, timestamp)
+        gone = times.note(stream, timestamp, window)
         if gone is not None:
             self._heard.pop((key.fingerprint, gone), None)
             self._gone.add((key.fingerprint, gone))
         self._heard[key.fingerprint, stream] = timestamp
-        late = KEPT_WITHIN if packet.message_id in FREQUENT or there.is_of_vehicles else 0.0
-        self._keep_at = min(self._keep_at, self.now + late)
+        self._keep_at = min(self._keep_at, self.now + _kept_within(there, packet))
         self._signer(link, peer, key).heard(timestamp)
         return key
+
+    def _believed(self, link: _Link) -> Window:
+        """Return which times are believed on a link.
+
+        A clock that was not set yet, or shows less than an earlier run has signed, keeps nobody
+        out who is ahead of it. A vehicle may be ahead: it has GPS.
+        """
+        clock, newest, latest = self._clock(), HIGHEST_TIMESTAMP, HIGHEST_TIMESTAMP
+        is_set = clock >= max(SET_SINCE, self._known_until - RESERVE)
+        if is_set and not link.is_of_vehicles:
+            known = max(timestamp_at(self.now + self._highest_offset), self._known_until)
+            newest, latest = clock + self._window, known + self._window
+        return Window(clock - self._window, newest, latest, self._window, self.now)
+
+    def _refuse(self, key: Key, peer: Peer, packet: Packet, window: Window) -> None:
+        """Count a packet that is not believed, and tell of a clock that is wrong."""
+        timestamp = timestamp_of(packet)
+        is_ahead = timestamp > window.newest
+        self.counts.ahead += is_ahead
+        self.counts.old += not is_ahead
+        told = self._told.get(key.fingerprint, -inf)
+        if window.oldest <= timestamp <= window.newest or self.now - told < TELL_EACH:
+            return
+        self._told[key.fingerprint] = self.now
+        actor = f"{packet.source}@{peer} signed {key.name}"
+        seconds = (self._clock() - timestamp) / UNITS
+        self._refused.append(SignatureRefused(actor, seconds, self.now))
+
+    def take_refused(self) -> list[SignatureRefused]:
+        """Return whose clocks are wrong, for the journal and the log, since the last call."""
+        refused, self._refused = self._refused, []
+        return refused
 
     def _matters(self, link: _Link) -> bool:
         """Whether there is a key that a signature could be of."""
@@ -238,7 +296,7 @@ class Signatures:
             if key is None:
                 return raw
             signer = self._signer(link, peer, key)
-        clock = max(self._clock(), self._from)
+        clock = self._own_clock()
         sealed = signer.sign(raw, clock=clock)
         self._note_own(link, signer, sealed)
         if signer.last <= clock + RESERVE:  # else it is a time of the other end's, for it alone
@@ -266,12 +324,16 @@ class Signatures:
                 del self._signers[next(iter(self._signers))]
             signer = Signer(key, link_id=self._links[link].number)
             # one that was forgotten may have been ahead of the clock by as many packets as it sent
-            signer.last = min(self._highest, self._clock() + int(UNITS))
+            signer.last = min(self._highest, self._own_clock() + int(UNITS))
             self._signers[link, peer] = signer
         return signer
 
     def _clock(self) -> int:
         return 0 if self._offset is None else timestamp_at(self.now + self._offset)
+
+    def _own_clock(self) -> int:
+        """Return the time of what we sign: never one of an earlier run again."""
+        return max(self._clock(), self._from)
 
     # kept
 
@@ -296,6 +358,13 @@ class Signatures:
         self._gone.clear()
         self._keep_at = inf
         return seen
+
+
+def _kept_within(link: _Link, packet: Packet) -> float:
+    """Return the seconds in which the time of a packet must be on its way to the store."""
+    if packet.message_id in HARMLESS or link.is_of_vehicles:
+        return HARMLESS_WITHIN
+    return STREAMED_WITHIN if packet.message_id in STREAMED else 0.0
 
 
 def _time(fingerprint: str, stream: Stream, timestamp: int) -> SignatureTime:

@@ -55,6 +55,7 @@ class Passing:
         self._refusals = refusals
         self._vehicles = vehicles
         self._identity = identity
+        self._writers = file_transfer.Writers()
 
     def pass_on(
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
@@ -65,7 +66,7 @@ class Passing:
         it, and is no refusal worth a line.
         """
         target = EVERYBODY if message is None else _target(message)
-        why_not = self._why_not(client, packet, message)
+        why_not = self._why_not(client, packet, message, now=now)
         if why_not is not None:
             if message is not None and packet.message_id not in TELLING:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
@@ -114,16 +115,21 @@ class Passing:
         self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
 
     def _why_not(
-        self, client: GcsClient, packet: Packet, message: m.Message | None
+        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> Rejection | None:
         """Return why a packet may go to no rover at all, None if it may."""
         if self._is_ours(packet.source):
             words = f"{packet.source} is an address of the server or of a rover"
             return Rejection(R.NOT_ALLOWED, words)
         least = _least_role(packet, message)
-        if client.rights.reach(least):
-            return None
-        return client.rights.refusal(f"may not send that to a rover, {least} may")
+        if not client.rights.reach(least):
+            return client.rights.refusal(f"may not send that to a rover, {least} may")
+        if isinstance(message, m.FileTransferProtocol):
+            is_safety = client.rights.reach(SAFETY)
+            if not is_safety and self._writers.ends_anothers(message, client.key, now=now):
+                return client.rights.refusal("may not end that: somebody writes a file")
+            self._writers.note(message, client.key, now=now)
+        return None
 
     def _is_ours(self, source: Address) -> bool:
         """Whether a packet says that it is of the server or of a rover, and is of neither."""

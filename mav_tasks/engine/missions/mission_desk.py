@@ -68,7 +68,7 @@ MissionMessage = (
 
 
 class _Desk:
-    """Uploads to, and downloads from, one address."""
+    """Uploads to, and downloads from, one address, of plans of one type."""
 
     def __init__(self, check: ItemCheck, form: RequestForm) -> None:
         self.uploads = UploadDesk(check, form)
@@ -99,7 +99,7 @@ class MissionDesks:
             vehicles, book, submissions, plans, self._answers, write_through
         )
         self._go_to = GoToItems(submissions, book)
-        self._desks: dict[tuple[int, int], _Desk] = {}
+        self._desks: dict[tuple[int, int, int], _Desk] = {}
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -119,7 +119,7 @@ class MissionDesks:
         at_server = component == vehicle.server_component
         if not at_server and (component != AUTOPILOT or not self._settings.claim):
             return False
-        desk = self._desk(vehicle, component)
+        desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
         who = (client.key, client.signed_by.name)  # one endpoint may have several keys
         sender = Sender(who, packet.source, Address(vehicle.system_id, component))
         if self._is_refused(client, vehicle, sender, message, now=now):
@@ -131,7 +131,8 @@ class MissionDesks:
                 unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
                 self._uploads.refused(sender, vehicle, unknown, now=now)
             case m.MissionCount():
-                desk.uploads.receiver.count(message, sender, now=now)
+                rank = client.rights.rank
+                desk.uploads.receiver.count(message, sender, rank=rank, now=now)
             case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
                 self._vehicles.touch(vehicle)  # never an item of a plan, whatever is under way
                 self._go_to.receive(client, vehicle, packet, message, now=now)
@@ -201,15 +202,15 @@ class MissionDesks:
 
     def handle_deadline(self, *, now: float) -> None:
         """Ask again, and give up."""
-        for (system_id, _), desk in self._desks.items():
+        for (system_id, _, _), desk in self._desks.items():
             due = desk.uploads.receiver.next_deadline()
             vehicle = self._vehicles.get(system_id) if due is not None and due <= now else None
             if vehicle is not None:
                 desk.uploads.receiver.handle_deadline(now=now)
                 self._uploads.flush(desk.uploads, vehicle, now=now)
 
-    def _desk(self, vehicle: Vehicle, component: int) -> _Desk:
-        key = vehicle.system_id, component
+    def _desk(self, vehicle: Vehicle, component: int, kind: int) -> _Desk:
+        key = vehicle.system_id, component, kind if kind in STORED else MISSION
         desk = self._desks.get(key)
         if desk is None:
             is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests

@@ -27,8 +27,6 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavSeverity
 from mav_tasks.services.mission_item import packed
 from mav_tasks.services.mission_receiver import (
-    CAPACITY,
-    GIVE_UP,
     MissionReceiver,
     RequestForm,
     Sender,
@@ -41,20 +39,18 @@ from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
 
 R = TaskReason
 
-#: why the receiver itself has ended an upload, by its answer
+#: for what reason the receiver itself has ended an upload, by its answer
 ENDED = {
-    MavMissionResult.DENIED: Rejection(R.NOT_ALLOWED, "upload: another client is at it: wait"),
-    MavMissionResult.NO_SPACE: Rejection(R.QUEUE_FULL, f"upload: more than {CAPACITY} items"),
-    MavMissionResult.OPERATION_CANCELLED: Rejection(
-        R.WRONG_STATE, f"upload: no item came for {GIVE_UP:g} s: upload it again"
-    ),
+    MavMissionResult.DENIED: R.NOT_ALLOWED,
+    MavMissionResult.NO_SPACE: R.QUEUE_FULL,
+    MavMissionResult.OPERATION_CANCELLED: R.WRONG_STATE,
 }
 
 
-def refusal_of(result: int) -> Rejection:
-    """Return why an upload ended with this MAV_MISSION_RESULT, where nothing else says so."""
-    unreadable = Rejection(R.BAD_PARAMETER, "upload: an item cannot be read")
-    return ENDED.get(MavMissionResult(result), unreadable)
+def refusal_of(result: int, words: str) -> Rejection:
+    """Return why the receiver has ended an upload with this MAV_MISSION_RESULT."""
+    reason = ENDED.get(MavMissionResult(result), R.BAD_PARAMETER)
+    return Rejection(reason, f"upload: {words or 'an item cannot be read'}")
 
 
 class UploadDesk:
@@ -102,7 +98,8 @@ class MissionUploads:
         for told in outgoing:
             self._answers.send(told)
             if isinstance(told.message, m.MissionAck) and told.message.type:
-                why = refusal or desk.check.take_refusal() or refusal_of(told.message.type)
+                ended = refusal_of(told.message.type, told.why)
+                why = ended if told.why else refusal or desk.check.take_refusal() or ended
                 self.refused(told.sender, vehicle, why, now=now)
         for upload in uploads:
             self._vehicles.touch(vehicle)

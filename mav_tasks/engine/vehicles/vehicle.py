@@ -879,6 +879,13 @@ class Vehicle:
             self.step(now=now)
         return paused
 
+    def pause_tasks(self, *, now: float) -> None:
+        """Let task and queue stand, and not what else may move the vehicle."""
+        self.hold_before.forget()
+        self.forget_start()
+        self.tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
+        self.step(now=now)
+
     def proceed(self, *, actor: str, now: float) -> TaskId | None:
         """Release STOP, takeover and pause; arming is allowed again. A held task stays held.
 

@@ -5,6 +5,7 @@ changes anything.
 """
 
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from math import inf
 
@@ -24,11 +25,13 @@ from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
 from mav_tasks.services.persona import persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
+from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.lifecycle import TaskReason
 
 OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
 MAX_PEERS = 256  # endpoints on one vehicle link
+MOST_NAMED = 5  # tasks in one text
 BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
 
 #: messages that nobody but a controller of the vehicle sends
@@ -166,6 +169,28 @@ class VehicleSide:
         budget, place = self.link_budget(vehicle, now=now), vehicle.requests.place
         is_driven = any(v.tasks.is_driving for v in self if v.requests.place == place)
         return budget.why_not(packet, message, is_driven=is_driven, now=now)
+
+    def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
+        """Pause each vehicle with a task of a key that counts no more, whosever task is driven.
+
+        Whether what that key had asked for is still wanted only an operator can say.
+        """
+        for tasks in self._fleet if keys else ():
+            theirs = [task for task in tasks.unfinished if task.submitter.key in keys]
+            if not theirs:
+                continue
+            names = ", ".join(sorted({task.submitter.key for task in theirs}))
+            ids = ", ".join(str(task.id) for task in theirs[:MOST_NAMED])
+            more = f" and {len(theirs) - MOST_NAMED} more" if len(theirs) > MOST_NAMED else ""
+            words = (
+                f"is paused: key {names} counts no more. Cancel its tasks {ids}{more}, or continue"
+            )
+            self._book.record(VehicleNoted(tasks.vehicle, words, now))
+            vehicle = self.get(tasks.vehicle)
+            if vehicle is None:
+                tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
+            else:
+                vehicle.pause_tasks(now=now)
 
     def settle(self) -> list[Vehicle]:
         """Look at what became of those to which something was done; gives them."""

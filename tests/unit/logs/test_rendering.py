@@ -21,6 +21,7 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     ServerStopped,
+    SignatureRefused,
     SignaturesSeen,
     StepReached,
     SubmissionRefused,
@@ -91,6 +92,7 @@ SAMPLES: list[tuple[Event, dict[str, object]]] = [
         VehicleHalted(1, 7, TaskReason.OPERATOR, "a", AT),
         {"epoch": 7, "reason": "operator", "actor": "a"},
     ),
+    (SignatureRefused("a signed anna", 90.0, AT), {"actor": "a signed anna", "seconds": 90.0}),
     (VehicleSeen(1, "found", AT), {"text": "found"}),
     (VehicleNoted(1, "silent", AT), {"text": "silent"}),
     (ServerStopped((1, 2), AT), {"unconfirmed": [1, 2]}),
@@ -126,7 +128,8 @@ def test_the_export_and_the_log_have_the_same_fields(
     assert exported.items() >= values.items()
     assert (exported["event"], exported["time"]) == (type(event).__name__, TIME)
     assert exported["message"] == str(event)
-    assert "vehicle" in exported or isinstance(event, ParameterSet | ServerStopped | SignaturesSeen)
+    of_none = ParameterSet | ServerStopped | SignaturesSeen | SignatureRefused
+    assert "vehicle" in exported or isinstance(event, of_none)
     record = logging.makeLogRecord({"msg": event, "levelno": 20, "levelname": "INFO"})
     record.created = UTC
     logged = strictly(json_line(record, str(event), None))

@@ -13,10 +13,12 @@ from mav_tasks.mavlink.signing import (
     EPOCH,
     HIGHEST_TIMESTAMP,
     MOST_STREAMS,
+    UNITS,
     Key,
     Signer,
     Stream,
     StreamTimes,
+    Window,
     is_signed_with,
     signed,
     stream_of,
@@ -30,7 +32,7 @@ VECTORS: list[dict[str, Any]] = [
 ]
 NUMBERED = list(enumerate(VECTORS))
 WINDOW = 60 * 100_000
-ONE, TWO = Stream(1, Address(255, 190)), Stream(2, Address(255, 190))
+ONE = Stream(1, Address(255, 190))
 KEY = Key("anna", SECRET, "operator")
 
 each = pytest.mark.parametrize(("number", "vector"), NUMBERED)
@@ -85,29 +87,68 @@ def test_time_is_counted_in_ticks_of_10_us_since_2015() -> None:
 # what is news
 
 
+def window(clock: int, *, now: float = 0.0, latest: int | None = None) -> Window:
+    """A minute on both sides of the clock."""
+    newest = clock + WINDOW
+    return Window(clock - WINDOW, newest, latest or newest, WINDOW, now)
+
+
 def test_in_a_stream_time_only_goes_on() -> None:
     times = StreamTimes()
     for timestamp, is_news in ((1000, True), (1000, False), (999, False), (1001, True)):
-        assert times.is_news(ONE, timestamp, clock=1000, window=WINDOW) is is_news
+        assert times.is_news(ONE, timestamp, window(1000)) is is_news
         if is_news:
-            times.note(ONE, timestamp)
-    # of one that is known the clock is not asked: it may be far behind, and idle for long
-    assert times.is_news(ONE, 1002, clock=10 * WINDOW, window=WINDOW)
+            times.note(ONE, timestamp, window(1000))
 
 
 def test_a_stream_begins_within_the_window() -> None:
-    times = StreamTimes()
-    clock = 5 * WINDOW
-    assert times.is_news(ONE, clock - WINDOW, clock=clock, window=WINDOW)
-    assert not times.is_news(ONE, clock - WINDOW - 1, clock=clock, window=WINDOW)
-    assert times.is_news(ONE, clock + 10 * WINDOW, clock=clock, window=WINDOW)
+    times, clock = StreamTimes(), 5 * WINDOW
+    for seconds, is_news in ((-61, False), (-60, True), (60, True), (61, False)):
+        timestamp = clock + int(seconds * UNITS)
+        assert times.is_news(ONE, timestamp, window(clock)) is is_news
 
 
-def test_one_that_is_ahead_does_not_let_older_ones_begin() -> None:
-    times = StreamTimes()
-    times.note(ONE, 10 * WINDOW)
-    assert not times.is_news(TWO, 8 * WINDOW, clock=8 * WINDOW, window=WINDOW)
-    assert times.is_news(TWO, 9 * WINDOW, clock=8 * WINDOW, window=WINDOW)
+@pytest.mark.parametrize("far", [-100 * WINDOW, 0, 100 * WINDOW])
+def test_a_known_clock_may_be_far_off_and_is_believed_as_fast_as_ours(far: int) -> None:
+    """Held back is what comes later after the one before than it was signed after it."""
+    times, clock = StreamTimes(), 200 * WINDOW
+    latest = clock + abs(far) + 10 * WINDOW
+    times.note(ONE, clock, window(clock))
+    hour = int(3600 * UNITS)
+    for late, is_news in ((0.0, True), (59.0, True), (61.0, False), (1800.0, False)):
+        wall = clock + far + hour + int(late * UNITS)
+        seen = window(wall, now=3600.0 + late, latest=latest + hour)
+        assert times.is_news(ONE, clock + hour, seen) is is_news
+
+
+def test_a_clock_that_counts_packets_is_believed_while_it_is_not_silent() -> None:
+    times, clock = StreamTimes(), 10 * WINDOW
+    for number in range(10):
+        seen = window(clock + number * 50 * int(UNITS), now=number * 50.0)
+        assert times.is_news(ONE, clock + number, seen)
+        times.note(ONE, clock + number, seen)
+    late = window(clock + 511 * int(UNITS), now=511.0)
+    assert not times.is_news(ONE, clock + 10, late)
+
+
+def test_of_an_earlier_run_only_the_clock_tells_what_is_new() -> None:
+    times, clock = StreamTimes(), 10 * WINDOW
+    times.restore(ONE, clock)
+    assert not times.is_news(ONE, clock, window(clock))
+    assert times.is_news(ONE, clock + 1, window(clock))
+    assert not times.is_news(ONE, clock + 1, window(clock + 2 * WINDOW, now=100.0))
+
+
+def test_a_time_that_cannot_be_right_keeps_nobody_out() -> None:
+    """Not of its own stream, nor of others, though there is no room for more."""
+    times, clock = StreamTimes(), 10 * WINDOW
+    for number in range(MOST_STREAMS):
+        times.restore(Stream(number, Address(255, 190)), 1000 * WINDOW + number)
+    for stream in (Stream(3, Address(255, 190)), Stream(200, Address(255, 190)), ONE):
+        for timestamp in (clock, clock + 1):
+            assert times.is_news(stream, timestamp, window(clock))
+            times.note(stream, timestamp, window(clock))
+            assert not times.is_news(stream, timestamp, window(clock))
 
 
 def test_what_was_heard_in_a_forgotten_stream_is_no_news_again() -> None:
@@ -116,11 +157,11 @@ def test_what_was_heard_in_a_forgotten_stream_is_no_news_again() -> None:
     heard = []
     for number, stream in enumerate(streams):
         timestamp = 1000 + number
-        assert times.is_news(stream, timestamp, clock=1000, window=WINDOW)
-        gone = times.note(stream, timestamp)
+        assert times.is_news(stream, timestamp, window(1000))
+        gone = times.note(stream, timestamp, window(1000))
         assert (gone is not None) is (number >= MOST_STREAMS)
         heard.append((stream, timestamp))
-    assert not [one for one in heard if times.is_news(one[0], one[1], clock=1000, window=WINDOW)]
+    assert not [one for one in heard if times.is_news(*one, window(1000))]
 
 
 @given(st.lists(st.tuples(st.integers(0, 200), st.integers(0, 3 * WINDOW)), max_size=300))
@@ -128,9 +169,9 @@ def test_nothing_is_ever_news_twice(packets: list[tuple[int, int]]) -> None:
     times, accepted = StreamTimes(), set()
     for number, timestamp in packets:
         stream = Stream(number, Address(1, 1))
-        if times.is_news(stream, timestamp, clock=WINDOW, window=WINDOW):
+        if times.is_news(stream, timestamp, window(WINDOW)):
             assert (stream, timestamp) not in accepted
-            times.note(stream, timestamp)
+            times.note(stream, timestamp, window(WINDOW))
             accepted.add((stream, timestamp))
 
 

@@ -10,7 +10,9 @@ from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_receiver import (
     ASK_AGAIN,
     CAPACITY,
+    EACH_ITEM,
     GIVE_UP,
+    LONGEST,
     QUIET,
     MissionReceiver,
     RequestForm,
@@ -51,7 +53,7 @@ class Rig:
         outgoing, uploads = self.receiver.take()
         self.uploads += uploads
         words = []
-        for sender, message in outgoing:
+        for sender, message, _why in outgoing:
             assert target_of(message) == sender.address
             match message:
                 case m.MissionRequest() | m.MissionRequestInt():
@@ -61,8 +63,11 @@ class Rig:
                     words.append((str(sender.key), "ack", message.type))
         return words
 
-    def count(self, number: int, sender: Sender = ALICE, *, kind: int = MISSION) -> "Rig":
-        self.receiver.count(m.MissionCount(1, 1, number, kind), sender, now=self.now)
+    def count(
+        self, number: int, sender: Sender = ALICE, *, kind: int = MISSION, rank: int = 1
+    ) -> "Rig":
+        message = m.MissionCount(1, 1, number, kind)
+        self.receiver.count(message, sender, rank=rank, now=self.now)
         return self
 
     def item(self, seq: int, sender: Sender = ALICE, **what: int) -> None:
@@ -180,6 +185,52 @@ def test_another_client_is_denied_also_while_it_is_being_decided() -> None:
     assert rig.said() == []
     rig.receiver.finish(Result.ACCEPTED, opaque_id=1, now=0.0)
     assert rig.said() == [("alice", "ack", Result.ACCEPTED)]
+
+
+def test_one_of_a_higher_rank_uploads_instead_and_the_other_is_told() -> None:
+    rig = Rig().count(2)
+    rig.item(0)
+    rig.said()
+    rig.count(1, BOB, rank=2)
+    assert rig.said() == [("alice", "ack", Result.DENIED), ("bob", "request", 0)]
+    rig.item(1)  # which alice had been asked for
+    rig.count(2)
+    assert rig.said() == [("alice", "ack", Result.DENIED)]
+    rig.item(0, BOB)
+    rig.said()
+    assert [(upload.sender, len(upload.items)) for upload in rig.uploads] == [(BOB, 1)]
+
+
+def test_what_is_being_decided_about_is_displaced_by_nobody() -> None:
+    rig = Rig().uploaded()
+    rig.count(1, BOB, rank=2)
+    assert rig.said() == [("bob", "ack", Result.DENIED)]
+
+
+def test_an_upload_has_a_minute_and_half_a_second_for_each_item() -> None:
+    """However often it is begun again meanwhile; its count is worth nothing."""
+    rig = Rig().count(CAPACITY)
+    seen: list[tuple[float, str, int]] = []
+    items = 0
+    while not any(what == "ack" for _, what, _ in seen):
+        seen += rig.run(rig.now + 2.0)
+        if items % 7 == 6:
+            rig.count(CAPACITY)
+        rig.item(items % 7)
+        items += 1
+    ended, _, result = seen[-1]
+    assert result == Result.OPERATION_CANCELLED
+    assert LONGEST < ended <= LONGEST + EACH_ITEM * items
+
+
+@pytest.mark.parametrize("pace", [0.1, 0.3])  # s for an item, over a radio of 57,600 baud
+def test_the_longest_plan_over_a_slow_radio_has_time_enough(pace: float) -> None:
+    rig = Rig().count(CAPACITY)
+    for seq in range(CAPACITY):
+        rig.run(rig.now + pace)
+        rig.item(seq)
+    rig.said()
+    assert [len(upload.items) for upload in rig.uploads] == [CAPACITY]
 
 
 def test_the_same_count_again_may_be_of_another_plan() -> None:

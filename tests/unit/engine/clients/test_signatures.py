@@ -48,6 +48,7 @@ def packet(
     made: Any = {
         "command": common.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
         "heartbeat": common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+        "setpoint": common.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0),
         "radio": common.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7),
     }[kind]
     (whole,) = split_datagram(made.pack(mav, force_mavlink1=v1))
@@ -121,18 +122,34 @@ def test_nor_after_a_restart_on_what_the_store_has() -> None:
     assert again.admit(CLIENTS, "p", packet(timestamp=NOW + 1)) == ANNA
 
 
-def test_what_comes_often_is_kept_once_a_second() -> None:
+@pytest.mark.parametrize(
+    ("kind", "within"), [("heartbeat", 60.0), ("setpoint", 1.0), ("command", 0.0)]
+)
+def test_a_time_is_kept_as_soon_as_its_packet_could_do_harm_again(kind: str, within: float) -> None:
     it = signatures()
-    it.admit(CLIENTS, "p", packet(kind="heartbeat"))
+    it.admit(CLIENTS, "p", packet())
     it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
     it.take_times()  # of its own times it keeps a reserve, at once
-    it.admit(CLIENTS, "p", packet(kind="heartbeat", timestamp=NOW + 1))
-    assert (it.take_times(), it.next_deadline()) == (None, 1.0)
-    it.now = 1.0
+    it.admit(CLIENTS, "p", packet(kind=kind, timestamp=NOW + 1))
+    assert it.next_deadline() == within
+    it.now = within - 0.1
+    assert it.take_times() is None
+    it.now = within
     seen = it.take_times()
     assert seen is not None
     assert [time.timestamp for time in seen.times] == [NOW + 1]
     assert it.next_deadline() is None
+
+
+def test_an_idle_station_is_written_down_once_a_minute() -> None:
+    it, written = signatures(), 0
+    for second in range(3600):
+        it.now = float(second)
+        beat = packet(kind="heartbeat", timestamp=NOW + second * 100_000)
+        assert it.admit(CLIENTS, "p", beat) == ANNA
+        it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
+        written += it.take_times() is not None
+    assert 55 <= written <= 62
 
 
 def test_who_signs_is_answered_with_his_key_and_in_his_time() -> None:
@@ -142,6 +159,49 @@ def test_who_signs_is_answered_with_his_key_and_in_his_time() -> None:
     (sealed,) = split_datagram(it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT))
     assert timestamp_of(sealed) > ahead
     assert it.sealed(CLIENTS, "q", UNSIGNED_HEARTBEAT) == UNSIGNED_HEARTBEAT
+
+
+@pytest.mark.parametrize("utc", [0.0, 1_577_836_799.0])  # 1970, 2019
+def test_a_clock_that_was_never_set_believes_any_that_goes_on(utc: float) -> None:
+    it = Signatures(window=60.0)
+    it.set_wall(utc)
+    it.change_keys(KeysChanged((ANNA,)))
+    it.change_link(LinkChanged(CLIENTS, LinkSide.CLIENTS, up=True, takes_unsigned=False))
+    year = 365 * 86_400 * 100_000
+    for timestamp, key in ((NOW + year, ANNA), (NOW + year, None), (NOW + year + 1, ANNA)):
+        assert it.admit(CLIENTS, "p", packet(timestamp=timestamp)) is key
+    it.set_wall(UTC)
+    assert it.admit(CLIENTS, "p", packet(timestamp=NOW)) is ANNA
+
+
+def test_a_clock_behind_what_an_earlier_run_has_signed_was_not_set_yet() -> None:
+    """As of a computer that goes on from when it was switched off."""
+    it = signatures()
+    raw = packet(timestamp=NOW - 1000)
+    it.admit(CLIENTS, "p", raw)
+    it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
+    seen = it.take_times()
+    assert seen is not None
+    again = signatures(times=seen.times, signed_until=seen.signed_until)
+    again.set_wall(UTC - 3600.0)
+    assert again.admit(CLIENTS, "p", raw) is None
+    assert again.admit(CLIENTS, "p", packet(timestamp=NOW + 100 * 100_000)) == ANNA
+    again.set_wall(UTC + 120.0)
+    assert again.admit(CLIENTS, "p", packet(timestamp=NOW + 3600 * 100_000)) is None
+    assert again.admit(CLIENTS, "p", packet(timestamp=NOW + 121 * 100_000)) == ANNA
+
+
+def test_who_is_refused_for_the_time_is_told_once_a_minute() -> None:
+    it, told = signatures(), []
+    for second in range(90):
+        it.now = float(second)
+        for late in (-3600, 3600):
+            timestamp = NOW + (second - late) * 100_000
+            assert it.admit(CLIENTS, "p", packet(timestamp=timestamp)) is None
+        told += it.take_refused()
+    assert [round(each.seconds) for each in told] == [-3600, -3600]
+    assert str(told[0]).startswith("255/190@p signed anna refused: signed 3600 s after the time")
+    assert (it.counts.ahead, it.counts.old) == (90, 90)
 
 
 def test_each_end_is_signed_to_later_than_before_also_after_a_restart_with_the_clock_back() -> None:
@@ -157,12 +217,16 @@ def test_each_end_is_signed_to_later_than_before_also_after_a_restart_with_the_c
 
 
 def test_a_holder_of_a_key_cannot_lead_the_servers_time_away() -> None:
-    """Or else what others hear would be of one time for ever, and so no news to them."""
+    """Or else what others hear would be of one time for ever, and so no news to them.
+
+    A vehicle's time may be ahead, a client's while the server's own clock was never set.
+    """
     it = signatures()
-    assert it.admit(CLIENTS, "p", packet(timestamp=HIGHEST_TIMESTAMP)) == ANNA
+    assert it.admit(CLIENTS, "p", packet(timestamp=HIGHEST_TIMESTAMP)) is None
+    assert it.admit(VEHICLES, "rover", packet(ROVER, timestamp=HIGHEST_TIMESTAMP)) == ROVER
     it.admit(CLIENTS, "q", packet(BEN))
     for _ in range(3):
-        it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)  # it does not fail
+        it.sealed(VEHICLES, "rover", UNSIGNED_HEARTBEAT)  # it does not fail
     to_ben = [it.sealed(CLIENTS, "q", UNSIGNED_HEARTBEAT) for _ in range(2)]
     seen = it.take_times()
     assert seen is not None

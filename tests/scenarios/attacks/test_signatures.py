@@ -1,0 +1,234 @@
+"""S2, S3, S5: what is signed well and must not count, and what must count all the same.
+
+A packet held back, one meant for another server, a clock that is ahead, a key that is revoked
+while its task drives.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.engine.inputs import KeysChanged, WallClock
+from mav_tasks.mavlink.signing import timestamp_at
+from mav_tasks.tasks.events import SignaturesSeen, SignatureTime
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, restart, signing
+
+TASK_CANCEL = 54010
+HOUR, YEAR = 3600.0, 365 * 86_400.0
+
+
+def at_time(client: FakeClient, utc: float) -> FakeClient:
+    """Have a client's clock say this."""
+    client._mav.signing.timestamp = timestamp_at(utc)
+    return client
+
+
+def set_clock(world: World, utc_offset: float) -> None:
+    world.server.pump.handle(WallClock(utc_offset), now=world.now)
+    world.server.pump.turn(now=world.now)
+
+
+def held_back(world: World, client: FakeClient) -> bytes:
+    """Give a TASK_MOVE that leaves the client now, and arrives when somebody wants it to."""
+    client.heartbeats = False
+    return client.packed(command_long(MOVE, 1.0, 0, 0, 0, 0, 0, 5))
+
+
+# S2
+
+
+def test_a_command_held_back_for_half_an_hour_is_not_done(world: World) -> None:
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    raw = held_back(world, client)
+    world.leave(world.rover_parties[0])  # which would cost a minute of CPU
+    world.run(1800.0)
+    client.send_raw(raw)
+    world.run(0.3)
+    assert world.tasks() == ()
+
+
+@pytest.mark.parametrize("offset", [-3 * HOUR, 3 * HOUR])
+def test_nor_one_of_a_client_whose_clock_is_hours_off(world: World, offset: float) -> None:
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    set_clock(world, UTC + offset)
+    raw = held_back(world, client)
+    world.run(90.0)
+    client.send_raw(raw)
+    world.run(0.3)
+    assert world.tasks() == ()
+
+
+@pytest.mark.parametrize("offset", [-3 * HOUR, 3 * HOUR])
+def test_a_clock_that_is_hours_off_is_believed_as_long_as_it_goes_on(
+    world: World, offset: float
+) -> None:
+    """The server's clock is set while a client is there, whose own is as it was."""
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    set_clock(world, UTC + offset)
+    client.heartbeats = False
+    world.run(90.0)  # longer than the window: silent, but its clock goes on
+    at_time(client, UTC + world.now)
+    sent = client.move(1.0)
+    world.run(1.0)
+    assert sent.result == ACCEPTED
+    world.run(90.0)
+    at_time(client, UTC + world.now)
+    assert client.stop().ack is None
+    world.run(0.3)
+    assert world.paused() is R.STOPPED
+
+
+def test_a_command_for_one_server_is_not_done_by_another_a_minute_later(
+    make_world: MakeWorld,
+) -> None:
+    """Who commands both has spoken to the other one before, too. Sooner than that nobody can tell
+    for which of them it was: README of the dialect.
+    """
+    one, other = put(make_world(), ALICE), put(make_world(), ALICE)
+    for world in (one, other):
+        client = signing(world, ALICE)
+        world.run(1.5)
+    sent_at = other.now
+    raw = held_back(one, signing(one, ALICE, name="mover"))
+    client.heartbeats = False
+    other.run(61.5)
+    at_time(client, UTC + sent_at - 1.0)
+    client.send_raw(raw)
+    other.run(0.3)
+    assert other.tasks() == ()
+
+
+# S3
+
+
+def ahead(world: World, seconds: float) -> FakeClient:
+    """Have somebody with the key send from a clock that is ahead."""
+    client = signing(world, ALICE, behind=-seconds, name="ahead")
+    client.heartbeats = False
+    client.move(1.0)
+    client.rotate(5.0)
+    world.run(0.5)
+    return client
+
+
+@pytest.mark.parametrize("seconds", [90.0, HOUR, YEAR])
+def test_a_clock_ahead_shuts_nobody_out(world: World, seconds: float) -> None:
+    put(world, ALICE, BOB)
+    refused = ahead(world, seconds)
+    assert (refused.acks, world.tasks(), world.paused()) == ([], (), R.NONE)
+    same = signing(world, ALICE, name="the same stream")
+    another = world.add_client("another stream")
+    another.sign(ALICE.secret, utc=UTC + world.now, link_id=7)
+    world.run(0.5)
+    moved = same.move(1.0)
+    world.run(0.5)
+    stopped = another.stop()
+    world.run(0.3)
+    assert (moved.result, stopped.result) == (ACCEPTED, ACCEPTED)
+    assert world.paused() is R.STOPPED
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "tasks.sqlite3"
+
+
+@pytest.mark.parametrize("poisoned", ["by a packet", "by an older version"])
+def test_nor_after_a_restart(make_world: MakeWorld, path: Path, poisoned: str) -> None:
+    store = PromptSqliteStore(path, wall_offset=UTC)
+    world = put(make_world(store=store), ALICE)
+    right = signing(world, ALICE)
+    world.run(1.5)
+    if poisoned == "by a packet":
+        ahead(world, YEAR)
+    else:
+        stream = SignatureTime(ALICE.fingerprint, 1, 255, 190, timestamp_at(UTC + YEAR))
+        store.append([SignaturesSeen((stream,), (), 0, world.now)])
+        store.take_outcomes()
+    restart(world, path, well=True)
+    sent = right.stop()
+    world.run(0.3)
+    assert sent.result == ACCEPTED
+    assert world.paused() is R.STOPPED
+
+
+# S5
+
+
+def test_a_task_of_a_revoked_key_drives_no_further(world: World) -> None:
+    put(world, ALICE, BOB)
+    client, operator = signing(world, ALICE), signing(world, BOB, name="operator")
+    world.run(1.5)
+    driven, waiting = client.move(20.0), client.move(1.0)
+    world.until_state(1, S.EXECUTING)
+    world.until(lambda: world.truth.north > 0.5, within=10)
+    world.server.pump.handle(KeysChanged((REVOKED, BOB)), now=world.now)
+    north = world.truth.north
+    world.run(5.0)
+    assert world.truth.north - north < 0.5
+    assert world.stands()
+    assert world.state(driven.task_id) == (S.PAUSED, R.OPERATOR)
+    assert world.state(waiting.task_id)[0] is S.QUEUED
+    told = "Rover 1 is paused: key alice counts no more. Cancel its tasks 1, 2, or continue"
+    assert told in operator.texts()
+    operator.proceed()
+    world.until(lambda: world.state(driven.task_id)[0] is S.EXECUTING, within=10)
+
+
+def test_nor_do_those_of_others_that_would_let_it_begin(world: World) -> None:
+    """One that waits behind another's is not begun either: the queue stands."""
+    put(world, ALICE, BOB)
+    client, operator = signing(world, ALICE), signing(world, BOB, name="operator")
+    world.run(1.5)
+    driven = operator.move(1.0)
+    waiting = client.move(1.0)
+    world.until_state(1, S.EXECUTING)
+    world.server.pump.handle(KeysChanged((REVOKED, BOB)), now=world.now)
+    world.run(6.0)
+    assert world.state(driven.task_id) == (S.PAUSED, R.OPERATOR)
+    assert world.state(waiting.task_id)[0] is S.QUEUED
+    operator.command(TASK_CANCEL, waiting.task_id)
+    operator.proceed()
+    world.until_idle(tasks=2)
+    assert world.state(driven.task_id)[0] is S.COMPLETED
+    assert world.truth.north == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_key_that_came_or_has_another_role_pauses_nobody(world: World) -> None:
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    client.move(1.0)
+    world.until_state(1, S.EXECUTING)
+    for keys in ((ALICE, BOB), (replace(ALICE, role="observer"), BOB)):
+        world.server.pump.handle(KeysChanged(keys), now=world.now)
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+
+
+def test_nor_does_it_drive_where_the_key_was_revoked_while_the_server_was_away(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world = put(make_world(store=PromptSqliteStore(path, wall_offset=UTC)), ALICE, BOB)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    client.command(MOVE, 1.0, 0, 0, 0, 0, 10.0, 5)  # in 10 s
+    world.run(0.5)
+    restart(world, path, well=True, keys=(REVOKED, BOB))
+    world.run(15.0)
+    assert world.state(1)[0] is S.QUEUED
+    assert world.paused() is R.OPERATOR
+    assert world.truth.north == 0.0
