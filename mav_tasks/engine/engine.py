@@ -10,6 +10,7 @@ from typing import assert_never
 
 from mav_tasks.engine.clients.broadcasts import Broadcasts
 from mav_tasks.engine.clients.displays import Displays
+from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.operator_watch import OperatorWatch
@@ -17,7 +18,6 @@ from mav_tasks.engine.clients.parameters import MESSAGES as PARAMETER_MESSAGES
 from mav_tasks.engine.clients.parameters import ParameterDesk
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.request_limit import RequestLimit
 from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.setup_signing import SetupSigning
@@ -137,8 +137,8 @@ class Engine:
         self._publisher = Publisher(
             self._gcs, self._vehicles, self._book, self._displays, self._submissions
         )
-        self._passing = Passing(self._vehicles, self._vehicles.our_address, refusals)
-        self._requests = RequestLimit(self._vehicles, refusals)
+        self._passing = Passing(self._vehicles, refusals)
+        self._door = Door(self._vehicles, refusals)
         self._broadcasts = Broadcasts(self._vehicles, packer)
         self._operator = OperatorWatch()
         self._restarts = RestartWatch()
@@ -264,7 +264,7 @@ class Engine:
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
                 f" {self.signatures.counts}, left out {self._gates.left_out} datagrams,"
-                f" {self._requests.left_out} requests"
+                f" {self._door.left_out} requests"
             ),
         )
 
@@ -291,7 +291,7 @@ class Engine:
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
-        if not self._requests.may_pass(client, packet, message, now=now):
+        if not self._door.may_pass(client, packet, message, now=now):
             return
         self._publisher.welcome(client, now=now)
         for each in self._broadcasts.addressed(received):

@@ -7,16 +7,18 @@ acknowledges: who sent that waits until a heartbeat shows the mode.
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import marks_of
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
+from mav_tasks.engine.policy import row_of_command, row_of_message
 from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.mavlink.messages import SetMode
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -77,7 +79,7 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
             return True
         if not self._is_mission(vehicle, mode):
-            client.rights.require(OPERATOR, "change the mode")
+            client.rights.require(row_of_command(MavCmd.DO_SET_MODE).role, "change the mode")
             vehicle.client_asks_mode(mode, client.key, now=now)
             return False
         self._plans.check_start(client.rights, vehicle, submitter)
@@ -122,7 +124,7 @@ class ModeRequests:
             self._submissions.run_unasked(client, vehicle, draft, actor=actor, now=now)
             self._show(vehicle, mode, now=now)
         elif not self._is_mission(vehicle, mode):
-            client.rights.require(OPERATOR, "change the mode")
+            client.rights.require(row_of_message(SetMode.id).role, "change the mode")
             vehicle.client_asks_mode(mode, client.key, now=now)
             vehicle.requests.forward(packet)
             vehicle.requests.ask_to_show(now=now)

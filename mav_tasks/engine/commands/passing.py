@@ -5,10 +5,9 @@ What the server does not claim goes to the link on which the target was seen, if
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY
-from mav_tasks.engine.commands.motion_gate import may_pass, passed, withheld
+from mav_tasks.engine.commands.motion_gate import may_pass, passed, why_not_sent, withheld
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.engine.missions.plans import MISSION
+from mav_tasks.engine.policy import Kind, Row, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -22,39 +21,14 @@ from mav_tasks.tasks.lifecycle import TaskReason
 R = TaskReason
 
 EVERYBODY = Address(0, 0)
-#: what everybody may send to a vehicle: it asks. SYSTEM_TIME sets the clock of some
-ASKING = frozenset(
-    {
-        *(m.Ping.id, m.Timesync.id, m.ParamRequestRead.id, m.ParamRequestList.id),
-        *(m.MissionRequestList.id, m.MissionRequest.id, m.MissionRequestInt.id, m.MissionAck.id),
-    }
-)
-#: what everybody sends all the time, and only operators have passed on: nothing was refused there
-TELLING = frozenset({m.Heartbeat.id, m.SystemTime.id, m.Statustext.id})
-#: what changes the bounds in which a vehicle drives, or anything in it; files are read and written
-#: by one message
-BOUNDING = frozenset(
-    {
-        m.ParamSet.id,
-        m.FileTransferProtocol.id,
-        50,  # PARAM_MAP_RC
-        126,  # SERIAL_CONTROL, a PX4's shell
-        160,  # FENCE_POINT
-        175,  # RALLY_POINT
-        323,  # PARAM_EXT_SET
-        11002,  # DEVICE_OP_WRITE
-    }
-)
 
 
 class Passing:
     """Passes clients' packets on."""
 
-    def __init__(self, vehicles: VehicleSide, identity: Address, refusals: Refusals) -> None:
-        """``identity``: as whom the server speaks to vehicles."""
+    def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
         self._refusals = refusals
         self._vehicles = vehicles
-        self._identity = identity
 
     def pass_on(
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
@@ -64,10 +38,18 @@ class Passing:
         Without a ``message`` its id is unknown and its bytes are unverified: noise may look like
         it, and is no refusal worth a line.
         """
+        row = row_of(packet.message_id, message).passed_on
         target = EVERYBODY if message is None else _target(message)
-        why_not = self._why_not(client, packet, message)
-        if why_not is not None:
-            if message is not None and packet.message_id not in TELLING:
+        if self._is_ours(packet.source):
+            if message is not None and row.kind is not Kind.TELL:
+                words = f"{packet.source} is an address of the server or of a rover"
+                why_not = Rejection(R.NOT_ALLOWED, words)
+                self._refusals.stream(client, target.system_id, packet, why_not, now=now)
+            return
+        if not client.rights.reach(row.role):
+            if message is not None and row.kind is not Kind.TELL:
+                words = f"may not send that to a rover, {row.role} may"
+                why_not = client.rights.refusal(words)
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
         behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
@@ -81,36 +63,24 @@ class Passing:
         for vehicles in behind.values():
             is_old = self._vehicles.is_old_news(now=now)
             refusing = [
-                v for v in vehicles if not may_pass(v, client.key, packet, message, is_old=is_old)
+                v for v in vehicles if not may_pass(v, client.key, row, message, is_old=is_old)
             ]
             if not refusing:
                 for vehicle in vehicles:
-                    passed(vehicle, client.key, packet, message, now=now)
+                    passed(vehicle, client.key, row, message, now=now)
                 vehicles[0].requests.forward(packet)
                 continue
             for vehicle in vehicles:
-                withheld(vehicle, client.key, packet, message, now=now)
+                withheld(vehicle, client.key, row, now=now)
             if message is None:
                 continue
             for vehicle in refusing:
-                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client))
+                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client, row))
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
-
-    def _why_not(
-        self, client: GcsClient, packet: Packet, message: m.Message | None
-    ) -> Rejection | None:
-        """Return why a packet may go to no rover at all, None if it may."""
-        if self._is_ours(packet.source):
-            words = f"{packet.source} is an address of the server or of a rover"
-            return Rejection(R.NOT_ALLOWED, words)
-        least = _least_role(packet, message)
-        if client.rights.reach(least):
-            return None
-        return client.rights.refusal(f"may not send that to a rover, {least} may")
 
     def _is_ours(self, source: Address) -> bool:
         """Whether a packet says that it is of the server or of a rover, and is of neither."""
-        return source == self._identity or any(
+        return source == self._vehicles.our_address or any(
             source in (vehicle.server_address, Address(vehicle.system_id, AUTOPILOT))
             for vehicle in self._vehicles.addressed_by(source.system_id)
         )
@@ -123,20 +93,9 @@ class Passing:
                 vehicle.client_is_gone((link, peer), now=now)
 
 
-def _least_role(packet: Packet, message: m.Message | None) -> str:
-    """Return the role from which on a client may have a packet passed on."""
-    if packet.message_id in ASKING:
-        return OBSERVER
-    if isinstance(message, m.FileTransferProtocol) and file_transfer.reads(message):
-        return OBSERVER
-    is_of_plan = getattr(message, "mission_type", MISSION) == MISSION  # or else of a fence
-    is_bounding = packet.message_id in BOUNDING or not is_of_plan
-    return SAFETY if is_bounding else OPERATOR
-
-
-def _why_withheld(vehicle: Vehicle, client: GcsClient) -> str:
+def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
     """Return in words why a packet that a client may send does not go to a rover now."""
-    return vehicle.why_not_moved(client.key) or "not finite, or older than the server's pause"
+    return why_not_sent(row, vehicle, client.key) or "not finite, or older than the server's pause"
 
 
 def _target(message: m.Message) -> Address:

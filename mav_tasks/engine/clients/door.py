@@ -1,15 +1,14 @@
 """How many requests of each client are taken in: as many as its role may send in a second.
 
-STOP is never too many. What belongs to a transfer that is under way is asked for, and not counted;
-nor is what says that somebody is there, or drives by hand: its rate is bounded where it comes in.
-But all that goes on to a rover is counted of who may only look: its way there may be narrow.
+STOP is never too many. What belongs to a transfer that is under way is asked for, and not counted; nor is what says that
+somebody is there, or drives by hand: its rate is bounded where it comes in. But all that goes on to
+a rover is counted of who may only look: its way there may be narrow.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OPERATOR
-from mav_tasks.engine.commands.motion_gate import GO_TO
-from mav_tasks.engine.commands.passing import ASKING
+from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
+from mav_tasks.engine.policy import row_of
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -19,19 +18,8 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
-UNCOUNTED = frozenset(
-    {
-        *(m.Heartbeat.id, m.Timesync.id, m.SystemTime.id, m.Ping.id),
-        *(m.MissionItem.id, m.MissionItemInt.id, m.MissionAck.id),
-        *(m.MissionRequest.id, m.MissionRequestInt.id),
-        *(m.ManualControl.id, m.RcChannelsOverride.id),
-        *(m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id),
-        *(m.SetAttitudeTarget.id, m.SetActuatorControlTarget.id),
-    }
-)
 
-
-class RequestLimit:
+class Door:
     """Counts requests, and answers what is one too many."""
 
     def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
@@ -44,7 +32,7 @@ class RequestLimit:
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> bool:
         """Whether a client's packet is seen to; a command is told if it is not."""
-        if _is_uncounted(client, packet, message) or client.may_ask(now=now):
+        if is_stop(message) or _is_uncounted(client, packet, message) or client.may_ask(now=now):
             return True
         self.left_out += 1
         if isinstance(message, m.CommandLong | m.CommandInt) and client.may_be_refused(now=now):
@@ -76,8 +64,5 @@ class RequestLimit:
 
 
 def _is_uncounted(client: GcsClient, packet: Packet, message: m.Message | None) -> bool:
-    if packet.message_id not in UNCOUNTED:
-        return is_stop(message)
-    if isinstance(message, m.MissionItem | m.MissionItemInt) and message.current in GO_TO:
-        return False  # a task, and no item of a transfer
-    return packet.message_id not in ASKING or client.rights.reach(OPERATOR)
+    row = row_of(packet.message_id, message)
+    return not row.is_counted and (row.role != OBSERVER or client.rights.reach(OPERATOR))
