@@ -12,7 +12,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
@@ -40,12 +40,6 @@ class Passing:
         """
         row = row_of(packet.message_id, message).passed_on
         target = EVERYBODY if message is None else _target(message)
-        if self._is_ours(packet.source):
-            if message is not None and row.kind is not Kind.TELL:
-                words = f"{packet.source} is an address of the server or of a rover"
-                why_not = Rejection(R.NOT_ALLOWED, words)
-                self._refusals.stream(client, target.system_id, packet, why_not, now=now)
-            return
         if not client.rights.reach(row.role):
             if message is not None and row.kind is not Kind.TELL:
                 words = f"may not send that to a rover, {row.role} may"
@@ -77,13 +71,6 @@ class Passing:
             for vehicle in refusing:
                 why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client, row))
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
-
-    def _is_ours(self, source: Address) -> bool:
-        """Whether a packet says that it is of the server or of a rover, and is of neither."""
-        return source == self._vehicles.our_address or any(
-            source in (vehicle.server_address, Address(vehicle.system_id, AUTOPILOT))
-            for vehicle in self._vehicles.addressed_by(source.system_id)
-        )
 
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """A client is gone: whatever it was driving is driven by nobody."""
