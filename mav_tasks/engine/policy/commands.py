@@ -57,6 +57,8 @@ START = Row(
     "starts what the server drives itself",
     is_claimed=True,
 )
+#: rows that no number has for itself
+BY_WORDS = (DISARM, PAUSE, PAUSE_HERE, HOLD, START)
 
 OURS = {
     **named(SUBMITS, "54000 TASK_MOVE, 54001 TASK_ROTATE, 54002 TASK_DRIVE"),

@@ -37,6 +37,8 @@ BOUNDING_PLAN = Row(
     is_bound=True,
     elsewhere=BOUNDS,
 )
+#: rows that no number has for itself
+BY_WORDS = (READ_FILE, GO_TO_ITEM, BOUNDING_PLAN)
 
 MESSAGES: Mapping[int, Row] = {
     **named(
