@@ -11,6 +11,7 @@ from typing import assert_never
 
 from mav_tasks.engine.clients.broadcasts import Broadcasts
 from mav_tasks.engine.clients.displays import Displays
+from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.operator_watch import OperatorWatch
@@ -18,7 +19,6 @@ from mav_tasks.engine.clients.parameters import MESSAGES as PARAMETER_MESSAGES
 from mav_tasks.engine.clients.parameters import ParameterDesk
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.request_limit import RequestLimit
 from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.setup_signing import SetupSigning
@@ -27,7 +27,7 @@ from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands.asked import AskedByMessage
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.ordering import Kind, kind_of_message
+from mav_tasks.engine.commands.ordering import kind_of_message
 from mav_tasks.engine.commands.passing import Passing
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
@@ -51,6 +51,7 @@ from mav_tasks.engine.intake import Intake
 from mav_tasks.engine.missions.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.plans import Plans
+from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
@@ -148,8 +149,8 @@ class Engine:
             self._submissions,
             TelemetryRates(self._gcs, self._vehicles),
         )
-        self._passing = Passing(self._vehicles, self._vehicles.our_address, refusals)
-        self._requests = RequestLimit(self._vehicles, refusals)
+        self._passing = Passing(self._vehicles, refusals)
+        self._door = Door(self._vehicles, refusals)
         self._broadcasts = Broadcasts(self._vehicles, packer)
         self._operator = OperatorWatch()
         self._restarts = RestartWatch()
@@ -276,7 +277,7 @@ class Engine:
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
                 f" {self.signatures.counts}, left out {self._gates.left_out} datagrams,"
-                f" {self._requests.left_out} requests"
+                f" {self._door.left_out} requests"
             ),
         )
 
@@ -326,11 +327,11 @@ class Engine:
     def _kind_of(self, message: m.Message | None) -> Kind:
         target = getattr(message, "target_system", 0)
         vehicle = self._vehicles.look_at(target) if target else next(iter(self._vehicles), None)
-        return Kind.OTHER if vehicle is None else kind_of_message(message, vehicle.persona)
+        return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
-        if not self._requests.may_pass(client, packet, message, now=now):
+        if not self._door.may_pass(client, packet, message, now=now):
             return
         self._publisher.welcome(client, now=now)
         for each in self._broadcasts.addressed(received):

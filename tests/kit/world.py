@@ -40,7 +40,8 @@ STANDS = 0.01  # m/s and rad/s
 COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
 
 
-MODE_COMMAND, SETPOINT = 76, 84  # COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED
+INT_COMMAND, MODE_COMMAND = 75, 76  # COMMAND_INT, COMMAND_LONG
+SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
 
 #: shows each change at once, so that a scenario's times are those of the server alone; what a
 #: second of not knowing does is test_one_hertz's
@@ -270,6 +271,18 @@ class World(VirtualWorld):
 
         self.watched.loses = look
         return ids
+
+    def commands_passed_on(self) -> set[int]:
+        """Give the numbers of the commands that go to rovers from here on, as they come."""
+        numbers: set[int] = set()
+
+        def look(sender: str, _target: str, data: bytes) -> bool:
+            if sender == VEHICLE_LINK and data[7] in (INT_COMMAND, MODE_COMMAND):
+                numbers.add(int.from_bytes(data[COMMAND_ID], "little"))
+            return False
+
+        self.watched.loses = look
+        return numbers
 
     def lose_acks(self) -> list[bytes]:
         """From now on lose the acks of the first rover; gives the list that they end up in."""

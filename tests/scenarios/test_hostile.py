@@ -177,11 +177,11 @@ def test_only_a_command_is_a_stop_that_is_never_too_much(with_roles: MakeRoles) 
     """Other messages, too, have a field for a command: they are counted."""
     world = with_roles(observer=Limits(rate=2.0))
     observer = join(world, OBSERVER)
-    before = world.server.engine._requests.left_out
+    before = world.server.engine._door.left_out
     for _ in range(100):
         observer.send(common.MAVLink_command_ack_message(STOP, 0, 0, 0, 1, 1))
     world.run(0.2)
-    assert world.server.engine._requests.left_out - before >= 80
+    assert world.server.engine._door.left_out - before >= 80
     assert answer(world, observer.stop()) is not None
 
 

@@ -10,8 +10,8 @@ from copy import copy
 from typing import Any
 
 from mav_tasks.engine.clients.gcs_side import Received
-from mav_tasks.engine.commands.goals import OUR_COMMANDS
 from mav_tasks.engine.missions.mission_desk import MESSAGES as MISSION_MESSAGES
+from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -53,5 +53,5 @@ def _is_to_everybody(message: m.Message | None) -> bool:
     if getattr(message, "target_system", None) != EVERYBODY:
         return False
     if isinstance(message, m.CommandLong | m.CommandInt):
-        return message.command not in OUR_COMMANDS
+        return not is_task_command(message.command)
     return isinstance(message, (m.SetMode, *MISSION_MESSAGES))

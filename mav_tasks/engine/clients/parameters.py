@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.clients.rights import SAFETY
 from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection, SettingError
@@ -152,7 +152,7 @@ class ParameterDesk:
             pending = {each: wish for each, (wish, _) in self._pending.items()}
             expected, _ = with_all(self._configured, self._kept | pending)
             changed(expected, name, value)
-            client.rights.require(SAFETY, "set parameters")
+            client.rights.require(row_of_message(m.ParamSet.id).role, "set parameters")
             self._submissions.check_open()
         except SettingError as error:
             refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)

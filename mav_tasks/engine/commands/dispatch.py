@@ -11,24 +11,25 @@ from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.clients.rights import OPERATOR, SAFETY, SUBMITTER
+from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import (
     CHANGE_MODE,
-    OUR_COMMANDS,
     bad,
     becomes_task,
-    place_in,
+    has_place,
     reposition_flags,
     whole,
 )
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.ordering import Kind, kind_of, note_halt, require_newer
+from mav_tasks.engine.commands.motion_gate import why_not_sent
+from mav_tasks.engine.commands.ordering import kind_of, note_halt, require_newer, row_said
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import result_of
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.missions.plans import Plans, begins_with
+from mav_tasks.engine.policy import Kind, Row, is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -44,54 +45,6 @@ from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
-
-#: commands that a vehicle follows in the mode in which we drive it: a second source
-MOVING = frozenset(
-    {
-        MavCmd.NAV_WAYPOINT,
-        MavCmd.NAV_LOITER_UNLIM,
-        18,  # NAV_LOITER_TURNS
-        MavCmd.NAV_LOITER_TIME,
-        MavCmd.NAV_TAKEOFF,
-        32,  # DO_FOLLOW
-        33,  # DO_FOLLOW_REPOSITION
-        34,  # DO_ORBIT
-        MavCmd.CONDITION_YAW,
-        MavCmd.DO_REPOSITION,
-        MavCmd.NAV_SET_YAW_SPEED,
-        MavCmd.DO_MOTOR_TEST,
-        43000,  # GUIDED_CHANGE_SPEED
-        43002,  # GUIDED_CHANGE_HEADING
-    }
-)
-#: all that passes while STOP is latched, besides disarming: what only asks. Of the others nobody
-#: can list all that arm, change the mode or move (DO_AUX_FUNCTION alone does each).
-ASKING = frozenset(
-    {
-        MavCmd.REQUEST_MESSAGE,
-        MavCmd.REQUEST_PROTOCOL_VERSION,
-        MavCmd.REQUEST_AUTOPILOT_CAPABILITIES,
-        MavCmd.GET_HOME_POSITION,
-        521,  # REQUEST_CAMERA_INFORMATION
-        522,  # REQUEST_CAMERA_SETTINGS
-        525,  # REQUEST_STORAGE_INFORMATION
-        527,  # REQUEST_CAMERA_CAPTURE_STATUS
-        528,  # REQUEST_FLIGHT_INFORMATION
-    }
-)
-
-
-#: that change what bounds a rover
-BOUNDING = frozenset(
-    {
-        180,  # DO_SET_PARAMETER
-        207,  # DO_FENCE_ENABLE
-        218,  # DO_AUX_FUNCTION: the fence is one of them
-        245,  # PREFLIGHT_STORAGE
-        5300,  # DO_SET_SAFETY_SWITCH_STATE
-    }
-)
-
 
 GIVEN_UP = 3.5  # s, after which a client waits for no answer any more
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
@@ -158,9 +111,11 @@ class Commands:
         try:
             now_too = self._settings.guided == "now"
             kind = kind_of(command, vehicle.persona, runs_goals_now=now_too)
+            is_old = self._vehicles.is_old_news(now=now)
             if kind is Kind.GO:
-                is_old = self._vehicles.is_old_news(now=now)
                 require_newer(asked, is_old=is_old, now=now)
+            elif is_old and kind is Kind.MOTION:
+                raise Rejection(R.STALE, "it waited while the server stood still")
             self._dispatch(asked, now=now)
         except Rejection as refusal:
             if self._is_tried_again(asked, now=now):
@@ -187,18 +142,26 @@ class Commands:
             raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
         component = asked.command.target.component_id
         at_server = component == asked.vehicle.server_component
+        row = row_said(asked.command)
         # an autopilot answers for components that are not there: also about what it sends
         is_interval = asked.command.command in (
             MavCmd.SET_MESSAGE_INTERVAL,
             MavCmd.GET_MESSAGE_INTERVAL,
         )
         at_nobody = is_interval and component not in asked.vehicle.components
-        if component in (0, AUTOPILOT) or at_server or at_nobody:
+        if row.is_claimed and (component in (0, AUTOPILOT) or at_server or at_nobody):
+            asked.rights.require(row.role, f"send {row.name}")
             match asked.command.command:
                 case number if becomes_task(number) and (at_server or self._claims(number)):
                     self._take_in(asked, now=now)
                     return
-                case number if self._control.handles(number):
+                case (
+                    MavCmd.TASK_CANCEL
+                    | MavCmd.TASK_CLEAR
+                    | MavCmd.TASK_MODIFY
+                    | MavCmd.TASK_RELEASE
+                    | MavCmd.DO_CHANGE_SPEED
+                ):
                     asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
                     return
                 case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
@@ -237,23 +200,24 @@ class Commands:
                 case MavCmd.REQUEST_MESSAGE if self._displays.show(asked, now=now):
                     asked.answer(MavResult.ACCEPTED)
                     return
-                case number if number in OUR_COMMANDS:
+                case number if is_task_command(number):
                     self._refuse_unknown(asked, now=now)
                     return
-        if at_server and asked.command.command in ASKING:  # ground stations ask everybody
+        if at_server and row.kind is Kind.QUESTION:  # ground stations ask everybody
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif at_server:
             self._refuse_unknown(asked, now=now)
         elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
             return
         else:  # also to a component never heard of: an autopilot does what that is told
-            _check_relay(asked, now=now)
+            _check_relay(asked, row.passed_on, now=now)
             self._check_question(asked, now=now)
             _relay(asked, now=now)
 
     def _check_question(self, asked: Asked, *, now: float) -> None:
         """Refuse an observer's question that is too much for the link to the rover."""
-        if asked.command.command in ASKING and not asked.rights.reach(SUBMITTER):
+        is_question = row_said(asked.command).kind is Kind.QUESTION
+        if is_question and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
             why_not = self._vehicles.why_not_asked(asked.vehicle, asked.packet, message, now=now)
             if why_not is not None:
@@ -266,7 +230,7 @@ class Commands:
 
     def _claims(self, command: int) -> bool:
         """Whether a command to the autopilot itself is ours to see to."""
-        return command in OUR_COMMANDS or self._settings.claim
+        return is_task_command(command) or self._settings.claim
 
     def _take_in(self, asked: Asked, *, now: float) -> None:
         """A command that asks for a task; or, without a place, for a pause."""
@@ -274,7 +238,7 @@ class Commands:
             words = "it waited while the server stood still: send it again"
             raise Rejection(R.STALE, words)
         is_reposition = asked.command.command == MavCmd.DO_REPOSITION
-        if is_reposition and place_in(asked.command) is None:
+        if is_reposition and not has_place(asked.command):
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
         elif is_reposition:
             held_at = asked.vehicle.hold_before.since
@@ -386,7 +350,6 @@ class Commands:
             case 0.0:
                 return self._pause(asked, now=now)
             case 1.0:
-                asked.rights.require(OPERATOR, "let a rover go on")
                 return vehicle.proceed(actor=asked.actor, now=now)
             case value:
                 raise Rejection(R.BAD_PARAMETER, f"param1 {value:g}: 0 pauses, 1 continues")
@@ -407,24 +370,21 @@ def _check_last_item(asked: Asked) -> None:
         raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)
 
 
-def _check_relay(asked: Asked, *, now: float) -> None:
+def _check_relay(asked: Asked, row: Row, *, now: float) -> None:
     """Refuse what would move a stopped vehicle, or drive one that a task drives."""
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
-    disarms = number == MavCmd.COMPONENT_ARM_DISARM and params[0] == 0.0
-    if not disarms and number not in ASKING:
-        least = SAFETY if number in BOUNDING else OPERATOR
-        asked.rights.require(least, f"send command {number} to a rover")
-    if vehicle.tasks.is_stopped and not disarms and number not in ASKING:
+    asked.rights.require(row.role, f"send command {number} to a rover")
+    if vehicle.tasks.is_stopped and not row.passes_under_stop:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
     if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
         vehicle.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
-    why_not = vehicle.why_not_moved(asked.client.key) if number in MOVING else ""
+    why_not = why_not_sent(row, vehicle, asked.client.key)
     if why_not:
         raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
-    if number in MOVING:
+    if row.needs_grant:
         vehicle.is_moved_by(asked.client.key, now=now)
 
 

@@ -9,6 +9,7 @@ from math import degrees, inf, isinf, isnan, nan, radians, tau
 from struct import Struct
 from typing import NamedTuple
 
+from mav_tasks.engine.policy import is_task_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import EXACT, large_number
@@ -48,8 +49,6 @@ NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT, which has no NaN there
 LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
 MAX_WAIT = 86_400.0  # s
 MAX_DELAY = 31_536_000.0  # s, a year
-#: command ids set aside for tasks
-OUR_COMMANDS = range(54000, 54050)
 CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
 MAX_FLAGS = EXACT  # of a bit mask in a float32
 MIN_SPEED = 0.01  # m/s; slower, a drive of a metre takes minutes and is taken for being stuck
@@ -84,7 +83,7 @@ def wish_of(
     if command.frame is not None and command.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
     goal = goal_of(command, driving)
-    if command.command not in OURS:
+    if not is_task_command(command.command):
         refuse_infinite(command)
         return Wish(goal, Terms(priority=priority), marks_of(command, packet))
     marks = marks_of(command, packet, nonce=identifier(command, 4, "nonce"))
@@ -184,17 +183,23 @@ def flag(command: Command, index: int, name: str, *, default: int | None = 0) ->
     return whole(command, index, name, high=1, default=default) == 1
 
 
-def place_in(command: Command) -> Place | None:
-    """Give the place in x and y, or None if none is given; Rejection names what is wrong."""
+def has_place(command: Command) -> bool:
+    """Whether a place is given in x and y, a bad one or a good one."""
     x, y = command.params[4:6]
     if command.frame is None:
-        if isnan(x) and isnan(y):
-            return None
+        return not (isnan(x) and isnan(y))
+    return not x == y == NOT_GIVEN
+
+
+def place_in(command: Command) -> Place | None:
+    """Give the place in x and y, or None if none is given; Rejection names what is wrong."""
+    if not has_place(command):
+        return None
+    x, y = command.params[4:6]
+    if command.frame is None:
         latitude = number(command, 5, "latitude", low=-90.0, high=90.0)
         longitude = number(command, 6, "longitude", low=-180.0, high=180.0)
         return _global(round(latitude * 1e7), round(longitude * 1e7))
-    if x == NOT_GIVEN and y == NOT_GIVEN:
-        return None
     for value, name, param in ((x, "x", 5), (y, "y", 6)):
         if value == NOT_GIVEN:
             raise bad(f"{name} is not given", param=param)
@@ -357,7 +362,6 @@ def _set_yaw_speed(command: Command, driving: Driving) -> SingleGoal:
     return Head(radians(angle), speed, HEAD_FOR, is_relative=flag(command, 3, "relative"))
 
 
-OURS = frozenset({MavCmd.TASK_MOVE, MavCmd.TASK_ROTATE, MavCmd.TASK_DRIVE})
 _GOALS: dict[int, Callable[[Command, Driving], SingleGoal]] = {
     MavCmd.TASK_MOVE: _move,
     MavCmd.TASK_ROTATE: _rotate,

@@ -6,11 +6,12 @@ acknowledges: who sent that waits until a heartbeat shows the mode.
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.commands.asked import Asked, AskedByMessage
-from mav_tasks.engine.commands.ordering import Kind, kind_of, note_halt, require_newer
+from mav_tasks.engine.commands.ordering import kind_of, note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
+from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -73,7 +74,7 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
             return True
         if not self._is_mission(vehicle, mode):
-            asked.rights.require(OPERATOR, "change the mode")
+            asked.rights.require(row_of_command(MavCmd.DO_SET_MODE).role, "change the mode")
             vehicle.client_asks_mode(mode, client.key, now=now)
             return False
         self._plans.check_start(asked.rights, vehicle, asked.submitter)

@@ -5,11 +5,11 @@ had left before it, if it names another epoch than the present one, or if it wai
 stood still. Who is refused may send it anew; that is told.
 """
 
-from enum import Enum, auto
 from math import isfinite
 
 from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
+from mav_tasks.engine.commands.goals import CHANGE_MODE, has_place, reposition_flags
+from mav_tasks.engine.policy import DISARM, PAUSE, PAUSE_HERE, Kind, Row, row_of_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
@@ -27,32 +27,28 @@ EPOCHS = 1 << 24  # that a float32 tells apart
 AGAIN = "if you still mean it, send it again in 4 s"
 
 
-class Kind(Enum):
-    """What a word does to a rover."""
-
-    #: makes it stand
-    HALT = auto()
-    #: lets it move: by a task, in a mode, by arming, by what was held
-    GO = auto()
-    OTHER = auto()
+def row_said(command: Command) -> Row:
+    """Return the row of a command by what it says; of a mode ``ModeRequests`` knows more."""
+    match command.command, command.params[0]:
+        case MavCmd.COMPONENT_ARM_DISARM, 0.0:
+            return DISARM
+        case MavCmd.DO_PAUSE_CONTINUE, 0.0:
+            return PAUSE
+        case MavCmd.DO_REPOSITION, _ if not has_place(command):
+            return PAUSE_HERE
+        case number, _:
+            return row_of_command(number)
 
 
 def kind_of(command: Command, persona: Persona, *, runs_goals_now: bool) -> Kind:
     """Return what a command does; ``runs_goals_now``: a "go to" comes before what runs."""
-    match command.command:
-        case MavCmd.TASK_STOP | MavCmd.TASK_CANCEL | MavCmd.TASK_CLEAR:
-            return Kind.HALT
-        case MavCmd.DO_PAUSE_CONTINUE | MavCmd.COMPONENT_ARM_DISARM:
-            return Kind.HALT if command.params[0] == 0.0 else Kind.GO
-        case MavCmd.DO_SET_MODE:
-            is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
-            return Kind.HALT if is_hold else Kind.GO
-        case MavCmd.DO_REPOSITION if runs_goals_now and reposition_flags(command) & CHANGE_MODE:
-            return Kind.GO
-        case MavCmd.TASK_RELEASE | MavCmd.MISSION_START | MavCmd.DO_SET_STANDARD_MODE:
-            return Kind.GO
-        case _:
-            return Kind.OTHER
+    row, number = row_said(command), command.command
+    if number == MavCmd.DO_SET_MODE:
+        is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
+        return Kind.HALT if is_hold else Kind.GO
+    if number == MavCmd.DO_REPOSITION and runs_goals_now and row.kind is not Kind.HALT:
+        return Kind.GO if reposition_flags(command) & CHANGE_MODE else row.kind
+    return row.kind
 
 
 def kind_of_message(message: Message | None, persona: Persona) -> Kind:
@@ -61,7 +57,7 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
         return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
     if isinstance(message, CommandLong | CommandInt):
         return kind_of(command_of(message), persona, runs_goals_now=True)
-    return Kind.OTHER
+    return Kind.WISH
 
 
 def require_newer(asked: Asked, *, is_old: bool, now: float) -> None:

@@ -5,15 +5,15 @@ What the server does not claim goes to the link on which the target was seen, if
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTER
-from mav_tasks.engine.commands.motion_gate import may_pass, passed, withheld
+from mav_tasks.engine.clients.rights import SAFETY, SUBMITTER
+from mav_tasks.engine.commands.motion_gate import may_pass, passed, why_not_sent, withheld
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.engine.missions.plans import MISSION
+from mav_tasks.engine.policy import Kind, Row, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
@@ -22,39 +22,14 @@ from mav_tasks.tasks.lifecycle import TaskReason
 R = TaskReason
 
 EVERYBODY = Address(0, 0)
-#: what everybody may send to a vehicle: it asks. SYSTEM_TIME sets the clock of some
-ASKING = frozenset(
-    {
-        *(m.Ping.id, m.Timesync.id, m.ParamRequestRead.id, m.ParamRequestList.id),
-        *(m.MissionRequestList.id, m.MissionRequest.id, m.MissionRequestInt.id, m.MissionAck.id),
-    }
-)
-#: what everybody sends all the time, and only operators have passed on: nothing was refused there
-TELLING = frozenset({m.Heartbeat.id, m.SystemTime.id, m.Statustext.id})
-#: what changes the bounds in which a vehicle drives, or anything in it; files are read and written
-#: by one message
-BOUNDING = frozenset(
-    {
-        m.ParamSet.id,
-        m.FileTransferProtocol.id,
-        50,  # PARAM_MAP_RC
-        126,  # SERIAL_CONTROL, a PX4's shell
-        160,  # FENCE_POINT
-        175,  # RALLY_POINT
-        323,  # PARAM_EXT_SET
-        11002,  # DEVICE_OP_WRITE
-    }
-)
 
 
 class Passing:
     """Passes clients' packets on."""
 
-    def __init__(self, vehicles: VehicleSide, identity: Address, refusals: Refusals) -> None:
-        """``identity``: as whom the server speaks to vehicles."""
+    def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
         self._refusals = refusals
         self._vehicles = vehicles
-        self._identity = identity
         self._writers = file_transfer.Writers()
 
     def pass_on(
@@ -65,10 +40,11 @@ class Passing:
         Without a ``message`` its id is unknown and its bytes are unverified: noise may look like
         it, and is no refusal worth a line.
         """
+        row = row_of(packet.message_id, message).passed_on
         target = EVERYBODY if message is None else _target(message)
-        why_not = self._why_not(client, packet, message, now=now)
+        why_not = self._why_not(client, row, message, now=now)
         if why_not is not None:
-            if message is not None and packet.message_id not in TELLING:
+            if message is not None and row.kind is not Kind.TELL:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
         is_observers = not client.rights.reach(SUBMITTER)
@@ -83,7 +59,7 @@ class Passing:
         for vehicles in behind.values():
             is_old = self._vehicles.is_old_news(now=now)
             refusing = [
-                v for v in vehicles if not may_pass(v, client.key, packet, message, is_old=is_old)
+                v for v in vehicles if not may_pass(v, client.key, row, message, is_old=is_old)
             ]
             too_much = (
                 self._vehicles.why_not_asked(vehicles[0], packet, message, now=now)
@@ -95,15 +71,15 @@ class Passing:
                 continue
             if not refusing:
                 for vehicle in vehicles:
-                    passed(vehicle, client.key, packet, message, now=now)
+                    passed(vehicle, client.key, row, message, now=now)
                 vehicles[0].requests.forward(packet)
                 continue
             for vehicle in vehicles:
-                withheld(vehicle, client.key, packet, message, now=now)
+                withheld(vehicle, client.key, row, now=now)
             if message is None:
                 continue
             for vehicle in refusing:
-                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client))
+                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client, row))
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
 
     def _refuse_question(
@@ -115,28 +91,17 @@ class Passing:
         self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
 
     def _why_not(
-        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
+        self, client: GcsClient, row: Row, message: m.Message | None, *, now: float
     ) -> Rejection | None:
         """Return why a packet may go to no rover at all, None if it may."""
-        if self._is_ours(packet.source):
-            words = f"{packet.source} is an address of the server or of a rover"
-            return Rejection(R.NOT_ALLOWED, words)
-        least = _least_role(packet, message)
-        if not client.rights.reach(least):
-            return client.rights.refusal(f"may not send that to a rover, {least} may")
+        if not client.rights.reach(row.role):
+            return client.rights.refusal(f"may not send that to a rover, {row.role} may")
         if isinstance(message, m.FileTransferProtocol):
             is_safety = client.rights.reach(SAFETY)
             if not is_safety and self._writers.ends_anothers(message, client.key, now=now):
                 return client.rights.refusal("may not end that: somebody writes a file")
             self._writers.note(message, client.key, now=now)
         return None
-
-    def _is_ours(self, source: Address) -> bool:
-        """Whether a packet says that it is of the server or of a rover, and is of neither."""
-        return source == self._identity or any(
-            source in (vehicle.server_address, Address(vehicle.system_id, AUTOPILOT))
-            for vehicle in self._vehicles.addressed_by(source.system_id)
-        )
 
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """A client is gone: whatever it was driving is driven by nobody."""
@@ -146,20 +111,9 @@ class Passing:
                 vehicle.client_is_gone((link, peer), now=now)
 
 
-def _least_role(packet: Packet, message: m.Message | None) -> str:
-    """Return the role from which on a client may have a packet passed on."""
-    if packet.message_id in ASKING:
-        return OBSERVER
-    if isinstance(message, m.FileTransferProtocol) and file_transfer.reads(message):
-        return OBSERVER
-    is_of_plan = getattr(message, "mission_type", MISSION) == MISSION  # or else of a fence
-    is_bounding = packet.message_id in BOUNDING or not is_of_plan
-    return SAFETY if is_bounding else OPERATOR
-
-
-def _why_withheld(vehicle: Vehicle, client: GcsClient) -> str:
+def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
     """Return in words why a packet that a client may send does not go to a rover now."""
-    return vehicle.why_not_moved(client.key) or "not finite, or older than the server's pause"
+    return why_not_sent(row, vehicle, client.key) or "not finite, or older than the server's pause"
 
 
 def _target(message: m.Message) -> Address:

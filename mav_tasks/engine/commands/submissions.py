@@ -8,8 +8,9 @@ from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwise
 from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import OURS, wish_of
+from mav_tasks.engine.commands.goals import wish_of
 from mav_tasks.engine.commit_gate import CommitGate, Effect
+from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -88,7 +89,7 @@ class Submissions:
         )
         # A stock client cannot read TASK_STATUS, and counts it as a packet lost; it fills up with
         # zeros. A nonce, or NaN for none, comes from somebody who knows these commands.
-        is_ours = command.command in OURS
+        is_ours = is_task_command(command.command)
         asked.client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         rover = f"rover {vehicle.system_id}"
         ability = Ability.of(vehicle.persona, rover=rover)

@@ -5,12 +5,14 @@ Each gives the id of the task acted on, 0 for none or many; a Rejection says why
 
 from dataclasses import replace
 
-from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
+from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number, whole
+from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
+from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -35,16 +37,6 @@ class TaskControl:
         """Take new settings."""
         self._settings = settings
 
-    def handles(self, command: int) -> bool:
-        """Whether a command is one of these."""
-        return command in (
-            MavCmd.TASK_CANCEL,
-            MavCmd.TASK_CLEAR,
-            MavCmd.TASK_MODIFY,
-            MavCmd.TASK_RELEASE,
-            MavCmd.DO_CHANGE_SPEED,
-        )
-
     def act(self, asked: Asked, *, now: float) -> int:
         """Do what a command asks for."""
         match asked.command.command:
@@ -64,7 +56,7 @@ class TaskControl:
     ) -> None:
         """COMMAND_CANCEL: call off a client's latest task of a command, if it is not over."""
         task = self._book.latest(submitter, command, vehicle=vehicle.system_id)
-        if task is not None and rights.reach(SUBMITTER):
+        if task is not None and rights.reach(row_of_message(CommandCancel.id).role):
             vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: Asked, *, now: float) -> int:
@@ -86,7 +78,6 @@ class TaskControl:
         return task.id
 
     def _clear(self, asked: Asked, *, now: float) -> int:
-        asked.rights.require(OPERATOR, "clear a queue")
         begun_too = flag(asked.command, 1, "scope")
         asked.vehicle.clear(begun_too=begun_too, actor=asked.actor, now=now)
         return 0
@@ -128,7 +119,6 @@ class TaskControl:
         return task.id
 
     def _change_speed(self, asked: Asked, *, now: float) -> int:
-        asked.rights.require(OPERATOR, "set the speed")
         whole(asked.command, 1, "speed type", high=GROUND_OR_AIR)
         wish = asked.command.params[1]
         if wish == NO_CHANGE:

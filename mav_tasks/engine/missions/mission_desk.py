@@ -5,8 +5,6 @@ What becomes of uploads is in ``mission_uploads``, clearing in ``mission_clearin
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.clients.rights import OPERATOR, SAFETY, SUBMITTER
-from mav_tasks.engine.commands.motion_gate import GO_TO
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.go_to_items import GoToItems
 from mav_tasks.engine.missions.item_check import ItemCheck
@@ -15,6 +13,7 @@ from mav_tasks.engine.missions.mission_clearing import MissionClearing
 from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadDesk
 from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored, begins_with
 from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -43,14 +42,6 @@ MESSAGES = (
     m.MissionSetCurrent,
     m.MissionRequestPartialList,
     m.MissionWritePartialList,
-)
-#: of them, what only reads
-READING = (
-    m.MissionRequestList,
-    m.MissionRequest,
-    m.MissionRequestInt,
-    m.MissionRequestPartialList,
-    m.MissionAck,
 )
 MissionMessage = (
     m.MissionCount
@@ -122,7 +113,7 @@ class MissionDesks:
         desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
         who = (client.key, client.signed_by.name)  # one endpoint may have several keys
         sender = Sender(who, packet.source, Address(vehicle.system_id, component))
-        if self._is_refused(client, vehicle, sender, message, now=now):
+        if self._is_refused(client, vehicle, sender, packet, message, now=now):
             return True
         match message:
             case m.MissionCount() if message.mission_type not in STORED:
@@ -171,21 +162,18 @@ class MissionDesks:
         client: GcsClient,
         vehicle: Vehicle,
         sender: Sender,
+        packet: Packet,
         message: MissionMessage,
         *,
         now: float,
     ) -> bool:
         """Whether a client may not write what it writes; it has been told so then."""
-        if isinstance(message, READING) or getattr(message, "current", 0) in GO_TO:
-            return False  # a "go to" is answered as every other task is
+        if isinstance(message, m.MissionSetCurrent) or getattr(message, "current", 0) in GO_TO:
+            return False  # these are answered, and refused, in their own ways
         kind = getattr(message, "mission_type", MISSION)
+        row = row_of(packet.message_id, message)
         try:
-            if isinstance(message, m.MissionClearAll):
-                client.rights.require(OPERATOR, "clear plans")
-            if kind != MISSION:
-                client.rights.require(SAFETY, "change fence or rally points")
-            if not isinstance(message, m.MissionSetCurrent):  # that is answered in its own way
-                client.rights.require(SUBMITTER, "send plans")
+            client.rights.require(row.role, f"change {row.about}")
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
                 self._answers.ack(sender, kind, MavMissionResult.DENIED)

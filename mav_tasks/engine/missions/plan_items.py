@@ -15,7 +15,6 @@ from mav_tasks.engine.commands.goals import (
     MAX_DELAY,
     MAX_WAIT,
     MIN_SPEED,
-    OURS,
     bad,
     becomes_task,
     goal_of,
@@ -24,6 +23,7 @@ from mav_tasks.engine.commands.goals import (
     refuse_infinite,
     whole,
 )
+from mav_tasks.engine.policy import is_task_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -127,7 +127,7 @@ def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
         return kind(command, count, driving)
     if item.command in PERFORMED:
         return Perform()
-    if item.command in OURS:
+    if is_task_command(item.command) and becomes_task(item.command):
         return _own(command, driving)
     if becomes_task(item.command) and item.command != MavCmd.DO_REPOSITION:
         return goal_of(command, driving)

@@ -614,16 +614,25 @@ class Vehicle:
 
     def why_not_moved(self, client: Hashable) -> str:
         """Give in words what keeps a client's motion message from passing, "" if nothing does."""
-        if self.tasks.is_stopped:
-            return "STOP is latched"
-        if self.tasks.is_driving or self.control.is_engaged:
+        why_not = self.why_no_motion()
+        if why_not:
+            return why_not
+        if self.tasks.is_driving:  # also one that is paused
             return "not while tasks drive"
-        if self.control.awaits_mode:
-            return "HOLD is being asked for"
         if not self.armed:
             return "the rover is not armed"
         if not self._authority.has_granted(client):
             return f"ask for {self.persona.mode_name(self.persona.control_mode)} first"
+        return ""
+
+    def why_no_motion(self) -> str:
+        """Return in words why nobody else may have it move now, "" if somebody may."""
+        if self.tasks.is_stopped:
+            return "STOP is latched"
+        if self.control.is_engaged:
+            return "not while tasks drive"
+        if self.control.awaits_mode:
+            return "HOLD is being asked for"
         return ""
 
     def is_not_moved_by(self, client: Hashable, *, now: float) -> None:

@@ -4,7 +4,8 @@ from math import inf, nan, pi, radians
 
 import pytest
 
-from mav_tasks.engine.commands.goals import _GOALS, OURS, Wish, becomes_task, marks_of, wish_of
+from mav_tasks.engine.commands.goals import _GOALS, Wish, becomes_task, marks_of, wish_of
+from mav_tasks.engine.policy import is_task_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.messages import CommandInt, CommandLong
@@ -40,7 +41,7 @@ def command(number: int, *params: float) -> Command:
 def whole(number: int, *params: float, x: int = 0, y: int = 0, frame: int = 6) -> Command:
     one, two, three, four = (*params, *(0.0,) * (4 - len(params)))
     message = CommandInt(1, 191, frame, number, 0, 0, one, two, three, four, x, y, 0.0)
-    if number in OURS:
+    if is_task_command(number):
         message.z = 5.0  # the priority
     return command_of(message)
 

@@ -1,38 +1,30 @@
-"""How many requests of each client are taken in: as many as its role may send in a second.
+"""What of a client's packets is seen to: none of a borrowed address, and not too many requests.
 
-STOP is never too many. What belongs to a transfer that is under way is asked for, and not counted;
-nor is what says that somebody is there, or drives by hand: its rate is bounded where it comes in.
-But all that goes on to a rover is counted of who may only look: its way there may be narrow.
+Who calls itself the server, or a rover, is heeded by nobody, whatever it sends: a loop in the net
+does so, or somebody who hides. STOP alone comes in from anybody, and is never too many.
+
+What belongs to a transfer that is under way is asked for, and not counted; nor is what says that
+somebody is there, or drives by hand: its rate is bounded where it comes in. But all that goes on to
+a rover is counted of who may only look: its way there may be narrow.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.rights import OPERATOR
-from mav_tasks.engine.commands.motion_gate import GO_TO
-from mav_tasks.engine.commands.passing import ASKING
+from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
+from mav_tasks.engine.policy import Kind, row_of
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
-UNCOUNTED = frozenset(
-    {
-        *(m.Heartbeat.id, m.Timesync.id, m.SystemTime.id, m.Ping.id),
-        *(m.MissionItem.id, m.MissionItemInt.id, m.MissionAck.id),
-        *(m.MissionRequest.id, m.MissionRequestInt.id),
-        *(m.ManualControl.id, m.RcChannelsOverride.id),
-        *(m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id),
-        *(m.SetAttitudeTarget.id, m.SetActuatorControlTarget.id),
-    }
-)
 
-
-class RequestLimit:
-    """Counts requests, and answers what is one too many."""
+class Door:
+    """Counts requests, and answers what is one too many; turns borrowed addresses away."""
 
     def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
         self._refusals = refusals
@@ -44,12 +36,34 @@ class RequestLimit:
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> bool:
         """Whether a client's packet is seen to; a command is told if it is not."""
+        if is_stop(message):
+            return True
+        if self._is_ours(packet.source):
+            self._turn_away(client, packet, message, now=now)
+            return False
         if _is_uncounted(client, packet, message) or client.may_ask(now=now):
             return True
         self.left_out += 1
         if isinstance(message, m.CommandLong | m.CommandInt) and client.may_be_refused(now=now):
             self._refuse(client, packet, message, now=now)
         return False
+
+    def _is_ours(self, source: Address) -> bool:
+        """Whether a packet says that it is of the server or of a rover; it is of neither."""
+        vehicle = self._vehicles.look_at(source.system_id)
+        return source == self._vehicles.our_address or (
+            vehicle is not None
+            and source in (vehicle.server_address, Address(vehicle.system_id, AUTOPILOT))
+        )
+
+    def _turn_away(
+        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
+    ) -> None:
+        if message is None or row_of(packet.message_id, message).kind is Kind.TELL:
+            return  # noise may look like it, and nobody waits for what comes of a heartbeat
+        words = f"{packet.source} is an address of the server or of a rover"
+        refusal = Rejection(TaskReason.NOT_ALLOWED, words)
+        self._refusals.stream(client, target_of(message).system_id, packet, refusal, now=now)
 
     def _refuse(
         self,
@@ -76,8 +90,5 @@ class RequestLimit:
 
 
 def _is_uncounted(client: GcsClient, packet: Packet, message: m.Message | None) -> bool:
-    if packet.message_id not in UNCOUNTED:
-        return is_stop(message)
-    if isinstance(message, m.MissionItem | m.MissionItemInt) and message.current in GO_TO:
-        return False  # a task, and no item of a transfer
-    return packet.message_id not in ASKING or client.rights.reach(OPERATOR)
+    row = row_of(packet.message_id, message)
+    return not row.is_counted and (row.role != OBSERVER or client.rights.reach(OPERATOR))

@@ -1,0 +1,222 @@
+"""The commands, MAV_CMD of MAVLink's ``common`` and ``ardupilotmega`` sets and our own.
+
+Judged by what a rover does that is sent the command, not by what it is meant for in a plan.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTER
+from mav_tasks.engine.policy.row import UNKNOWN, Kind, Row
+
+#: numbers set aside for tasks
+TASK_COMMANDS = range(54000, 54050)
+
+ACTS = Row("", Kind.ACTION, OPERATOR, "servos, relays, cameras, gimbals, home, steps of a plan")
+ASKS = Row("", Kind.QUESTION, OBSERVER, "questions")
+GOES = Row("", Kind.GO, OPERATOR, "arms, changes the mode, starts the rover's own mission")
+MOVES = Row(
+    "", Kind.MOTION, OPERATOR, "drives to a place, at a speed, to a course", needs_grant=True
+)
+#: turns wheels, or stops the autopilot: never while it is driven, nor by who may not do the rest
+SERVICES = Row(
+    "",
+    Kind.MOTION,
+    SAFETY,
+    "tests of motors, calibration, firmware, restart: also of a rover that is not armed",
+    is_bound=True,
+)
+BOUNDS = Row("", Kind.ACTION, SAFETY, "fence, parameters, storage, estimates", is_bound=True)
+SUBMITS = Row("", Kind.WISH, SUBMITTER, "asks for a task", is_claimed=True)
+
+
+def named(row: Row, names: str) -> dict[int, Row]:
+    """Return the rows of what is all the same to us, by number: of "1 THIS, 2 THAT"."""
+    pairs = (each.split() for each in names.split(","))
+    return {int(number): replace(row, name=name) for number, name in pairs}
+
+
+#: what a command is by what it says; its number's own row is then that of the most that it can be
+DISARM = Row(
+    "COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms, urgently and always"
+)
+PAUSE = Row(
+    "DO_PAUSE_CONTINUE with param1 = 0",
+    Kind.HALT,
+    OBSERVER,
+    "pauses",
+    is_claimed=True,
+    elsewhere=GOES,
+)
+PAUSE_HERE = replace(PAUSE, name="DO_REPOSITION without a place", elsewhere=MOVES)
+HOLD = Row("DO_SET_MODE, SET_MODE: HOLD", Kind.HALT, OBSERVER, "holds", is_claimed=True)
+START = Row(
+    "DO_SET_MODE, SET_MODE: return, or the mission",
+    Kind.GO,
+    SUBMITTER,
+    "starts what the server drives itself",
+    is_claimed=True,
+)
+#: rows that no number has for itself
+BY_WORDS = (DISARM, PAUSE, PAUSE_HERE, HOLD, START)
+
+OURS = {
+    **named(SUBMITS, "54000 TASK_MOVE, 54001 TASK_ROTATE, 54002 TASK_DRIVE"),
+    **named(replace(SUBMITS, about="an item of a plan"), "54014 TASK_OPTIONS"),
+    **named(replace(SUBMITS, about="changes a task of one's own"), "54012 TASK_MODIFY"),
+    54003: Row("TASK_STOP", Kind.HALT, OBSERVER, "STOP, wherever it is sent", is_claimed=True),
+    54010: Row("TASK_CANCEL", Kind.HALT, SUBMITTER, "a task of one's own", is_claimed=True),
+    54011: Row("TASK_CLEAR", Kind.HALT, OPERATOR, "anybody's tasks", is_claimed=True),
+    54013: Row("TASK_RELEASE", Kind.GO, SUBMITTER, "a task of one's own", is_claimed=True),
+}
+
+#: standard commands that the server sees to itself
+CLAIMED = {
+    **named(
+        replace(SUBMITS, elsewhere=MOVES),
+        """16 NAV_WAYPOINT, 19 NAV_LOITER_TIME, 115 CONDITION_YAW, 192 DO_REPOSITION,
+        213 NAV_SET_YAW_SPEED""",
+    ),
+    **named(replace(SUBMITS, elsewhere=GOES), "20 NAV_RETURN_TO_LAUNCH"),
+    **named(replace(SUBMITS, elsewhere=ACTS), "93 NAV_DELAY"),
+    21: Row(
+        "NAV_LAND",
+        Kind.WISH,
+        OBSERVER,
+        "disarms once nothing drives",
+        is_claimed=True,
+        elsewhere=GOES,
+    ),
+    22: Row(
+        "NAV_TAKEOFF", Kind.WISH, OBSERVER, "accepted: nothing", is_claimed=True, elsewhere=MOVES
+    ),
+    178: Row(
+        "DO_CHANGE_SPEED",
+        Kind.WISH,
+        OPERATOR,
+        "speed of tasks",
+        is_claimed=True,
+        elsewhere=MOVES,
+    ),
+    **named(
+        replace(GOES, about="continues", is_claimed=True, elsewhere=GOES),
+        "193 DO_PAUSE_CONTINUE",
+    ),
+    **named(
+        replace(GOES, about="any other mode"),
+        "176 DO_SET_MODE",
+    ),
+    **named(
+        Row("", Kind.GO, SUBMITTER, "a plan of one's own", is_claimed=True, elsewhere=GOES),
+        "224 DO_SET_MISSION_CURRENT, 300 MISSION_START",
+    ),
+    511: Row(
+        "SET_MESSAGE_INTERVAL",
+        Kind.QUESTION,
+        OBSERVER,
+        "what one client is shown",
+        is_claimed=True,
+        elsewhere=ACTS,
+    ),
+    **named(
+        replace(ASKS, is_claimed=True, elsewhere=ASKS),
+        "510 GET_MESSAGE_INTERVAL, 512 REQUEST_MESSAGE",
+    ),
+}
+
+#: that go on to the rover
+PASSED_ON = {
+    **named(
+        ASKS,
+        """410 GET_HOME_POSITION, 519 REQUEST_PROTOCOL_VERSION, 520 REQUEST_AUTOPILOT_CAPABILITIES,
+        521 REQUEST_CAMERA_INFORMATION, 522 REQUEST_CAMERA_SETTINGS,
+        525 REQUEST_STORAGE_INFORMATION, 527 REQUEST_CAMERA_CAPTURE_STATUS,
+        528 REQUEST_FLIGHT_INFORMATION""",
+    ),
+    **named(
+        replace(ASKS, role=OPERATOR, about="questions that are some work to answer"),
+        """401 RUN_PREARM_CHECKS, 2002 REQUEST_CAMERA_IMAGE_CAPTURE,
+        2504 REQUEST_VIDEO_STREAM_INFORMATION, 2505 REQUEST_VIDEO_STREAM_STATUS,
+        5200 UAVCAN_GET_NODE_INFO, 42428 DO_SEND_BANNER, 42502 GIMBAL_AXIS_CALIBRATION_STATUS""",
+    ),
+    **named(
+        GOES,
+        """92 NAV_GUIDED_ENABLE, 177 DO_JUMP, 185 DO_FLIGHTTERMINATION, 188 DO_RETURN_PATH_START,
+        189 DO_LAND_START, 190 DO_RALLY_LAND, 191 DO_GO_AROUND, 221 DO_GUIDED_MASTER,
+        223 DO_ENGINE_CONTROL, 262 DO_SET_STANDARD_MODE, 400 COMPONENT_ARM_DISARM,
+        601 DO_JUMP_TAG, 3001 ARM_AUTHORIZATION_REQUEST, 42001 SOLO_BTN_FLY_CLICK,
+        42002 SOLO_BTN_FLY_HOLD, 42003 SOLO_BTN_PAUSE_CLICK""",
+    ),
+    **named(
+        replace(
+            GOES, role=SAFETY, is_bound=True, about="does any of that, and takes the fence away"
+        ),
+        "218 DO_AUX_FUNCTION, 5300 DO_SET_SAFETY_SWITCH_STATE",
+    ),
+    **named(
+        MOVES,
+        """17 NAV_LOITER_UNLIM, 18 NAV_LOITER_TURNS, 23 NAV_LAND_LOCAL, 24 NAV_TAKEOFF_LOCAL,
+        25 NAV_FOLLOW, 30 NAV_CONTINUE_AND_CHANGE_ALT, 31 NAV_LOITER_TO_ALT, 32 DO_FOLLOW,
+        33 DO_FOLLOW_REPOSITION, 34 DO_ORBIT, 35 DO_FIGURE_EIGHT, 36 NAV_ARC_WAYPOINT,
+        81 NAV_PATHPLANNING, 82 NAV_SPLINE_WAYPOINT, 83 NAV_ALTITUDE_WAIT, 84 NAV_VTOL_TAKEOFF,
+        85 NAV_VTOL_LAND, 94 NAV_PAYLOAD_PLACE, 113 CONDITION_CHANGE_ALT, 186 DO_CHANGE_ALTITUDE,
+        194 DO_SET_REVERSE, 252 OVERRIDE_GOTO, 3000 DO_VTOL_TRANSITION,
+        4000 SET_GUIDED_SUBMODE_STANDARD, 4001 SET_GUIDED_SUBMODE_CIRCLE,
+        30001 PAYLOAD_PREPARE_DEPLOY, 42702 NAV_SCRIPT_TIME, 42703 NAV_ATTITUDE_TIME,
+        43000 GUIDED_CHANGE_SPEED, 43001 GUIDED_CHANGE_ALTITUDE, 43002 GUIDED_CHANGE_HEADING""",
+    ),
+    **named(
+        replace(UNKNOWN, about="what a script on board, or a user, makes of it"),
+        """217 DO_SEND_SCRIPT_MESSAGE, 31000 WAYPOINT_USER_1, 31001 WAYPOINT_USER_2,
+        31002 WAYPOINT_USER_3, 31003 WAYPOINT_USER_4, 31004 WAYPOINT_USER_5,
+        31005 SPATIAL_USER_1, 31006 SPATIAL_USER_2, 31007 SPATIAL_USER_3, 31008 SPATIAL_USER_4,
+        31009 SPATIAL_USER_5, 31010 USER_1, 31011 USER_2, 31012 USER_3, 31013 USER_4,
+        31014 USER_5""",
+    ),
+    **named(
+        SERVICES,
+        """209 DO_MOTOR_TEST, 241 PREFLIGHT_CALIBRATION, 242 PREFLIGHT_SET_SENSOR_OFFSETS,
+        243 PREFLIGHT_UAVCAN, 246 PREFLIGHT_REBOOT_SHUTDOWN, 310 ACTUATOR_TEST,
+        311 CONFIGURE_ACTUATOR, 500 START_RX_PAIR, 610 DO_SET_SYS_CMP_ID,
+        42000 POWER_OFF_INITIATED, 42004 FIXED_MAG_CAL, 42005 FIXED_MAG_CAL_FIELD,
+        42006 FIXED_MAG_CAL_YAW, 42424 DO_START_MAG_CAL, 42425 DO_ACCEPT_MAG_CAL,
+        42426 DO_CANCEL_MAG_CAL, 42427 SET_FACTORY_TEST_MODE, 42429 ACCELCAL_VEHICLE_POS,
+        42650 FLASH_BOOTLOADER, 42700 DEBUG_TRAP, 42701 SCRIPTING""",
+    ),
+    **named(
+        BOUNDS,
+        """180 DO_SET_PARAMETER, 207 DO_FENCE_ENABLE, 212 DO_AUTOTUNE_ENABLE, 222 DO_GUIDED_LIMITS,
+        245 PREFLIGHT_STORAGE, 420 INJECT_FAILURE, 526 STORAGE_FORMAT, 611 DO_SET_GLOBAL_ORIGIN,
+        2600 CONTROL_HIGH_LATENCY, 5000 NAV_FENCE_RETURN_POINT,
+        5001 NAV_FENCE_POLYGON_VERTEX_INCLUSION, 5002 NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+        5003 NAV_FENCE_CIRCLE_INCLUSION, 5004 NAV_FENCE_CIRCLE_EXCLUSION,
+        5005 NAV_FENCE_HOME_CIRCLE_INCLUSION, 5100 NAV_RALLY_POINT, 32000 CAN_FORWARD,
+        42007 SET_EKF_SOURCE_SET, 42505 GIMBAL_FULL_RESET, 42651 BATTERY_RESET,
+        43003 EXTERNAL_POSITION_ESTIMATE, 43004 EXTERNAL_WIND_ESTIMATE, 43005 SET_HAGL""",
+    ),
+    **named(
+        ACTS,
+        """80 NAV_ROI, 95 NAV_LAST, 112 CONDITION_DELAY, 114 CONDITION_DISTANCE, 159 CONDITION_LAST,
+        179 DO_SET_HOME, 181 DO_SET_RELAY, 182 DO_REPEAT_RELAY, 183 DO_SET_SERVO,
+        184 DO_REPEAT_SERVO, 187 DO_SET_ACTUATOR, 195 DO_SET_ROI_LOCATION,
+        196 DO_SET_ROI_WPNEXT_OFFSET, 197 DO_SET_ROI_NONE, 198 DO_SET_ROI_SYSID,
+        200 DO_CONTROL_VIDEO, 201 DO_SET_ROI, 202 DO_DIGICAM_CONFIGURE, 203 DO_DIGICAM_CONTROL,
+        204 DO_MOUNT_CONFIGURE, 205 DO_MOUNT_CONTROL, 206 DO_SET_CAM_TRIGG_DIST,
+        208 DO_PARACHUTE, 210 DO_INVERTED_FLIGHT, 211 DO_GRIPPER, 214 DO_SET_CAM_TRIGG_INTERVAL,
+        215 DO_SET_RESUME_REPEAT_DIST, 216 DO_SPRAYER, 220 DO_MOUNT_CONTROL_QUAT, 240 DO_LAST,
+        260 OBLIQUE_SURVEY, 405 ILLUMINATOR_ON_OFF, 406 DO_ILLUMINATOR_CONFIGURE,
+        529 RESET_CAMERA_SETTINGS, 530 SET_CAMERA_MODE, 531 SET_CAMERA_ZOOM,
+        532 SET_CAMERA_FOCUS, 533 SET_STORAGE_USAGE, 534 SET_CAMERA_SOURCE, 600 JUMP_TAG,
+        1000 DO_GIMBAL_MANAGER_PITCHYAW, 1001 DO_GIMBAL_MANAGER_CONFIGURE,
+        2000 IMAGE_START_CAPTURE, 2001 IMAGE_STOP_CAPTURE, 2003 DO_TRIGGER_CONTROL,
+        2004 CAMERA_TRACK_POINT, 2005 CAMERA_TRACK_RECTANGLE, 2010 CAMERA_STOP_TRACKING,
+        2020 CAMERA_START_MTI, 2021 CAMERA_STOP_MTI, 2500 VIDEO_START_CAPTURE,
+        2501 VIDEO_STOP_CAPTURE, 2502 VIDEO_START_STREAMING, 2503 VIDEO_STOP_STREAMING,
+        2510 LOGGING_START, 2511 LOGGING_STOP, 2520 AIRFRAME_CONFIGURATION, 2800 PANORAMA_CREATE,
+        4501 CONDITION_GATE, 10001 DO_ADSB_OUT_IDENT, 10151 LOWEHEISER_SET_STATE,
+        30002 PAYLOAD_CONTROL_DEPLOY, 40001 RESET_MPPT, 40002 PAYLOAD_CONTROL,
+        42501 GIMBAL_RESET, 42503 GIMBAL_REQUEST_AXIS_CALIBRATION, 42600 DO_WINCH""",
+    ),
+}
+
+COMMANDS: Mapping[int, Row] = {**PASSED_ON, **CLAIMED, **OURS}

@@ -1,0 +1,104 @@
+"""Attack S6: who calls itself the server, or a rover, is heeded by nobody, whatever it sends.
+
+STOP alone is: it only stops, and it is never too late to find out who has sent it.
+"""
+
+from collections.abc import Callable
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import GUIDED, FakeClient, heartbeat, set_mode
+from tests.kit.world import World
+
+#: of the server towards rovers, of a rover, and of the server in that rover
+OWN = ((250, 191), (1, 1), (1, 191))
+SERVO, SPEED, MISSION_START, DO_SET_MODE = 183, 178, 300, 176
+MISSION_COUNT = 44
+
+SENT: dict[str, Callable[[FakeClient], object]] = {
+    "arm": lambda client: client.arm(),
+    "servo": lambda client: client.command(SERVO, 1, 1900, target=(1, 1)),
+    "mode": lambda client: client.mode(GUIDED),
+    "SET_MODE": lambda client: client.send(set_mode(GUIDED)),
+    "task": lambda client: client.move(2.0),
+    "task to all": lambda client: client.command(SERVO, 1, 1900, target=(0, 0)),
+    "speed": lambda client: client.command(SPEED, 1, 1.5),
+    "pause": lambda client: client.pause(),
+    "disarm": lambda client: client.arm(False),
+    "parameter of ours": lambda client: client.send(
+        common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 1.5, 9)
+    ),
+    "parameter of the rover": lambda client: client.send(
+        common.MAVLink_param_set_message(1, 1, b"CRUISE_SPEED", 1.5, 9)
+    ),
+    "upload": lambda client: client.send(common.MAVLink_mission_count_message(1, 1, 2, 0)),
+    "clear": lambda client: client.send(common.MAVLink_mission_clear_all_message(1, 1, 0)),
+    "rates": lambda client: client.send(common.MAVLink_request_data_stream_message(1, 1, 0, 20, 1)),
+}
+
+
+def borrowed(world: World, source: tuple[int, int]) -> FakeClient:
+    """Let a client take part that says that it is somebody of ours."""
+    client = world.add_client("of a borrowed name", system_id=source[0], component_id=source[1])
+    client.reads_dialect = False
+    world.run(1.2)
+    return client
+
+
+@pytest.mark.parametrize("source", OWN)
+@pytest.mark.parametrize("what", SENT)
+def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
+    world: World, source: tuple[int, int], what: str
+) -> None:
+    client = borrowed(world, source)
+    client.heartbeats = False
+    armed, mode = world.rover.autopilot.armed, world.rover.autopilot.mode
+    speed = world.rover.autopilot.parameters["CRUISE_SPEED"]
+    reached = len(of_source(world, source))
+    SENT[what](client)
+    world.run(1.0)
+    assert client.acks == []
+    assert MISSION_COUNT not in [packet.message_id for packet in client.received]
+    assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (armed, mode)
+    assert world.rover.autopilot.parameters["CRUISE_SPEED"] == speed
+    assert world.server.engine.parameters == {}
+    assert (world.tasks(), world.paused()) == ((), R.NONE)
+    assert len(of_source(world, source)) == reached
+    refused = [
+        event for event in world.events(SubmissionRefused) if "is an address of" in str(event)
+    ]
+    assert len(refused) == 1
+
+
+def of_source(world: World, source: tuple[int, int]) -> list[object]:
+    """Give what has reached the rover from an address, but for what the server itself sends."""
+    if source == (250, 191):
+        return []  # the server sends heartbeats and requests as such; arming and mode tell enough
+    return [packet for packet in world.observer.reached if packet.source == source]
+
+
+@pytest.mark.parametrize("source", OWN)
+def test_its_stop_stops_all_the_same(world: World, source: tuple[int, int]) -> None:
+    task = world.client.move(20.0)
+    client = borrowed(world, source)
+    world.until_state(task.task_id, S.EXECUTING)
+    client.stop()
+    world.until_state(task.task_id, S.KILLED, within=1.0)
+    world.until(world.stands, within=3.0)
+    assert (world.paused(), world.rover.autopilot.mode) == (R.STOPPED, Mode.HOLD)
+    client.proceed()
+    world.run(1.0)
+    assert world.paused() is R.STOPPED
+
+
+def test_a_companion_of_the_rover_is_somebody_else(world: World) -> None:
+    client = borrowed(world, (1, 195))
+    client.send(heartbeat())
+    sent = client.move(0.5)
+    world.run(0.2)
+    assert sent.task_id == 1
