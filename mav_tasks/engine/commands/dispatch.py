@@ -219,7 +219,9 @@ class Commands:
         is_question = row_said(asked.command).kind is Kind.QUESTION
         if is_question and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
-            why_not = self._vehicles.why_not_asked(asked.vehicle, asked.packet, message, now=now)
+            why_not = self._vehicles.why_not_asked(
+                asked.vehicle, asked.client.key, asked.packet, message, now=now
+            )
             if why_not is not None:
                 raise asked.rights.refusal(why_not, R.RATE_LIMITED)
 

@@ -62,7 +62,7 @@ class Passing:
                 v for v in vehicles if not may_pass(v, client.key, row, message, is_old=is_old)
             ]
             too_much = (
-                self._vehicles.why_not_asked(vehicles[0], packet, message, now=now)
+                self._vehicles.why_not_asked(vehicles[0], client.key, packet, message, now=now)
                 if is_observers and message is not None
                 else None
             )

@@ -4,6 +4,7 @@ An observer's questions are answered by the vehicle, over its link: a list of al
 hundred small questions a second, would delay the telemetry that a task is driven by.
 """
 
+from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.mavlink import messages as m
@@ -17,6 +18,8 @@ LIST_SHARE = 0.3  # of the link, that an ArduPilot uses for a list
 SLOW_LIST = 5.0  # s; a link that takes longer for one is narrow
 LEAST = 100.0  # bytes/s for questions on the narrowest link: one or two
 WITHIN = 5.0  # s, of which the questions may come at once
+OWN_SHARE = 0.25  # of them, that one client has: the others are answered beside a flood of its
+MOST_CLIENTS = 64  # of whom is known what they have asked
 
 
 class LinkBudget:
@@ -28,19 +31,28 @@ class LinkBudget:
         self.spare = spare_of(budget, capacity, vehicles=vehicles)
         rate = max(LEAST, OBSERVERS_SHARE * self.spare * vehicles)
         self._questions = TokenBucket(rate=rate, burst=WITHIN * rate, now=now)
+        self._rate = max(LEAST, OWN_SHARE * rate)  # bytes/s, of one client
+        self._own: dict[Hashable, TokenBucket] = {}
         self._listed_until = -inf
 
     def __repr__(self) -> str:
         return f"LinkBudget({self._carries:g} bytes/s, {self.spare:g} to spare)"
 
     def why_not(
-        self, packet: Packet, message: m.Message, *, is_driven: bool, now: float
+        self,
+        who: Hashable,
+        packet: Packet,
+        message: m.Message,
+        *,
+        is_driven: bool,
+        now: float,
     ) -> str | None:
         """Return why an observer's question may not be passed on now, None if it may."""
         if not _asks_for_much(message):
             size = len(packet.raw) + _size_of_answer(message)
-            is_too_much = not self._questions.take(tokens=size, now=now)
-            return "may ask so much, and no more, over a narrow link" if is_too_much else None
+            may_ask = self._of(who, now=now).take(tokens=size, now=now)
+            may_ask = may_ask and self._questions.take(tokens=size, now=now)
+            return None if may_ask else "may ask so much, and no more, over a narrow link"
         takes = LIST / (LIST_SHARE * self._carries)
         if is_driven and takes > SLOW_LIST:
             return "may not ask for a list over a narrow link while a task drives"
@@ -48,6 +60,16 @@ class LinkBudget:
             return "may ask for one list at a time over a narrow link"
         self._listed_until = now + takes
         return None
+
+    def _of(self, who: Hashable, *, now: float) -> TokenBucket:
+        """Return what one client may still ask."""
+        bucket = self._own.pop(who, None)
+        if bucket is None:
+            bucket = TokenBucket(rate=self._rate, burst=WITHIN * self._rate, now=now)
+            if len(self._own) >= MOST_CLIENTS:
+                del self._own[next(iter(self._own))]
+        self._own[who] = bucket
+        return bucket
 
 
 def _asks_for_much(message: m.Message) -> bool:

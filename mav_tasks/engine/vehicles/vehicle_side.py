@@ -4,7 +4,7 @@ Any bytes may come in here; only a packet with a good CRC from a known or newly 
 changes anything.
 """
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from math import inf
@@ -163,12 +163,12 @@ class VehicleSide:
         return budget
 
     def why_not_asked(
-        self, vehicle: Vehicle, packet: Packet, message: m.Message, *, now: float
+        self, vehicle: Vehicle, who: Hashable, packet: Packet, message: m.Message, *, now: float
     ) -> str | None:
         """Return why an observer's question is too much for a vehicle's link, None if it is not."""
         budget, place = self.link_budget(vehicle, now=now), vehicle.requests.place
         is_driven = any(v.tasks.is_driving for v in self if v.requests.place == place)
-        return budget.why_not(packet, message, is_driven=is_driven, now=now)
+        return budget.why_not(who, packet, message, is_driven=is_driven, now=now)
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle with a task of a key that counts no more, whosever task is driven.

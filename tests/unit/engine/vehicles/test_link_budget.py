@@ -24,7 +24,7 @@ def budget(capacity: float) -> LinkBudget:
 
 
 def may(link: LinkBudget, message: m.Message, *, driven: bool = False, now: float = 0.0) -> bool:
-    return link.why_not(packet(message), message, is_driven=driven, now=now) is None
+    return link.why_not("client", packet(message), message, is_driven=driven, now=now) is None
 
 
 def test_a_list_waits_for_a_narrow_link_until_no_task_drives() -> None:
