@@ -92,7 +92,7 @@ def test_it_says_which_version_it_is() -> None:
 
 def test_a_shell_can_complete_commands() -> None:
     it = f"{sys.executable} -m mav_tasks.cli --show-completion"
-    shown = subprocess.run(  # whose parent is a shell, whoever runs the tests; it asks for that
+    shown = subprocess.run(  # in a shell: it prints the completion of the shell that called it
         ["bash", "-c", f"{it}; exit $?"], capture_output=True, text=True, timeout=30, check=True
     )
     assert "_MAV_TASKS_COMPLETE=complete_bash" in shown.stdout

@@ -48,7 +48,7 @@ class Endpoint:
         self._mav.command_long_send(self.system, TO_AUTOPILOT, number, 0, *values)
 
     async def close(self) -> None:
-        """Give the link back."""
+        """Stop its heartbeats and close the link."""
         self._beating.cancel()
         with suppress(asyncio.CancelledError):
             await self._beating

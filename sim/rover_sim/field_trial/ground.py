@@ -22,7 +22,7 @@ class Limits:
 class Ground(Protocol):
     """A rover, a server that can be started, ended and killed, and clients of it."""
 
-    #: true poses; None: there are none, and what the rover tells counts
+    #: true poses; None: nothing knows them, and the poses that the rover reports count
     truth: Track | None
 
     async def start_server(self) -> None:
@@ -42,7 +42,7 @@ class Ground(Protocol):
         ...
 
     def rover_link(self) -> Link | None:
-        """Return a link to the rover itself, while no server runs; None: there is none."""
+        """Return a link to the rover itself, for use while no server runs; None: it has none."""
         ...
 
     @property

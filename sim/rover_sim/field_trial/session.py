@@ -102,7 +102,7 @@ class Session:
 
     @property
     def client(self) -> Client:
-        """The client; TrialError while there is none."""
+        """The client that is connected. Raise TrialError if none is."""
         if self._client is None:
             raise TrialError("no client")
         return self._client
