@@ -7,6 +7,9 @@ it had left before the packet that came first, however late it comes.
 BEHIND = 0x80  # of 256 numbers; one that is farther behind looks as if it were ahead
 #: s and packets, one after the other and all behind, after which the sender has begun anew
 ANEW_AFTER, ANEW = 2.0, 3
+#: s of silence after which one that counts from 0 has begun anew with its second packet
+SILENT = 1.0
+FIRST = 8  # numbers, of which the second packet has one: some may be lost
 
 
 class NumberLine:
@@ -16,18 +19,25 @@ class NumberLine:
         self.last = -1  #: the highest number so far, counted on beyond 255; -1: none has come
         self._passed = [0.0] * 256  # s, when each number came, or a higher one
         self._behind: list[tuple[int, float]] = []  # number and s, of those since the last ahead
+        self._heard_at = 0.0
+        self._is_at_0 = False  # the last one was number 0, after a silence
+        self.lives = 0  #: times that the sender has begun anew
 
     def __repr__(self) -> str:
         return f"NumberLine({self.last})"
 
     def place(self, seq: int, *, now: float) -> int:
         """Take a packet in; return its number, counted on. It is late if that is below ``last``."""
+        silence, self._heard_at = now - self._heard_at, now
+        was_at_0, self._is_at_0 = self._is_at_0, seq == 0 and silence >= SILENT
         if self.last < 0:
             return self._move_on(seq, 256, now)
         ahead = self.number_of(seq) - self.last
         if ahead > 0:
             return self._move_on(self.last + ahead, ahead, now)
-        if ahead < 0 and self._begins_anew(self.last + ahead, now):
+        is_second = was_at_0 and seq <= FIRST
+        if ahead < 0 and (is_second or self._begins_anew(self.last + ahead, now)):
+            self.lives += 1
             forward = ahead & 0xFF
             return self._move_on(self.last + forward, forward, now)
         return self.last + ahead

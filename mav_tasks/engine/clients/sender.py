@@ -14,6 +14,7 @@ REMEMBERED = 64  # words
 
 
 class _Said(NamedTuple):
+    life: int  # of the sender: a program that is run again says all anew
     epoch: int  # of the vehicle, when the first copy came
     at: float  # s, of the last copy
     packet: bytes
@@ -33,7 +34,7 @@ class Sender:
     def first_epoch(self, content: Hashable, packet: Packet, *, now: float) -> int | None:
         """Return the epoch at which the first copy of this word came; None: it is none."""
         said = self._said.get(content)
-        if said is None:
+        if said is None or said.life != self.line.lives:
             return None
         within = DOUBLED if said.packet == packet.raw else COPIED
         return said.epoch if now - said.at <= within else None
@@ -41,6 +42,6 @@ class Sender:
     def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:
         """Remember a word, or that one more copy of it has come."""
         self._said.pop(content, None)
-        self._said[content] = _Said(epoch, now, packet.raw)
+        self._said[content] = _Said(self.line.lives, epoch, now, packet.raw)
         if len(self._said) > REMEMBERED:
             self._said.popitem(last=False)

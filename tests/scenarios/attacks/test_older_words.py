@@ -201,6 +201,27 @@ def test_who_held_it_may_go_on_at_once(world: World) -> None:
         assert going.answer == (ACCEPTED, 1)
 
 
+def test_a_script_that_is_run_again_from_the_same_port_is_heard(world: World) -> None:
+    """MAVSDK at 14540, say: each run counts its packets from 0, and sends the very same ones."""
+    for _ in range(3):
+        script = world.client
+        script._mav.seq = 0
+        script.send(command_long(512, 148, target=(1, 1)))
+        world.run(0.1)
+        script.send(command_long(512, 148, target=(1, 1)))
+        world.run(0.3)
+        armed = script.arm()
+        world.run(1)
+        assert armed.result == ACCEPTED
+        script.arm(False)
+        world.run(0.5)
+        for _ in range(20):
+            script.send(command_long(512, 148, target=(1, 1)))
+        script.heartbeats = False
+        world.run(4)
+        script.heartbeats, script._next_heartbeat = True, world.now
+
+
 def test_a_refusal_says_what_came_and_what_to_do_and_4_s_later_it_counts(world: World) -> None:
     script, person = world.add_client("script", system_id=245), world.add_client("person")
     script.move(20)

@@ -43,12 +43,27 @@ def test_the_newest_may_have_left_just_now() -> None:
 
 
 def test_a_sender_that_counts_from_0_again_is_believed_after_a_while() -> None:
-    line = line_of((100, 0.0))
-    assert line.place(0, now=10.0) == 0
-    assert line.place(1, now=11.0) == 1
-    number = line.place(2, now=12.0)
+    line = line_of((100, 0.0))  # and whose first packets are lost
+    assert line.place(20, now=10.0) == 20
+    assert line.place(21, now=11.0) == 21
+    number = line.place(22, now=12.0)
     assert number > 100
-    assert line.place(3, now=13.0) == number + 1
+    assert line.place(23, now=13.0) == number + 1
+
+
+def test_a_program_that_is_run_again_is_believed_with_its_second_packet() -> None:
+    line = line_of((0, 0.0), (1, 0.1), (12, 5.0))
+    assert line.place(0, now=8.0) == 0
+    assert line.place(1, now=8.1) == 257
+    assert (line.last, line.lives) == (257, 1)
+
+
+def test_its_first_packet_may_be_late_without_that() -> None:
+    line = line_of((1, 0.1), (12, 5.0))
+    assert line.place(0, now=8.0) == 0
+    assert line.place(13, now=8.1) == 13
+    assert line.place(2, now=8.2) == 2
+    assert line.lives == 0
 
 
 def test_a_burst_of_late_ones_is_none_that_begins_anew() -> None:
