@@ -29,7 +29,7 @@ from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
-from mav_tasks.store import NotKept, Store
+from mav_tasks.store import Kept, Store
 from mav_tasks.witness import Witness
 
 log = logging.getLogger("mav_tasks")
@@ -225,7 +225,7 @@ class Runner:
         """What it says to the last goes to the log: there is nobody else to tell."""
         self._store.close()
         for outcome in self._store.take_outcomes():
-            if isinstance(outcome, NotKept):
+            if not isinstance(outcome, Kept):
                 log.error("%s", outcome.text)
 
     def _on_signal(self) -> None:

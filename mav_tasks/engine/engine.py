@@ -30,6 +30,7 @@ from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.inputs import (
     Committed,
     Congestion,
+    HaltNotStored,
     Input,
     KeysChanged,
     LinkChanged,
@@ -187,6 +188,8 @@ class Engine:
                 self._vehicles.commit(through, now=now)
             case StoreFailed():
                 self._submissions.store_failed()
+            case HaltNotStored(vehicle=vehicle):
+                self._publisher.warn_of_loss(vehicle, now=now)
             case SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
                 self.not_in_force = self._parameters.not_in_force

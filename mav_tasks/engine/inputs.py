@@ -88,6 +88,13 @@ class StoreFailed:
 
 
 @dataclass(frozen=True, slots=True)
+class HaltNotStored:
+    """What makes a vehicle stand is stored nowhere so far: a restart would lose it."""
+
+    vehicle: int
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsChanged:
     """New settings are in force."""
 
@@ -114,6 +121,7 @@ Input = (
     | Congestion
     | Committed
     | StoreFailed
+    | HaltNotStored
     | SettingsChanged
     | WallClock
     | Shutdown

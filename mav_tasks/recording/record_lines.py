@@ -28,6 +28,7 @@ from typing import Any, assert_never, get_args
 from mav_tasks.engine.inputs import (
     Committed,
     Congestion,
+    HaltNotStored,
     Input,
     KeysChanged,
     LinkChanged,
@@ -128,7 +129,7 @@ def input_of(line: Sequence[Any]) -> Input | None:
         case "settings":
             (settings,) = values
             return SettingsChanged(settings_of(settings))
-        case "committed" | "store failed" | "wall clock" | "shutdown":
+        case "committed" | "store failed" | "halt not stored" | "wall clock" | "shutdown":
             return _SIMPLE[kind](*values)
         case _:
             raise ValueError(f"{kind!r} is unknown to this version")
@@ -140,9 +141,10 @@ def described(row: Sequence[Any]) -> str:
     return f"{name}({', '.join(f'{p}={v!r}' for p, v in zip(ROWS[name], values, strict=True))})"
 
 
-_SIMPLE: Mapping[str, type[Committed | StoreFailed | WallClock | Shutdown]] = {
+_SIMPLE: Mapping[str, type[Committed | StoreFailed | HaltNotStored | WallClock | Shutdown]] = {
     "committed": Committed,
     "store failed": StoreFailed,
+    "halt not stored": HaltNotStored,
     "wall clock": WallClock,
     "shutdown": Shutdown,
 }
@@ -172,6 +174,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["committed", now, through]
         case StoreFailed(text=text):
             return ["store failed", now, text]
+        case HaltNotStored(vehicle=vehicle):
+            return ["halt not stored", now, vehicle]
         case WallClock(offset=offset):
             return ["wall clock", now, offset]
         case Shutdown():

@@ -5,6 +5,7 @@ What fails is kept and tried again, in the same order, until it is written. Its 
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
 
@@ -36,6 +37,7 @@ class Writer:
         *,
         name: str,
         wall_offset: Callable[[], float],
+        note_next_id: Callable[[int], None],
         release: Callable[[], None],
     ) -> None:
         self._database = database
@@ -43,6 +45,7 @@ class Writer:
         self._trimmer = trimmer
         self._name = name
         self._wall_offset = wall_offset
+        self._note_next_id = note_next_id
         self._release = release
         self._base = database.last_number  # events are reported as counted from here
         self._encoder = Encoder()
@@ -128,6 +131,8 @@ class Writer:
                 return False
             time.sleep(RETRY)
         self._reported_at = None
+        with suppress(OSError):  # it is of use only to who puts an older file back
+            self._note_next_id(batch.next_id)
         self._mail.put(Kept(batch.last - self._base))
         return True
 

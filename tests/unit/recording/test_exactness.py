@@ -9,6 +9,7 @@ import pytest
 from mav_tasks.engine.inputs import (
     Committed,
     Congestion,
+    HaltNotStored,
     Input,
     LinkChanged,
     LinkSide,
@@ -52,6 +53,7 @@ INPUTS: list[Input | None] = [
     Congestion("tcp", ("h", 1), is_congested=False),
     Committed(12),
     StoreFailed("the disk is full: ä \ud800"),
+    HaltNotStored(7),
     SettingsChanged(Settings(clients=Clients(priorities={"255/190": 7}, stream_interval=0))),
     WallClock(-0.0),
     Shutdown(),
