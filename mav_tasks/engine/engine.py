@@ -28,6 +28,8 @@ from mav_tasks.engine.commands.passing import Passing
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Committed,
     Congestion,
     HaltNotStored,
@@ -165,6 +167,9 @@ class Engine:
         match item:
             case Packets():
                 self._receive(item, now=now)
+            case AtOnce(packets=several) | Backlog(packets=several):
+                for each in several:
+                    self._receive(each, now=now)
             case LinkChanged(side=side):
                 self._intake.change_link(item)
                 self._gates.change_link(item)

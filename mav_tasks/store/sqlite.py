@@ -2,11 +2,11 @@
 
 import os
 import stat
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 
+from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.settings import Retention
 from mav_tasks.store.base import Outcome
@@ -30,7 +30,7 @@ TRIM_AT_OPEN = 0.5  # s, for forgetting before the server serves; the rest is do
 class SqliteStore:
     """Implements ``Store``. Files and folders that it makes are its user's alone.
 
-    ``wall_offset`` gives UTC minus monotonic seconds, now. StoreError, on making one, says in one
+    ``wall_offset`` gives UTC minus ``boot_time``, now. StoreError, on making one, says in one
     line why the file cannot be used: by whom it is in use, damaged, newer, read-only, disk full.
     """
 
@@ -51,7 +51,7 @@ class SqliteStore:
             database = Database(self._path)
             was_complete = self._catch_up(database, record)
             release = opened.pop_all().close
-        utc = time.monotonic() + wall_offset()
+        utc = boot_time() + wall_offset()
         self._ended_well = database.ended_well and was_complete
         self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
         self._mail = Mailbox()

@@ -9,6 +9,7 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
 
+from mav_tasks.clock import boot_time
 from mav_tasks.store.base import Kept, NotKept
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
@@ -83,7 +84,7 @@ class Writer:
 
     def utc(self) -> float:
         """Give the time of the wall, seconds since 1970."""
-        return time.monotonic() + self._wall_offset()
+        return boot_time() + self._wall_offset()
 
     def _run(self) -> None:
         try:
