@@ -132,7 +132,7 @@ class Database:
         self.last_number = batch.last
 
     def catch_up(
-        self, events: Sequence[Event], *, last_number: int, next_id: int, offset: float
+        self, events: Sequence[Event], *, last_number: int, next_id: int | None, offset: float
     ) -> None:
         """Write events that an earlier life could not, before any other. StoreError.
 
@@ -140,7 +140,7 @@ class Database:
         """
         first, encoder = last_number + 1, Encoder()
         batch = Batch(events, first=first, encoder=encoder, format_id=self.format_id, offset=offset)
-        batch.next_id = next_id
+        batch.next_id = next_id or batch.next_id
         try:
             self.write(batch, utc=self.last_write or 0.0)
         except (OSError, sqlite3.Error) as error:

@@ -37,8 +37,8 @@ class HaltKeeper:
         self._name = name
         self._kept_through = kept_through
         self._waiting: SimpleQueue[Sequence[Word] | None] = SimpleQueue()
-        self._unkept: dict[int, Word] = {}  # by vehicle
-        self._report_at: dict[int, float] = {}  # by vehicle
+        self._unkept: dict[int, Word] = {}  # by register
+        self._report_at: dict[int, float] = {}  # by register
         self._is_closing = False
         self._thread = Thread(target=self._run, name="halts", daemon=True)
 
@@ -80,7 +80,7 @@ class HaltKeeper:
         try:
             words = self._waiting.get(timeout=RETRY if self._unkept else None)
             while words is not None:
-                self._unkept.update((word.vehicle, word) for word in words)
+                self._unkept.update((word.key, word) for word in words)
                 words = self._waiting.get_nowait()
             self._is_closing = True
         except Empty:
@@ -93,13 +93,13 @@ class HaltKeeper:
             if word.number > self._kept_through():
                 self._report(word, words_for(error))
                 return
-        del self._unkept[word.vehicle]
-        self._report_at.pop(word.vehicle, None)
+        del self._unkept[word.key]
+        self._report_at.pop(word.key, None)
 
     def _report(self, word: Word, why: str) -> None:
         now = time.monotonic()
-        if word.is_halt and now >= self._report_at.setdefault(word.vehicle, now + GRACE):
-            self._report_at[word.vehicle] = now + REPORT
+        if word.is_halt and now >= self._report_at.setdefault(word.key, now + GRACE):
+            self._report_at[word.key] = now + REPORT
             text = f"store {self._name}: record of halts: {why}: not kept: {_told(word)}"
             self._mail.put(HaltNotKept(word.vehicle, text))
 

@@ -2,12 +2,12 @@
 
 Every byte of it is written when it is opened, so that no later write needs free space. (A file
 system that copies on write may refuse even then; that is reported, see ``halt_keeper``.) For each
-vehicle it has the last word on its queue, paused or continued, with the number of the event in the
-journal. A word whose number the database does not know is newer than the database.
+vehicle it has the last word in each register, with the number of the event in the journal. A word
+whose number the database does not know is newer than the database.
 
-Each word has two cells, in different pages. A word goes into the cell that holds the older one, so
-that a write which is cut short leaves the word before it. Under the vehicle 0, which no vehicle is,
-stands the next task id as the number: whoever puts back an older database issues no id twice.
+Each register has two cells, in different pages. A word goes into the cell that holds the older one,
+so that a write which is cut short leaves the word before it. Under the vehicle 0, which no vehicle
+is, stands the next task id: whoever puts back an older database gives no id twice.
 """
 
 import os
@@ -15,6 +15,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from enum import IntEnum
 from errno import ENOENT
 from pathlib import Path
 from zlib import crc32
@@ -27,18 +28,28 @@ HEADER = b"mav-tasks record of halts, version 1\n".ljust(64, b"\0")
 VEHICLES = 256  # system ids, MAVLink
 SLOTS = 2
 CELL = 64  # bytes; a sector of a disk holds whole ones
-SIZE = len(HEADER) + SLOTS * VEHICLES * CELL
 IDS = 0  # the vehicle under which the next task id stands
 
-#: number, UTC seconds, reason, actor; before them stands the CRC-32 of the rest
-_BODY = struct.Struct("<QdB43s")
+#: number, UTC seconds, value, reason, actor; before them stands the CRC-32 of the rest
+_BODY = struct.Struct("<QdIB39s")
 _CRC = struct.Struct("<I")
 _EMPTY = bytes(CELL)
 
 
+class Register(IntEnum):
+    """What the words of a vehicle are about; each has one that counts, the last."""
+
+    QUEUE = 0  # why it is paused; NONE: it was continued
+    HALTS = 1  # how often it was halted, as the value
+
+
+REGISTERS = len(Register) * VEHICLES
+SIZE = len(HEADER) + SLOTS * REGISTERS * CELL
+
+
 @dataclass(frozen=True, slots=True)
 class Word:
-    """The last word on a vehicle's queue, from an event; a ``reason`` of NONE: it was continued.
+    """The last word in a register, made of an event.
 
     ``number`` is that of the event in the journal, ``utc`` in seconds since 1970.
     """
@@ -48,10 +59,17 @@ class Word:
     reason: TaskReason = TaskReason.NONE
     actor: str = ""
     utc: float = 0.0
+    register: Register = Register.QUEUE
+    value: int = 0
+
+    @property
+    def key(self) -> int:
+        """Where it stands."""
+        return self.register * VEHICLES + self.vehicle
 
     @property
     def is_halt(self) -> bool:
-        """Whether the vehicle's queue stands by it."""
+        """Whether the vehicle stands by it."""
         return self.reason is not TaskReason.NONE
 
 
@@ -100,10 +118,15 @@ class HaltRecord:
     def __repr__(self) -> str:
         return f"HaltRecord({self._path.name}, {len(self._newest)} words)"
 
+    def next_id_after(self, number: int) -> int | None:
+        """Return the next task id, or None if it is no news to such a database."""
+        word = self._newest[IDS][1] if IDS in self._newest else None
+        return None if word is None or word.number <= number else word.value
+
     @property
-    def next_id(self) -> int:
-        """The task id that comes after all that the record knows of."""
-        return self._newest[IDS][1].number if IDS in self._newest else 1
+    def last_number(self) -> int:
+        """The number of the last event that the record knows of."""
+        return max((word.number for _, word in self._newest.values()), default=0)
 
     def words_after(self, number: int) -> list[Word]:
         """Return the words that a database lacks whose last event has this number, in order."""
@@ -118,56 +141,63 @@ class HaltRecord:
         if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
             raise OSError(ENOENT, "it was removed or replaced while it was in use")
 
-    def note_next_id(self, next_id: int) -> None:
-        """Keep the next task id. The disk gets it in the kernel's time: a backup is older."""
-        if next_id > self.next_id:
-            self._put(Word(IDS, next_id))
+    def note_next_id(self, next_id: int, *, number: int) -> None:
+        """Keep the task id that is next after the event of this number.
+
+        The disk gets it in the kernel's time, half a minute: an older database is older than that.
+        """
+        self._put(Word(IDS, number, value=next_id))
 
     def close(self) -> None:
         """Close the file."""
         os.close(self._fd)
 
     def _put(self, word: Word) -> None:
-        slot = 1 - self._newest[word.vehicle][0] if word.vehicle in self._newest else 0
-        actor = word.actor.encode()[:43]
-        body = _BODY.pack(word.number, word.utc, word.reason, actor)
+        slot = 1 - self._newest[word.key][0] if word.key in self._newest else 0
+        body = _BODY.pack(word.number, word.utc, word.value, word.reason, word.actor.encode()[:39])
         cell = _CRC.pack(crc32(body)) + body
-        if os.pwrite(self._fd, cell, _place(slot, word.vehicle)) < len(cell):
+        if os.pwrite(self._fd, cell, _place(slot, word.key)) < len(cell):
             raise OSError(0, "it was not written as a whole")
-        self._newest[word.vehicle] = slot, word
+        self._newest[word.key] = slot, word
 
 
-def _place(slot: int, vehicle: int) -> int:
-    return len(HEADER) + (slot * VEHICLES + vehicle) * CELL
+def _place(slot: int, key: int) -> int:
+    return len(HEADER) + (slot * REGISTERS + key) * CELL
 
 
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
-    """Give the newest word of each vehicle with its slot. ValueError: it is no record of ours."""
+    """Give the newest word of each register with its slot. ValueError: it is no record of ours."""
     if len(content) != SIZE or not content.startswith(HEADER):
         raise ValueError("it is damaged: look whether the rovers stand, then remove it")
-    for vehicle in range(VEHICLES):
+    for key in range(REGISTERS):
         found: list[tuple[int, Word]] = []
         is_cut_short = 0
         for slot in range(SLOTS):
-            begin = _place(slot, vehicle)
+            begin = _place(slot, key)
             cell = content[begin : begin + CELL]
             if cell != _EMPTY:
-                word = _word_in(cell, vehicle)
+                word = _word_in(cell, key)
                 found += [] if word is None else [(slot, word)]
                 is_cut_short += word is None
         if is_cut_short == SLOTS:
             raise ValueError("it is damaged: look whether the rovers stand, then remove it")
         if found:
-            yield vehicle, max(found, key=lambda each: each[1].number)
+            yield key, max(found, key=lambda each: each[1].number)
 
 
-def _word_in(cell: bytes, vehicle: int) -> Word | None:
+def _word_in(cell: bytes, key: int) -> Word | None:
     body = cell[_CRC.size : _CRC.size + _BODY.size]
     if _CRC.unpack_from(cell)[0] != crc32(body):
         return None
-    number, utc, reason, actor = _BODY.unpack(body)
+    number, utc, value, reason, actor = _BODY.unpack(body)
     return Word(
-        vehicle, number, TaskReason(reason), actor.rstrip(b"\0").decode(errors="ignore"), utc
+        key % VEHICLES,
+        number,
+        TaskReason(reason),
+        actor.rstrip(b"\0").decode(errors="ignore"),
+        utc,
+        Register(key // VEHICLES),
+        value,
     )
 
 

@@ -62,7 +62,7 @@ class SqliteStore:
             trimmer,
             name=self.name,
             wall_offset=wall_offset,
-            note_next_id=record.note_next_id,
+            record=record,
             release=release,
         )
         self._number = database.last_number
@@ -126,13 +126,14 @@ class SqliteStore:
     def _catch_up(self, database: Database, record: HaltRecord) -> bool:
         """Bring into the database what its record of halts has beyond it; False: it lacked some."""
         newer = record.words_after(database.last_number)
-        if not newer and record.next_id <= database.next_id:
+        next_id = record.next_id_after(database.last_number)
+        if not newer and next_id is None:
             return True
         offset = self._wall_offset()
         database.catch_up(
             [event_of(word, offset=offset) for word in newer],
-            last_number=max([database.last_number, *(word.number for word in newer)]),
-            next_id=record.next_id,
+            last_number=record.last_number,
+            next_id=next_id,
             offset=offset,
         )
         return False

@@ -15,6 +15,7 @@ from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.database import Database
 from mav_tasks.store.failures import is_failure, words_for
+from mav_tasks.store.halt_record import HaltRecord
 from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event
@@ -38,7 +39,7 @@ class Writer:
         *,
         name: str,
         wall_offset: Callable[[], float],
-        note_next_id: Callable[[int], None],
+        record: HaltRecord,
         release: Callable[[], None],
     ) -> None:
         self._database = database
@@ -46,7 +47,7 @@ class Writer:
         self._trimmer = trimmer
         self._name = name
         self._wall_offset = wall_offset
-        self._note_next_id = note_next_id
+        self._record = record
         self._release = release
         self._base = database.last_number  # events are reported as counted from here
         self._encoder = Encoder()
@@ -132,8 +133,9 @@ class Writer:
                 return False
             time.sleep(RETRY)
         self._reported_at = None
-        with suppress(OSError):  # it is of use only to who puts an older file back
-            self._note_next_id(batch.next_id)
+        if batch.next_id:
+            with suppress(OSError):  # it is of use only to who puts an older file back
+                self._record.note_next_id(batch.next_id, number=batch.last)
         self._mail.put(Kept(batch.last - self._base))
         return True
 

@@ -12,7 +12,7 @@ from mav_tasks.errors import StoreError
 from mav_tasks.store import HaltNotKept
 from mav_tasks.store.database import Database
 from mav_tasks.store.halt_record import CELL, HEADER, SIZE, HaltRecord, Word
-from mav_tasks.store.halt_record import VEHICLES as CELLS
+from mav_tasks.store.halt_record import REGISTERS as CELLS
 from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason
 from tests.unit.store.full_disk import NO_NAMESPACE
@@ -108,7 +108,7 @@ def test_a_word_that_is_cut_short_leaves_the_one_before(path: Path) -> None:
     record.close()
     damage(path, slot=0, vehicle=9)
     assert [word.number for word in words(path)] == [2]
-    assert words(path)[0].actor == "ä" * 21
+    assert words(path)[0].actor == "ä" * 19
     damage(path, slot=1, vehicle=9)
     with pytest.raises(StoreError, match="damaged"):
         HaltRecord(path)
@@ -201,3 +201,13 @@ def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_
     if done.returncode == NO_NAMESPACE or done.stderr.startswith("unshare:"):
         pytest.skip("this machine gives no file system of one's own")
     assert done.stdout.split() == ["not", "kept", "STOPPED"], done.stderr
+
+
+def test_the_latest_task_id_counts_though_a_higher_one_came_before(path: Path) -> None:
+    record = HaltRecord(path)
+    record.note_next_id(16_777_215, number=10)
+    record.note_next_id(2, number=20)
+    record.close()
+    again = HaltRecord(path)
+    again.close()
+    assert [again.next_id_after(number) for number in (9, 19, 20)] == [2, 2, None]
