@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import Committed, Input, Outgoing, StoreFailed
+from mav_tasks.engine.inputs import Committed, HaltNotStored, Input, Outgoing, StoreFailed
 from mav_tasks.logs.rendering import level_of
-from mav_tasks.store import Kept, NotKept, Outcome, Store
+from mav_tasks.store import HaltNotKept, Kept, NotKept, Outcome, Store
 from mav_tasks.tasks.events import Event, ServerStopped
 from mav_tasks.witness import Witness, Witnesses
 
@@ -64,12 +64,7 @@ class Pump:
                 break
             for outcome in outcomes:
                 self._note_outcome(outcome)
-                self.handle(
-                    Committed(outcome.through)
-                    if isinstance(outcome, Kept)
-                    else StoreFailed(outcome.text),
-                    now=now,
-                )
+                self.handle(_input_of(outcome), now=now)
         self._note(noted)  # last: whoever waits for an answer does not wait for the log
 
     def close(self) -> None:
@@ -86,10 +81,14 @@ class Pump:
                 self._send(sealed)
 
     def _note_outcome(self, outcome: Outcome) -> None:
-        if isinstance(outcome, NotKept):
-            log.error("%s: submissions are refused until it is mended", outcome.text)
-        elif self._store_is_away:
-            log.warning("the store takes events again")
+        match outcome:
+            case HaltNotKept(text=text):
+                log.error("%s", text)
+                return
+            case NotKept(text=text):
+                log.error("%s: submissions are refused until it is mended", text)
+            case Kept() if self._store_is_away:
+                log.warning("the store takes events again")
         self._store_is_away = isinstance(outcome, NotKept)
 
     def _note(self, events: list[Event]) -> None:
@@ -97,3 +96,13 @@ class Pump:
             log.log(level_of(event), event)
             if isinstance(event, ServerStopped):
                 self.is_over = True
+
+
+def _input_of(outcome: Outcome) -> Input:
+    match outcome:
+        case Kept(through=through):
+            return Committed(through)
+        case NotKept(text=text):
+            return StoreFailed(text)
+        case HaltNotKept(vehicle=vehicle):
+            return HaltNotStored(vehicle)

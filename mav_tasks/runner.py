@@ -1,4 +1,9 @@
-"""The I/O shell: one loop, one timer, one pump; signals and the orderly end. It decides nothing."""
+"""The I/O shell: one loop, one timer, one pump; signals and the orderly end. It decides nothing.
+
+The engine's time is ``boot_time``, which goes on while the machine is asleep; the loop's does not,
+so the timer is set by how long is left. Every TEND_PERIOD the loop wakes at least: two callbacks
+further apart than STOOD_STILL tell that this process, or the machine, stood still.
+"""
 
 import asyncio
 import logging
@@ -9,8 +14,11 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Protocol
 
+from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Congestion,
     Input,
     KeysChanged,
@@ -18,27 +26,28 @@ from mav_tasks.engine.inputs import (
     LinkSide,
     Outgoing,
     Packets,
-    Peer,
     PeerChanged,
     SettingsChanged,
     Shutdown,
     WallClock,
 )
+from mav_tasks.link_reader import DRAIN, LinkReader
 from mav_tasks.links.base import TEND_PERIOD, Link, PacedLink, PeerChange, PeerState, StreamLink
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
-from mav_tasks.store import NotKept, Store
+from mav_tasks.store import Kept, Store
 from mav_tasks.witness import Witness
 
 log = logging.getLogger("mav_tasks")
 
-DRAIN = 64  # datagrams read from one link before the others have their turn
 EACH_TAKES = 1e-4  # s, to take one in, until it is known what those of a link take
 LEARNT = 0.2  # the part that the latest count for in that: one may be slow by chance
 SLOWER = 4.0  # times what was known, at the most, do they count for
 TURN = 1e-3  # s, for which datagrams are taken in even when a setpoint is due
+STOOD_STILL = 0.3  # s between two callbacks; data older than that steer nothing
+WALL_EVEN = 0.1  # s, by which the wall clock's offset may differ and a stamp still tells an age
 WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 
 HANGUP = 0.2  # s after SIGHUP, when it is seen whether the terminal is gone
@@ -113,8 +122,10 @@ class Runner:
         reload: Reload | None = None,
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: Keys | None = None,
+        clock: Callable[[], float] = boot_time,
     ) -> None:
         """``policies`` by the names of links; one without takes unsigned packets."""
+        self._clock = clock
         self._reload = reload
         self._policies = policies or {}
         self._keys = keys
@@ -128,6 +139,10 @@ class Runner:
         self._pump = Pump(engine, store, self._send, witnesses=witnesses)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._due = inf  # when the timer comes, by the engine's time
+        self._reader: LinkReader | None = None
+        self._ran_at = inf  # when the last callback began
+        self._wall_seen = 0.0  # the wall clock's offset then
         self._over: asyncio.Future[int] | None = None
         #: s, that a datagram of a link takes with all that it has sent: to many clients, longer
         self._each_takes = dict.fromkeys(self._links, EACH_TAKES)
@@ -146,14 +161,12 @@ class Runner:
             for link, side in self._sides:
                 policy = self._policies.get(link.name, TAKES_ALL)
                 self._guarded(link_changed(link, side, policy))
-                if isinstance(link, StreamLink):
-                    self._loop.add_reader(link.fileno(), self._on_stream_readable, link)
-                else:
-                    self._loop.add_reader(link.fileno(), self._on_readable, link)
+            self._reader = LinkReader(self._sides, note=self._note)
+            for link, _ in self._sides:
+                self._loop.add_reader(link.fileno(), self._on_readable, self._reader)
             if self._store_fd is not None:
                 self._loop.add_reader(self._store_fd, self._on_stored)
-            if self._streams:
-                self._tend(self._loop)
+            self._tend(self._loop)
             if self._reload is not None:
                 self._loop.add_signal_handler(signal.SIGHUP, self._on_hangup, self._reload)
                 if self._reload.was_asked:
@@ -165,38 +178,59 @@ class Runner:
             for link, _ in self._sides:
                 self._loop.remove_reader(link.fileno())
                 link.close()
+            if self._reader is not None:
+                self._reader.close()
             if self._keys is not None:
                 self._keys.close()
             self._close_store()
             self._pump.close()
 
-    def _on_readable(self, link: Link) -> None:
-        self._take_in(link, link.receive(DRAIN))
+    def _on_readable(self, reader: LinkReader) -> None:
+        """Read every link that has something, so that nothing depends on whose turn comes first."""
+        self._wake()
+        clients, vehicles = reader.readable()
+        of_each = [reader.read(link, now=self._ran_at) for link in clients]
+        of_clients = [packets for packets in of_each if packets.datagrams]
+        if len(of_clients) > 1 and self._time_for(of_clients) <= TURN:
+            self._guarded(AtOnce(tuple(of_clients)))
+        else:
+            for packets in of_clients:
+                self._take_in(packets)
+        for link in vehicles:
+            self._take_in(reader.read(link, now=self._ran_at))
+        reader.note_gone()
 
-    def _on_stream_readable(self, link: StreamLink) -> None:
-        while before := link.take_changes():  # to tell of some may show others
-            self._note(link, before)
-        pieces = link.receive(DRAIN)
-        changes = link.take_changes()
-        self._note(link, [change for change in changes if change.state is PeerState.UP])
-        self._take_in(link, pieces)
-        self._note(link, [change for change in changes if change.state is not PeerState.UP])
+    def _wake(self) -> None:
+        """Look whether this process stood still: then what came meanwhile is taken in first."""
+        now, before = self._clock(), self._ran_at
+        wall, wall_before = time.time() - now, self._wall_seen
+        self._ran_at, self._wall_seen = now, wall
+        if self._reader is None or now - before <= STOOD_STILL:
+            return
+        self._due = inf  # the timer is set anew: the loop does not count a suspended machine
+        wall_is_even = abs(wall - wall_before) < WALL_EVEN
+        packets = self._reader.read_late(now - before, wall_is_even=wall_is_even, now=now)
+        self._guarded(Backlog(packets) if packets else None)
+        self._reader.note_gone()
 
-    def _take_in(self, link: Link, datagrams: list[tuple[Peer, bytes]]) -> None:
+    def _time_for(self, several: Sequence[Packets]) -> float:
+        return sum(len(each.datagrams) * self._each_takes[each.link] for each in several)
+
+    def _take_in(self, packets: Packets) -> None:
         """Take in what came, but let no setpoint wait for all of it."""
-        assert self._loop is not None
         assert self._over is not None
+        link, datagrams, waited = packets.link, packets.datagrams, packets.waited
         while datagrams and not self._over.done():
-            due = self._timer.when() if self._timer is not None else inf
-            began = self._loop.time()
-            each = self._each_takes[link.name]
-            now_in = datagrams[: max(1, int(min(max(due - began, TURN) / each, DRAIN)))]
-            datagrams = datagrams[len(now_in) :]
-            self._guarded(Packets(link.name, now_in))
-            ended = self._loop.time()
+            began = self._clock()
+            each = self._each_takes[link]
+            count = max(1, int(min(max(self._due - began, TURN) / each, DRAIN)))
+            now_in, datagrams = datagrams[:count], datagrams[count:]
+            self._guarded(Packets(link, now_in, waited[:count]))
+            waited = waited[count:]
+            ended = self._clock()
             took = min((ended - began) / len(now_in), SLOWER * each)
-            self._each_takes[link.name] = each + LEARNT * (took - each)
-            if datagrams and self._timer is not None and self._timer.when() <= ended:
+            self._each_takes[link] = each + LEARNT * (took - each)
+            if datagrams and self._due <= ended:
                 self._guarded(None)
 
     def _note(self, link: StreamLink, changes: list[PeerChange]) -> None:
@@ -211,22 +245,25 @@ class Runner:
         if self._over is None or self._over.done():
             return
         loop.call_later(TEND_PERIOD, self._tend, loop)
+        self._wake()
         for link in self._streams:
             link.tend()
             self._note(link, link.take_changes())
 
     def _on_stored(self) -> None:
+        self._wake()
         self._guarded(None)
 
     def _on_timer(self) -> None:
-        self._timer = None
+        self._timer, self._due = None, inf
+        self._wake()
         self._guarded(None)
 
     def _close_store(self) -> None:
         """What it says to the last goes to the log: there is nobody else to tell."""
         self._store.close()
         for outcome in self._store.take_outcomes():
-            if isinstance(outcome, NotKept):
+            if not isinstance(outcome, Kept):
                 log.error("%s", outcome.text)
 
     def _on_signal(self) -> None:
@@ -291,7 +328,7 @@ class Runner:
 
     def _turn(self, item: Input | None) -> None:
         assert self._loop is not None
-        now = self._loop.time()
+        now = self._clock()
         offset = time.time() - now
         if self._wall_offset is None or abs(offset - self._wall_offset) > WALL_STEP:
             self._wall_offset = offset
@@ -312,11 +349,12 @@ class Runner:
         Most deadlines only move on, with each packet. To set the timer anew each time costs more.
         """
         due = self._pump.engine.next_deadline()
-        if due is None or (self._timer is not None and self._timer.when() <= due):
+        if due is None or self._due <= due:
             return
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = loop.call_at(due, self._on_timer)
+        self._due = due
+        self._timer = loop.call_later(max(0.0, due - self._clock()), self._on_timer)
 
     def _finish(self, code: int) -> None:
         if self._timer is not None:
@@ -336,5 +374,4 @@ class Runner:
 
     def _is_over_for(self, outgoing: Outgoing) -> bool:
         """Whether it was made before this process stood still: then it must not leave any more."""
-        assert self._loop is not None
-        return self._loop.time() > outgoing.until
+        return self._clock() > outgoing.until

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
+from mav_tasks.clock import boot_time
 from mav_tasks.config.reload import Reload
 from mav_tasks.engine.engine import Engine
 from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
@@ -108,7 +109,7 @@ def open_store(path: str | None, retention: Retention | None = None) -> SqliteSt
         return MemoryStore()
     return SqliteStore(
         chosen,
-        wall_offset=lambda: time.time() - time.monotonic(),
+        wall_offset=lambda: time.time() - boot_time(),
         retention=retention,
     )
 
@@ -143,7 +144,7 @@ async def _run(
     reload: Reload | None,
     keys: RingWatch,
 ) -> int:
-    now = asyncio.get_running_loop().time()
+    now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)  # what the store gave back
     for why in engine.not_in_force:
         _say(f"not in force, though set before: {why}")

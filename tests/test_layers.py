@@ -11,6 +11,8 @@ ROOT = Path(__file__).resolve().parent.parent
 #: package or module -> what else of ours it may import
 MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.errors": frozenset(),
+    "mav_tasks.clock": frozenset(),
+    "mav_tasks.link_reader": frozenset({"mav_tasks.engine", "mav_tasks.links"}),
     "mav_tasks.settings": frozenset(),
     "mav_tasks.setting_keys": frozenset({"mav_tasks.settings", "mav_tasks.errors"}),
     "mav_tasks.mavlink": frozenset({"mav_tasks.errors"}),
@@ -32,9 +34,15 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
-    "mav_tasks.links": frozenset({"mav_tasks.errors"}),
+    "mav_tasks.links": frozenset({"mav_tasks.clock", "mav_tasks.errors"}),
     "mav_tasks.store": frozenset(
-        {"mav_tasks.tasks", "mav_tasks.settings", "mav_tasks.folders", "mav_tasks.errors"}
+        {
+            "mav_tasks.clock",
+            "mav_tasks.tasks",
+            "mav_tasks.settings",
+            "mav_tasks.folders",
+            "mav_tasks.errors",
+        }
     ),
     "mav_tasks.witness": frozenset({"mav_tasks.engine", "mav_tasks.tasks"}),
     "mav_tasks.recording": frozenset(
@@ -52,6 +60,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.logs": frozenset(
         {
+            "mav_tasks.clock",
             "mav_tasks.engine",
             "mav_tasks.tasks",
             "mav_tasks.services",
@@ -75,6 +84,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.runner": frozenset(
         {
+            "mav_tasks.clock",
+            "mav_tasks.link_reader",
             "mav_tasks.mavlink",
             "mav_tasks.pump",
             "mav_tasks.logs",
@@ -120,6 +131,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.serve": frozenset(
         {
+            "mav_tasks.clock",
             "mav_tasks.config",
             "mav_tasks.key_ring",
             "mav_tasks.link_keys",

@@ -5,7 +5,7 @@ journal what happened and ``take_packets`` the links what to send. Time comes in
 monotonic seconds, never going back.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
 from math import inf
 from typing import assert_never
 
@@ -32,15 +32,17 @@ from mav_tasks.engine.commands.passing import Passing
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Committed,
     Congestion,
+    HaltNotStored,
     Input,
     KeysChanged,
     LinkChanged,
     LinkSide,
     Outgoing,
     Packets,
-    Peer,
     PeerChanged,
     SettingsChanged,
     Shutdown,
@@ -56,7 +58,6 @@ from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
-from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import command_of
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
@@ -175,7 +176,9 @@ class Engine:
         self._vehicles.check_late(now=now)
         match item:
             case Packets():
-                self._receive(item, now=now)
+                self._receive((item,), now=now)
+            case AtOnce(packets=several) | Backlog(packets=several):
+                self._receive(several, now=now)
             case LinkChanged(side=side):
                 self._intake.change_link(item)
                 self._gates.change_link(item)
@@ -200,6 +203,8 @@ class Engine:
                 self._vehicles.commit(through, now=now)
             case StoreFailed():
                 self._submissions.store_failed()
+            case HaltNotStored(vehicle=vehicle):
+                self._publisher.warn_of_loss(vehicle, now=now)
             case SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
                 self.not_in_force = self._parameters.not_in_force
@@ -281,17 +286,31 @@ class Engine:
             ),
         )
 
-    def _receive(self, item: Packets, *, now: float) -> None:
-        from_vehicles = self._vehicles.owns(item.link)
-        if not from_vehicles and not self._gcs.owns(item.link):
-            return
-        counts = self._vehicles.counts if from_vehicles else self._gcs.counts
+    def _receive(self, items: Sequence[Packets], *, now: float) -> None:
+        """Take in what came at one moment: what makes a rover stand comes first."""
+        received: list[Received] = []
+        for item in items:
+            if self._gcs.owns(item.link):
+                received += self._received(item, now=now)
+        if len(received) > 1:
+            received = self._halts_first(received)
+        for each in received:
+            self._gcs.hear_out(each, now=now)
+            self._receive_from_client(each, now=now)
+        for item in items:
+            if self._vehicles.owns(item.link):
+                self._receive_from_vehicles(item, now=now)
+
+    def _received(self, item: Packets, *, now: float) -> Iterator[Received]:
         let_in = self._gates.let_in(item, now=now)
-        packets = self._intake.packets(let_in, counts, now=now)
-        if not from_vehicles:
-            self._receive_from_clients(item.link, packets, now=now)
-            return
-        for peer, packet in packets:
+        for peer, packet, measured in self._intake.packets(let_in, self._gcs.counts, now=now):
+            waited = self._vehicles.may_have_waited(now=now) if measured is None else measured
+            received = self._gcs.receive(item.link, peer, packet, waited=waited, now=now)
+            if received is not None:
+                yield received
+
+    def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
+        for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
             vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
             if vehicle is not None:
                 if self._restarts.begins_anew(packet, now=now):
@@ -300,18 +319,6 @@ class Engine:
                     self._publisher.withhold(packet)
                 else:
                     self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
-
-    def _receive_from_clients(
-        self, link: str, packets: Iterable[tuple[Peer, Packet]], *, now: float
-    ) -> None:
-        """Take in what came at one moment: what makes a rover stand comes first."""
-        taken = (self._gcs.receive(link, peer, packet, now=now) for peer, packet in packets)
-        received = [each for each in taken if each is not None]
-        if len(received) > 1:
-            received = self._halts_first(received)
-        for each in received:
-            self._gcs.hear_out(each, now=now)
-            self._receive_from_client(each, now=now)
 
     def _halts_first(self, received: list[Received]) -> list[Received]:
         """Put what lets a rover go behind what makes one stand; all else keeps its order."""
@@ -347,8 +354,7 @@ class Engine:
             vehicle = self._vehicles.get(message.target_system)
             if vehicle is not None:
                 asked = AskedByMessage.of(client, vehicle, packet, int(message.custom_mode))
-                is_old = self._vehicles.is_old_news(now=now)
-                self._modes.heard(asked, is_old=is_old, now=now)
+                self._modes.heard(asked, now=now)
         elif isinstance(message, m.RequestDataStream):
             self._displays.set_streams(client, message)
         elif isinstance(message, m.SetupSigning):

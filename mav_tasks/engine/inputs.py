@@ -21,10 +21,32 @@ class LinkSide(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Packets:
-    """Datagrams of one link, or pieces of its streams, in the order in which they came."""
+    """Datagrams of one link, or pieces of its streams, in the order in which they came.
+
+    ``waited`` says of each for how long, in seconds, it lay on this machine before it was read, or
+    may have; empty: it was read as soon as it came.
+    """
 
     link: str
     datagrams: Sequence[tuple[Peer, bytes]]
+    waited: Sequence[float] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class AtOnce:
+    """What was read of several links in one go: which of it came first nobody knows."""
+
+    packets: tuple[Packets, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Backlog:
+    """All that came on all links while the server stood still, clients' links first.
+
+    How late each piece is ``waited`` says: what came only just now is among it.
+    """
+
+    packets: tuple[Packets, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +112,13 @@ class StoreFailed:
 
 
 @dataclass(frozen=True, slots=True)
+class HaltNotStored:
+    """What makes a vehicle stand is stored nowhere so far: a restart would lose it."""
+
+    vehicle: int
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsChanged:
     """New settings are in force."""
 
@@ -110,12 +139,15 @@ class Shutdown:
 
 Input = (
     Packets
+    | AtOnce
+    | Backlog
     | LinkChanged
     | KeysChanged
     | PeerChanged
     | Congestion
     | Committed
     | StoreFailed
+    | HaltNotStored
     | SettingsChanged
     | WallClock
     | Shutdown

@@ -1,6 +1,7 @@
 """From what links give to packets: a datagram stands alone, a stream goes on where it stopped."""
 
 from collections.abc import Iterator
+from itertools import repeat
 
 from mav_tasks.engine.inputs import LinkChanged, Packets, Peer, PeerChanged
 from mav_tasks.mavlink.codec import DecodeCounts
@@ -32,10 +33,13 @@ class Intake:
 
     def packets(
         self, item: Packets, counts: DecodeCounts, *, now: float
-    ) -> Iterator[tuple[Peer, Packet]]:
-        """Give the packets in order, each with its sender; counts what belongs to none."""
+    ) -> Iterator[tuple[Peer, Packet, float | None]]:
+        """Give the packets in order, each with its sender; counts what belongs to none.
+
+        And for how long each has waited, in seconds; None: that was not measured.
+        """
         streams = self._streams.get(item.link)
-        for peer, data in item.datagrams:
+        for (peer, data), waited in zip(item.datagrams, item.waited or repeat(None), strict=False):
             if streams is None:
                 packets = split_datagram(data)
                 if len(packets) != 1 or len(packets[0].raw) != len(data):
@@ -46,7 +50,7 @@ class Intake:
                 packets = splitter.feed(data, now=now)
                 counts.noise += splitter.noise - before
             for packet in packets:
-                yield peer, packet
+                yield peer, packet, waited
 
 
 def _splitter(streams: dict[Peer, StreamSplitter], peer: Peer) -> StreamSplitter:

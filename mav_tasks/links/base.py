@@ -40,6 +40,20 @@ class Link(Protocol):
         ...
 
 
+@runtime_checkable
+class StampedLink(Link, Protocol):
+    """A link of which the kernel says when each datagram arrived."""
+
+    def receive_stamped(
+        self, limit: int, *, longest: float
+    ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Give what ``receive`` gives, and how long each had waited to be read, s.
+
+        ``longest``: nothing has waited for longer; what has no stamp may have.
+        """
+        ...
+
+
 class PeerState(Enum):
     """What can become of a peer of a stream link."""
 

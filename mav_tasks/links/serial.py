@@ -10,10 +10,10 @@ import selectors
 import termios
 from contextlib import suppress
 from errno import EIO, ENODEV, ENOENT, ENXIO
-from time import monotonic
 
 from serial import Serial, SerialException
 
+from mav_tasks.clock import boot_time
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Peer, PeerChange, PeerState
@@ -50,7 +50,7 @@ class SerialLink:
         self._queue = OutQueue(max_age=way.max_age)
         self._free_at = 0.0  # when the line has sent what was written
         self._lost = 0
-        self._attempts.is_due(now=monotonic())
+        self._attempts.is_due(now=boot_time())
         try:
             self._open()
         except FAILURES as error:
@@ -95,7 +95,7 @@ class SerialLink:
         if self._device is None or peer != self._url.device:
             self._lost += 1
             return
-        self._queue.put(data, now=monotonic(), first=first)
+        self._queue.put(data, now=boot_time(), first=first)
         self._flush()
 
     def take_changes(self) -> list[PeerChange]:
@@ -105,7 +105,7 @@ class SerialLink:
 
     def tend(self) -> None:
         """Send what waits for the line; look for congestion; open the device if it is lost."""
-        now = monotonic()
+        now = boot_time()
         if self._device is None:
             if self._attempts.is_due(now=now):
                 try:
@@ -147,12 +147,12 @@ class SerialLink:
         self._changes.append(PeerChange(self._url.device, PeerState.UP, words))
 
     def _flush(self) -> None:
-        self._write(ahead_until=monotonic() + LEAD)
+        self._write(ahead_until=boot_time() + LEAD)
 
     def _write(self, *, ahead_until: float) -> None:
         """Write packets as long as the line is free before that time."""
         while self._device is not None and self._free_at < ahead_until:
-            now = monotonic()
+            now = boot_time()
             packet = self._queue.next(now=now)
             if not packet:
                 return

@@ -7,8 +7,8 @@ import os
 import selectors
 import socket
 from collections.abc import Callable
-from time import monotonic
 
+from mav_tasks.clock import boot_time
 from mav_tasks.links.base import Peer, PeerChange, PeerState
 from mav_tasks.links.out_queue import OutQueue
 from mav_tasks.links.url import LinkUrl
@@ -135,14 +135,14 @@ class Connections:
         if connection is None:
             self._lost += 1
             return
-        connection.queue.put(data, now=monotonic(), first=first)
+        connection.queue.put(data, now=boot_time(), first=first)
         reason = None if connection.is_blocked else self._flush(connection)
         if reason is not None:
             self._ended(connection, reason)
 
     def look(self) -> None:
         """Tell of congestions that have begun or ended."""
-        now = monotonic()
+        now = boot_time()
         for connection in self._by_peer.values():
             if connection.queue.changed(now=now):
                 is_congested = connection.queue.is_congested
@@ -168,7 +168,7 @@ class Connections:
 
     def _flush(self, connection: Connection) -> str | None:
         queue = connection.queue
-        while packet := queue.next(now=monotonic()):
+        while packet := queue.next(now=boot_time()):
             try:
                 queue.wrote(connection.socket.send(packet))
             except (BlockingIOError, InterruptedError):

@@ -1,9 +1,11 @@
 """UDP, listening or dialling: one socket, any number of peers."""
 
 import socket
+import time
 
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Peer
+from mav_tasks.links.stamps import ROOM, ask_for_stamps, stamp_in
 from mav_tasks.links.url import LinkUrl, is_loopback
 
 RECEIVE_BUFFER = 1 << 20  # bytes; a burst of telemetry waits here while the disk is slow
@@ -77,6 +79,25 @@ class UdpLink:
             self.lost += 1
         return received
 
+    def receive_stamped(
+        self, limit: int, *, longest: float
+    ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Give what ``receive`` gives, and how long each had waited to be read, s."""
+        received: list[tuple[Peer, bytes]] = []
+        waited: list[float] = []
+        try:
+            for _ in range(limit):
+                data, control, _, peer = self._socket.recvmsg(MAX_DATAGRAM, ROOM)
+                stamp = stamp_in(control)
+                age = longest if stamp is None else time.time() - stamp
+                received.append((peer, data))
+                waited.append(min(max(0.0, age), longest))
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError:
+            self.lost += 1
+        return received, waited
+
     def send(self, peer: Peer, data: bytes) -> None:
         """Send one datagram; one that the system does not take is lost, as on any network."""
         try:
@@ -93,6 +114,7 @@ def _open(family: socket.AddressFamily, bind_to: tuple[str, int]) -> socket.sock
     sock = socket.socket(family, socket.SOCK_DGRAM)
     try:
         sock.setblocking(False)
+        ask_for_stamps(sock)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         sock.bind(bind_to)
     except OSError:

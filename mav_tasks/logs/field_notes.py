@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from math import inf
 
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Congestion,
     Input,
     LinkChanged,
@@ -40,6 +42,9 @@ class FieldNotes:
     def took_in(self, item: Input | None, *, now: float) -> None:
         """Take note of who is new."""
         match item:
+            case AtOnce(packets=several) | Backlog(packets=several):
+                for each in several:
+                    self.took_in(each, now=now)
             case Packets(link=link):
                 for peer, _ in item.datagrams:
                     if (link, peer) not in self._heard:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import is_dataclass
 from typing import Any
 
+from mav_tasks.clock import boot_time
 from mav_tasks.logs.rendering import clean, utc_text, values_of
 from mav_tasks.logs.repeats import Repeats, Said
 from mav_tasks.tasks.events import Event, SubmissionRefused
@@ -49,7 +50,7 @@ def json_line(record: logging.LogRecord, words: str, repeated: tuple[int, float]
         "message": words,
     }
     if is_dataclass(record.msg):
-        values |= values_of(record.msg, offset=record.created - time.monotonic())
+        values |= values_of(record.msg, offset=record.created - boot_time())
     if repeated:
         more, seconds = repeated
         values |= {

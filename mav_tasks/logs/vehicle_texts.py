@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from math import inf
 
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Input,
     LinkChanged,
     LinkSide,
@@ -75,6 +77,9 @@ class VehicleTexts:
         if now >= self._due:
             self._handle_deadline(now)
         match item:
+            case AtOnce(packets=several) | Backlog(packets=several):
+                for each in several:
+                    self.took_in(each, now=now)
             case Packets() if item.link in self._links:
                 for packet in self._texts_in(item, now):
                     self._receive(packet, now)
@@ -100,7 +105,7 @@ class VehicleTexts:
             if not datagrams:
                 return
             item = Packets(item.link, datagrams)
-        for _, packet in self._intake.packets(item, self._counts, now=now):
+        for _, packet, _ in self._intake.packets(item, self._counts, now=now):
             if packet.message_id == TEXT:
                 yield packet
 

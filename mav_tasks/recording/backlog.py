@@ -9,7 +9,8 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-from mav_tasks.engine.inputs import Input, Packets
+from mav_tasks.engine import inputs
+from mav_tasks.engine.inputs import AtOnce, Input, Packets
 
 MOST = 32_000_000  # bytes, about
 SMALL = 200  # bytes, about, that any value takes
@@ -23,6 +24,8 @@ E = TypeVar("E")
 
 def room_of(item: Input | None) -> int:
     """Give how many bytes, about, an input takes in memory."""
+    if isinstance(item, AtOnce | inputs.Backlog):
+        return sum(map(room_of, item.packets), SMALL)
     if not isinstance(item, Packets):
         return SMALL
     room = SMALL

@@ -5,7 +5,9 @@ of this format, who wrote it where, ``now`` at the start in monotonic seconds, t
 the store gave back, and what the places of rows mean (``store/codec``). Then come, each an array::
 
     ["task", row]                           of an earlier run, as many as the first line says
-    ["packets", now, link, [[peer, data in base64], ...]]
+    ["packets", now, link, [[peer, data in base64], ...], [s waited, ...]]  the last if any waited
+    ["at once", now, [link, ...], ...]      the same of several links, each from its link on
+    ["backlog", now, [link, ...], ...]
     ["deadline", now]                       the engine is told that a deadline has come
     ["link", now, ...], ["peer", ...]       the other inputs, with their fields in order
     ["keys", now, [[name, role, ...], ...]] the key ring by its fingerprints: no secret is in a
@@ -26,8 +28,11 @@ from json import JSONEncoder
 from typing import Any, assert_never, get_args
 
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Committed,
     Congestion,
+    HaltNotStored,
     Input,
     KeysChanged,
     LinkChanged,
@@ -108,11 +113,11 @@ def input_of(line: Sequence[Any]) -> Input | None:
         case "deadline":
             return None
         case "packets":
-            link, datagrams = values
-            return Packets(
-                link,
-                [(peer_of(peer), a2b_base64(data, strict_mode=True)) for peer, data in datagrams],
-            )
+            return _packets_of(*values)
+        case "at once":
+            return AtOnce(tuple(_packets_of(*each) for each in values))
+        case "backlog":
+            return Backlog(tuple(_packets_of(*each) for each in values))
         case "link":
             link, side, up, peers, *rest = values
             return LinkChanged(link, LinkSide[side], up, tuple(map(peer_of, peers)), *rest)
@@ -128,7 +133,7 @@ def input_of(line: Sequence[Any]) -> Input | None:
         case "settings":
             (settings,) = values
             return SettingsChanged(settings_of(settings))
-        case "committed" | "store failed" | "wall clock" | "shutdown":
+        case "committed" | "store failed" | "halt not stored" | "wall clock" | "shutdown":
             return _SIMPLE[kind](*values)
         case _:
             raise ValueError(f"{kind!r} is unknown to this version")
@@ -140,9 +145,10 @@ def described(row: Sequence[Any]) -> str:
     return f"{name}({', '.join(f'{p}={v!r}' for p, v in zip(ROWS[name], values, strict=True))})"
 
 
-_SIMPLE: Mapping[str, type[Committed | StoreFailed | WallClock | Shutdown]] = {
+_SIMPLE: Mapping[str, type[Committed | StoreFailed | HaltNotStored | WallClock | Shutdown]] = {
     "committed": Committed,
     "store failed": StoreFailed,
+    "halt not stored": HaltNotStored,
     "wall clock": WallClock,
     "shutdown": Shutdown,
 }
@@ -152,9 +158,12 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
     match item:
         case None:
             return ["deadline", now]
-        case Packets(link=link, datagrams=datagrams):
-            pairs = [[_peer_to_json(peer), _base64(data)] for peer, data in datagrams]
-            return ["packets", now, link, pairs]
+        case Packets():
+            return ["packets", now, *_packets_to_json(item)]
+        case AtOnce(packets=packets):
+            return ["at once", now, *map(_packets_to_json, packets)]
+        case Backlog(packets=packets):
+            return ["backlog", now, *map(_packets_to_json, packets)]
         case LinkChanged():
             peers = [_peer_to_json(peer) for peer in item.peers]
             end = [item.is_local, item.is_stream, item.takes_unsigned, item.key, item.capacity]
@@ -172,12 +181,26 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["committed", now, through]
         case StoreFailed(text=text):
             return ["store failed", now, text]
+        case HaltNotStored(vehicle=vehicle):
+            return ["halt not stored", now, vehicle]
         case WallClock(offset=offset):
             return ["wall clock", now, offset]
         case Shutdown():
             return ["shutdown", now]
         case _:
             assert_never(item)
+
+
+def _packets_to_json(item: Packets) -> list[Any]:
+    pairs = [[_peer_to_json(peer), _base64(data)] for peer, data in item.datagrams]
+    return [item.link, pairs, *([list(item.waited)] if item.waited else [])]
+
+
+def _packets_of(link: str, datagrams: Sequence[Any], waited: Sequence[float] = ()) -> Packets:
+    pairs = [(peer_of(peer), a2b_base64(data, strict_mode=True)) for peer, data in datagrams]
+    if waited and len(waited) != len(pairs):
+        raise ValueError("so many datagrams did not wait")
+    return Packets(link, pairs, waited)
 
 
 def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool) -> Key:

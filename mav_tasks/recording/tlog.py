@@ -7,7 +7,9 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import (
+    AtOnce,
     Input,
     LinkChanged,
     Outgoing,
@@ -64,6 +66,9 @@ class Tlog:
         if isinstance(item, Packets):
             if not self._backlog.put((now, item), room_of(item)):
                 self._too_many.lose(len(item.datagrams), "too much waits to be written")
+        elif isinstance(item, AtOnce | inputs.Backlog):
+            for each in item.packets:
+                self.took_in(each, now=now)
         elif isinstance(item, WallClock | LinkChanged | PeerChanged):
             self._backlog.put((now, item), SMALL)
 

@@ -71,7 +71,7 @@ class TlogContent:
             self._heard.clear()
         when = self._when(now)
         from_vehicles = item.link in self._vehicle_links
-        for _, packet in self._intake.packets(item, self._counts, now=now):
+        for _, packet, _ in self._intake.packets(item, self._counts, now=now):
             if crc_fits(packet):
                 if from_vehicles:
                     self._heard.add(_words(packet.raw))

@@ -24,7 +24,15 @@ class NotKept:
     text: str
 
 
-Outcome = Kept | NotKept
+@dataclass(frozen=True, slots=True)
+class HaltNotKept:
+    """A halt of a vehicle is kept nowhere so far, and a restart would lose it."""
+
+    vehicle: int
+    text: str
+
+
+Outcome = Kept | NotKept | HaltNotKept
 
 
 class Store(Protocol):

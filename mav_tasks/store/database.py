@@ -14,7 +14,7 @@ from typing import Any
 from mav_tasks.errors import StoreError
 from mav_tasks.store import schema
 from mav_tasks.store.batch import Batch
-from mav_tasks.store.codec import dumps, format_of
+from mav_tasks.store.codec import Encoder, dumps, format_of
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.schema import transaction
@@ -135,6 +135,22 @@ class Database:
         if _identities(self._path) != self._files:
             raise OSError(ENOENT, GONE)  # what was just written is nowhere that it can be found
         self.last_number = batch.last
+
+    def catch_up(
+        self, events: Sequence[Event], *, last_number: int, next_id: int | None, offset: float
+    ) -> None:
+        """Write events that an earlier life could not, before any other. StoreError.
+
+        ``last_number`` is the last that the earlier life gave to any event.
+        """
+        first, encoder = last_number + 1, Encoder()
+        batch = Batch(events, first=first, encoder=encoder, format_id=self.format_id, offset=offset)
+        batch.next_id = next_id
+        try:
+            self.write(batch, utc=self.last_write or 0.0)
+        except (OSError, sqlite3.Error) as error:
+            self._connection.close()
+            raise StoreError(f"store {self._path}: {words_for(error)}") from error
 
     def is_certain(self) -> bool:
         """Bring what is in the WAL into the file itself; False: it is not all there yet.

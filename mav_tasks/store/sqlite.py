@@ -2,16 +2,18 @@
 
 import os
 import stat
-import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
+from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.folders import make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store.base import Outcome
 from mav_tasks.store.database import Database
+from mav_tasks.store.halt_keeper import HaltKeeper
+from mav_tasks.store.halt_record import HaltRecord, event_of, word_of
 from mav_tasks.store.journal import Journal
 from mav_tasks.store.lock import Lock
 from mav_tasks.store.mailbox import Mailbox
@@ -21,6 +23,7 @@ from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
 
+HALTS_LIMIT = 1.0  # s, for the last halts to be written when the server ends
 CLOSE_LIMIT = 3.0  # s, for what is left to be written when the server ends
 TRIM_AT_OPEN = 0.5  # s, for forgetting before the server serves; the rest is done beside it
 
@@ -28,7 +31,7 @@ TRIM_AT_OPEN = 0.5  # s, for forgetting before the server serves; the rest is do
 class SqliteStore:
     """Implements ``Store``. Files and folders that it makes are its user's alone.
 
-    ``wall_offset`` gives UTC minus monotonic seconds, now. StoreError, on making one, says in one
+    ``wall_offset`` gives UTC minus ``boot_time``, now. StoreError, on making one, says in one
     line why the file cannot be used: by whom it is in use, damaged, newer, read-only, disk full.
     """
 
@@ -42,14 +45,15 @@ class SqliteStore:
         self._wall_offset = wall_offset
         self._path = _real_path(Path(path))
         self.name = str(self._path)
-        lock = Lock(self._path)
-        try:
+        with ExitStack() as opened:
+            opened.callback(Lock(self._path).release)
+            record = HaltRecord(self._path)
+            opened.callback(record.close)
             database = Database(self._path)
-        except BaseException:
-            lock.release()
-            raise
-        utc = time.monotonic() + wall_offset()
-        self._ended_well = database.ended_well
+            was_complete = self._catch_up(database, record)
+            release = opened.pop_all().close
+        utc = boot_time() + wall_offset()
+        self._ended_well = database.ended_well and was_complete
         self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
         self._mail = Mailbox()
         trimmer = Trimmer(retention or Retention())
@@ -59,11 +63,17 @@ class SqliteStore:
             trimmer,
             name=self.name,
             wall_offset=wall_offset,
-            release=lock.release,
+            record=record,
+            release=release,
+        )
+        self._number = database.last_number
+        self._keeper = HaltKeeper(
+            record, self._mail, name=self.name, kept_through=lambda: database.last_number
         )
         self._is_open = True
         self._writer.trim_for(TRIM_AT_OPEN)
         self._writer.start()
+        self._keeper.start()
 
     def __repr__(self) -> str:
         return f"SqliteStore({str(self._path)!r})"
@@ -83,6 +93,14 @@ class SqliteStore:
         """Take events to be made durable; waits for nothing. ValueError once it is closed."""
         if not self._is_open:
             raise ValueError("the store is closed")
+        first, offset = self._number + 1, self._wall_offset()
+        self._number += len(events)
+        words = [
+            word_of(event, number, offset=offset) for number, event in enumerate(events, first)
+        ]
+        halts = [word for word in words if word is not None]
+        if halts:
+            self._keeper.append(halts)
         self._writer.append(tuple(events))
 
     def take_outcomes(self) -> list[Outcome]:
@@ -101,8 +119,25 @@ class SqliteStore:
         """
         if self._is_open:
             self._is_open = False
+            self._keeper.close(within=HALTS_LIMIT)
             self._writer.close(within=CLOSE_LIMIT)
+            self._keeper.report_lost()
             self._mail.close()
+
+    def _catch_up(self, database: Database, record: HaltRecord) -> bool:
+        """Bring into the database what its record of halts has beyond it; False: it lacked some."""
+        newer = record.words_after(database.last_number)
+        next_id = record.next_id_after(database.last_number)
+        if not newer and next_id is None:
+            return True
+        offset = self._wall_offset()
+        database.catch_up(
+            [event_of(word, offset=offset) for word in newer],
+            last_number=record.last_number,
+            next_id=next_id,
+            offset=offset,
+        )
+        return False
 
 
 def _real_path(path: Path) -> Path:

@@ -5,14 +5,17 @@ What fails is kept and tried again, in the same order, until it is written. Its 
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
 
+from mav_tasks.clock import boot_time
 from mav_tasks.store.base import Kept, NotKept
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.database import Database
 from mav_tasks.store.failures import is_failure, words_for
+from mav_tasks.store.halt_record import HaltRecord
 from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event
@@ -36,6 +39,7 @@ class Writer:
         *,
         name: str,
         wall_offset: Callable[[], float],
+        record: HaltRecord,
         release: Callable[[], None],
     ) -> None:
         self._database = database
@@ -43,6 +47,7 @@ class Writer:
         self._trimmer = trimmer
         self._name = name
         self._wall_offset = wall_offset
+        self._record = record
         self._release = release
         self._base = database.last_number  # events are reported as counted from here
         self._encoder = Encoder()
@@ -80,7 +85,7 @@ class Writer:
 
     def utc(self) -> float:
         """Give the time of the wall, seconds since 1970."""
-        return time.monotonic() + self._wall_offset()
+        return boot_time() + self._wall_offset()
 
     def _run(self) -> None:
         try:
@@ -128,6 +133,9 @@ class Writer:
                 return False
             time.sleep(RETRY)
         self._reported_at = None
+        if batch.next_id:
+            with suppress(OSError):  # it is of use only to who puts an older file back
+                self._record.note_next_id(batch.next_id, number=batch.last)
         self._mail.put(Kept(batch.last - self._base))
         return True
 

@@ -40,12 +40,15 @@ def test_time_comes_in_as_a_keyword() -> None:
 def test_what_can_come_into_the_engine() -> None:
     assert [kind.__name__ for kind in Input.__args__] == [
         "Packets",
+        "AtOnce",
+        "Backlog",
         "LinkChanged",
         "KeysChanged",
         "PeerChanged",
         "Congestion",
         "Committed",
         "StoreFailed",
+        "HaltNotStored",
         "SettingsChanged",
         "WallClock",
         "Shutdown",

@@ -16,6 +16,7 @@ import json
 import sys
 import time
 
+from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.links.udp import UdpLink
@@ -73,11 +74,11 @@ def _settings(*, drives: bool, is_limited: bool) -> Settings:
 
 async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
     store = (
-        SqliteStore(options.store, wall_offset=lambda: time.time() - time.monotonic())
+        SqliteStore(options.store, wall_offset=lambda: time.time() - boot_time())
         if options.store
         else MemoryStore()
     )
-    now = asyncio.get_running_loop().time()
+    now = boot_time()
     settings = _settings(drives=options.drive, is_limited=options.default_limits)
     engine = Engine(settings, now=now)
     recording = Recording(tlog=options.tlog, decisions=options.record)

@@ -62,7 +62,16 @@ class FloodGates:
     def let_in(self, item: Packets, *, now: float) -> Packets:
         """Give what is looked at of what came in."""
         gate = self._gates.get(item.link)
-        return item if gate is None else Packets(item.link, gate.let_in(item.datagrams, now=now))
+        if gate is None:
+            return item
+        if not item.waited:
+            return Packets(item.link, gate.let_in(item.datagrams, now=now))
+        kept = [
+            (each, waited)
+            for datagram, waited in zip(item.datagrams, item.waited, strict=True)
+            for each in gate.let_in([datagram], now=now)
+        ]
+        return Packets(item.link, [each for each, _ in kept], [waited for _, waited in kept])
 
 
 def stops_in(data: bytes) -> bytes:

@@ -27,6 +27,7 @@ REFUSALS = 20.0  # a second
 REFUSAL_EACH = 5.0
 MAX_REFUSALS_TOLD = 64
 BACK_AFTER = 3.5  # s of silence, after which a ground station may be another run of it
+OLD = 0.5  # s; what lay here for longer may have been sent before anything that came since
 MAX_FOLLOWED = 1000  # tasks of others that one client is told about
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 MAX_SENDERS = 32  # of which it is remembered what they have sent: there may be a router
@@ -59,6 +60,8 @@ class GcsClient:
         self.is_one_of_many = False
         #: with which the packet in hand was signed, or the last one
         self.signed_by = UNSIGNED
+        #: s, for which the packet in hand may have lain here before it was read
+        self.waited = 0.0
         self.last_source = Address(0, 0)
         #: of who sent that packet
         self.rights = NOTHING
@@ -104,6 +107,11 @@ class GcsClient:
         """The endpoint in words."""
         peer = self.outlet.peer
         return ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the packet in hand has waited while the server stood still."""
+        return self.waited > OLD
 
     def submitter(self, source: Address) -> Submitter:
         """Give who submits when a packet of ``source`` comes from here."""

@@ -30,12 +30,16 @@ SILENT = 3.0  # s, after which a client may be forgotten for another; heartbeats
 
 
 class Received(NamedTuple):
-    """A packet of a client. ``message`` is None when its id is not in the dialect."""
+    """A packet of a client. ``message`` is None when its id is not in the dialect.
+
+    ``waited``: for so many seconds it may have lain here before it was read.
+    """
 
     client: GcsClient
     packet: Packet
     message: m.Message | None
     key: Key
+    waited: float
 
 
 class GcsSide:
@@ -137,7 +141,9 @@ class GcsSide:
         """Give a client by its key, if it is still there."""
         return self._clients.get(key)
 
-    def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Received | None:
+    def receive(
+        self, link: str, peer: Peer, packet: Packet, *, waited: float = 0.0, now: float
+    ) -> Received | None:
         """Take a packet in; None if it means nothing."""
         message = None
         if packet.message_id in m.ALL:
@@ -161,11 +167,12 @@ class GcsSide:
         client.take_rights(self._rights.of(key, client.submitter(packet.source)), now=now)
         if message is not None:
             client.heard(packet, now=now)
-        return Received(client, packet, message, key)
+        return Received(client, packet, message, key, waited)
 
     def hear_out(self, received: Received, *, now: float) -> None:
         """Have a client be again who it was when it sent this packet, of several at one moment."""
         client, key = received.client, received.key
+        client.waited = received.waited
         if client.signed_by is not key:
             client.signed_by = key
             rights = self._rights.of(key, client.submitter(received.packet.source))

@@ -77,6 +77,14 @@ class Publisher:
             if isinstance(event, TaskChanged | TaskModified | TaskAdvanced | TaskWaits):
                 self.note_change(event.task_id)
 
+    def warn_of_loss(self, system_id: int, *, now: float) -> None:
+        """Tell all who listen that a vehicle stands by a word that is stored nowhere."""
+        vehicle = self._vehicles.get(system_id)
+        if vehicle is not None and vehicle.tasks.paused:
+            what = "STOP" if vehicle.tasks.is_stopped else "Pause"
+            text = f"{what} in force, but not kept: a restart loses it. See the server's log"
+            self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
+
     def _tell_ends(self, ended: set[TaskId], *, now: float) -> None:
         self._ended -= ended
         for task_id in sorted(ended):

@@ -111,10 +111,9 @@ class Commands:
         try:
             now_too = self._settings.guided == "now"
             kind = kind_of(command, vehicle.persona, runs_goals_now=now_too)
-            is_old = self._vehicles.is_old_news(now=now)
             if kind is Kind.GO:
-                require_newer(asked, is_old=is_old, now=now)
-            elif is_old and kind is Kind.MOTION:
+                require_newer(asked, now=now)
+            elif client.is_late and kind is Kind.MOTION:
                 raise Rejection(R.STALE, "it waited while the server stood still")
             self._dispatch(asked, now=now)
         except Rejection as refusal:
@@ -236,7 +235,7 @@ class Commands:
 
     def _take_in(self, asked: Asked, *, now: float) -> None:
         """A command that asks for a task; or, without a place, for a pause."""
-        if self._vehicles.may_have_waited(now=now) > GIVEN_UP:
+        if asked.client.waited > GIVEN_UP:
             words = "it waited while the server stood still: send it again"
             raise Rejection(R.STALE, words)
         is_reposition = asked.command.command == MavCmd.DO_REPOSITION

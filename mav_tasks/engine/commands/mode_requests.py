@@ -87,13 +87,13 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
         return True
 
-    def heard(self, asked: AskedByMessage, *, is_old: bool, now: float) -> None:
+    def heard(self, asked: AskedByMessage, *, now: float) -> None:
         """See to the message SET_MODE."""
         vehicle = asked.vehicle
         epoch = vehicle.tasks.halts.epoch
         try:
             if kind_of(asked.command, vehicle.persona, runs_goals_now=False) is Kind.GO:
-                require_newer(asked, is_old=is_old, now=now)
+                require_newer(asked, now=now)
             if not self.asked(asked, now=now):
                 vehicle.requests.forward(asked.packet)
                 vehicle.requests.ask_to_show(now=now)

@@ -7,6 +7,7 @@ the sticks moves a vehicle that a task is driving.
 from collections.abc import Hashable
 from math import isfinite
 
+from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
@@ -31,21 +32,17 @@ def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable) -> str:
 
 def may_pass(
     vehicle: Vehicle,
-    client: Hashable,
+    client: GcsClient,
     row: Row,
     message: m.Message | None,
-    *,
-    is_old: bool = False,
 ) -> bool:
-    """Whether a client's packet may be passed on to the vehicle; then ``passed`` is called.
-
-    ``is_old``: it may have waited for us while the vehicle stopped by itself.
-    """
-    if is_old and row.kind in (Kind.MOTION, Kind.STICKS) and not _asks_to_stand(message):
+    """Whether a client's packet may be passed on to the vehicle; then ``passed`` is called."""
+    # it may have waited for us while the vehicle stopped by itself
+    if client.is_late and row.kind in (Kind.MOTION, Kind.STICKS) and not _asks_to_stand(message):
         return False
     if row.needs_grant and message is not None and not _is_finite(message):
         return False
-    return not why_not_sent(row, vehicle, client)
+    return not why_not_sent(row, vehicle, client.key)
 
 
 def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> None:

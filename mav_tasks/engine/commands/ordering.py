@@ -60,12 +60,10 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
     return Kind.WISH
 
 
-def require_newer(asked: Asked, *, is_old: bool, now: float) -> None:
-    """Raise Rejection (STALE) for a word that lets go and is older than what holds the rover.
-
-    ``is_old``: it may have waited while the server stood still.
-    """
+def require_newer(asked: Asked, *, now: float) -> None:
+    """Raise Rejection (STALE) for a word that lets go and is older than what holds the rover."""
     halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
+    is_old = asked.client.is_late
     halts.was_asked_to_go_on()
     number = sender.line.number_of(packet.seq)
     sent_by = sender.line.sent_by(number, now=now)

@@ -57,10 +57,7 @@ class Passing:
                 if refusal is not None:
                     client.outlet.send(refusal, vehicle.server_address)
         for vehicles in behind.values():
-            is_old = self._vehicles.is_old_news(now=now)
-            refusing = [
-                v for v in vehicles if not may_pass(v, client.key, row, message, is_old=is_old)
-            ]
+            refusing = [v for v in vehicles if not may_pass(v, client, row, message)]
             too_much = (
                 self._vehicles.why_not_asked(vehicles[0], client.key, packet, message, now=now)
                 if is_observers and message is not None

@@ -306,10 +306,6 @@ class VehicleSide:
             self._agenda.touch(vehicle)
             vehicle.check_late(now=now)
 
-    def is_old_news(self, *, now: float) -> bool:
-        """Whether what is read now may have waited while this process stood still."""
-        return now < self._old_until
-
     def may_have_waited(self, *, now: float) -> float:
         """Return for how many seconds what is read now may have waited."""
         return self._stood_for if now < self._old_until else 0.0

@@ -38,7 +38,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    monkeypatch.setattr(serial, "monotonic", made)
+    monkeypatch.setattr(serial, "boot_time", made)
     return made
 
 

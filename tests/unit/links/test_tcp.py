@@ -36,7 +36,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    monkeypatch.setattr("mav_tasks.links.tcp.monotonic", made)
+    monkeypatch.setattr("mav_tasks.links.tcp.boot_time", made)
     monkeypatch.setattr(tcp_out, "monotonic", made)
     return made
 

@@ -7,8 +7,11 @@ from math import inf, nan
 import pytest
 
 from mav_tasks.engine.inputs import (
+    AtOnce,
+    Backlog,
     Committed,
     Congestion,
+    HaltNotStored,
     Input,
     LinkChanged,
     LinkSide,
@@ -46,16 +49,30 @@ PEERS = [("127.0.0.1", 14550), ("::1", 14550, 0, 0), "/dev/ttyUSB0", "rover1", 7
 INPUTS: list[Input | None] = [
     None,
     *(Packets("link", [(peer, b"\x00\xfd\xff"), (peer, b"")]) for peer in PEERS),
+    Packets("link", [("x", b"1"), ("y", b"2")], [0.1 + 0.2, 0.0]),
+    AtOnce((Packets("a", [("x", b"1")]), Packets("b", [("y", b"2")]))),
+    Backlog((Packets("a", [("x", b"1")], [20.5]), Packets("b", [(("h", 1), b"")]))),
     LinkChanged("udpin:x", LinkSide.CLIENTS, up=True, peers=(("h", 1), "x"), is_local=False),
     LinkChanged("tcp", LinkSide.VEHICLES, up=False, is_stream=True),
     PeerChanged("tcp", ("h", 1), up=True),
     Congestion("tcp", ("h", 1), is_congested=False),
     Committed(12),
     StoreFailed("the disk is full: ä \ud800"),
+    HaltNotStored(7),
     SettingsChanged(Settings(clients=Clients(priorities={"255/190": 7}, stream_interval=0))),
     WallClock(-0.0),
     Shutdown(),
 ]
+
+
+def test_packets_of_a_record_that_knows_no_waiting_are_read() -> None:
+    line = ["packets", 1.0, "link", [["x", "MQ=="]]]
+    assert input_of(line) == Packets("link", [("x", b"1")])
+
+
+def test_as_many_waits_as_datagrams() -> None:
+    with pytest.raises(ValueError, match="datagrams"):
+        input_of(["packets", 1.0, "link", [["x", "MQ=="]], [0.5, 0.5]])
 
 
 @pytest.mark.parametrize("item", INPUTS)
@@ -135,6 +152,7 @@ def test_what_was_restored_comes_back_as_it_was() -> None:
         uids={1: "x"},
         speeds={2: 0.3, 1: 1},
         homes={2: VehicleHomeSet(2, 5, 6, Frame(None, 1, -0.0, None), "a", 3.0)},
+        halt_epochs={2: 7, 1: 1},
         plans={(2, 0): (7, "[]"), (1, 1): (3, "ä")},
         parameters={"B": -0.0, "A": 1.5},
         ended_well=False,

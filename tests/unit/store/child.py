@@ -11,6 +11,7 @@ import signal
 import sys
 import time
 
+from mav_tasks.clock import boot_time
 from mav_tasks.store import Kept
 from mav_tasks.store.sqlite import SqliteStore
 from tests.unit.store.samples import submitted
@@ -21,7 +22,7 @@ UNDER_WAY = 50  # events appended and not yet kept
 def main(path: str, limit: int | None) -> None:
     """Run until killed."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # a write beyond the limit fails instead
-    store = SqliteStore(path, wall_offset=lambda: time.time() - time.monotonic())
+    store = SqliteStore(path, wall_offset=lambda: time.time() - boot_time())
     last = kept = max((task.id for task in store.load().tasks), default=0)
     before = last
     descriptor = store.fileno()

@@ -3,8 +3,10 @@
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.clients.flood_gate import MOST_STOPS, STRANGERS, FloodGate
+from mav_tasks.engine.clients.flood_gate import MOST_STOPS, STRANGERS, FloodGate, FloodGates
+from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets
 from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.settings import Clients
 from tests.kit.client import MOVE, STOP, Message, command_long, heartbeat
 
 
@@ -80,3 +82,12 @@ def test_a_datagram_of_many_packets_counts_as_many(full: FloodGate) -> None:
 @pytest.mark.parametrize("what", OTHERS)
 def test_nothing_else_is_though_it_has_the_number_of_stop_in_it(full: FloodGate, what: str) -> None:
     assert full.let_in([("somebody", OTHERS[what])], now=0.0) == []
+
+
+def test_what_is_let_in_keeps_how_long_it_waited() -> None:
+    gates = FloodGates(is_client=lambda *_: True, settings=Clients(packet_rate=20.0))
+    gates.change_link(LinkChanged("link", LinkSide.CLIENTS, up=True))
+    stop = STOPS["v2"]
+    datagrams = [("somebody", b"x"), ("somebody", bytes(2000)), ("somebody", stop)]
+    let_in = gates.let_in(Packets("link", datagrams, [3.0, 2.0, 1.0]), now=0.0)
+    assert let_in == Packets("link", [datagrams[0], datagrams[2]], [3.0, 1.0])

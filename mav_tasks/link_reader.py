@@ -1,0 +1,108 @@
+"""Reads the links that have something, and after a standstill of this process all of them at once.
+
+A word that was sent before a STOP must not count after it because its link is read later: what
+waited on several links is therefore handed over as a whole, with how long each piece had waited.
+"""
+
+import selectors
+from collections.abc import Callable, Sequence
+from itertools import chain
+from math import inf
+
+from mav_tasks.engine.inputs import LinkSide, Packets, Peer
+from mav_tasks.links.base import Link, PeerChange, PeerState, StampedLink, StreamLink
+
+DRAIN = 64  # datagrams read from one link before the others have their turn
+MOST_ROUNDS = 256  # of DRAIN from each link: more than the receive buffer of a UDP link holds
+SETTLES = 0.5  # s; for so long what stuck at the sender of a stalled stream follows what is here
+
+Note = Callable[[StreamLink, list[PeerChange]], None]
+
+
+class LinkReader:
+    """Reads without waiting; ``note`` is told what becomes of peers, in order with what they sent.
+
+    Times are those of the server's clock.
+    """
+
+    def __init__(self, sides: Sequence[tuple[Link, LinkSide]], *, note: Note) -> None:
+        self._note = note
+        self._selector = selectors.DefaultSelector()
+        for link, side in sides:
+            self._selector.register(link.fileno(), selectors.EVENT_READ, (link, side))
+        self._streams = {link.name: link for link, _ in sides if isinstance(link, StreamLink)}
+        self._gone: dict[str, tuple[StreamLink, list[PeerChange]]] = {}
+        self._stood_still = 0.0  # s, the last time that it did
+        self._settled_at = -inf
+
+    def __repr__(self) -> str:
+        return f"LinkReader({len(self._selector.get_map())} links)"
+
+    def close(self) -> None:
+        """Let the links go."""
+        self._selector.close()
+
+    def readable(self) -> tuple[list[Link], list[Link]]:
+        """Return the links that have something now, of clients and of vehicles."""
+        clients: list[Link] = []
+        vehicles: list[Link] = []
+        for key, _ in self._selector.select(0):
+            link, side = key.data
+            (clients if side is LinkSide.CLIENTS else vehicles).append(link)
+        return clients, vehicles
+
+    def read(self, link: Link, *, now: float) -> Packets:
+        """Read one link. ``note_gone`` belongs behind what is made of it."""
+        datagrams = self._received(link)
+        waited: Sequence[float] = ()
+        if now < self._settled_at and link.is_stream:
+            waited = [self._stood_still] * len(datagrams)
+            if len(datagrams) >= DRAIN:  # there is more
+                self._settled_at = now + SETTLES
+        return Packets(link.name, datagrams, waited)
+
+    def read_late(self, seconds: float, *, wall_is_even: bool, now: float) -> tuple[Packets, ...]:
+        """Read all links, clients' first, after nothing was read for so long.
+
+        The kernel's stamps say nothing if the wall clock was set meanwhile: then all of it counts
+        as being as old as it can be.
+        """
+        self._stood_still, self._settled_at = seconds, now + SETTLES
+        came: dict[str, tuple[list[tuple[Peer, bytes]], list[float]]] = {}
+        for _ in range(MOST_ROUNDS):
+            has_more = False
+            for link in chain(*self.readable()):
+                if link.name in self._gone:  # what comes after that is of another connection
+                    continue
+                if wall_is_even and isinstance(link, StampedLink):
+                    datagrams, waited = link.receive_stamped(DRAIN, longest=seconds)
+                else:
+                    datagrams = self._received(link)
+                    waited = [seconds] * len(datagrams)
+                has_more |= bool(datagrams)
+                all_datagrams, all_waited = came.setdefault(link.name, ([], []))
+                all_datagrams += datagrams
+                all_waited += waited
+            if not has_more:
+                break
+        return tuple(Packets(name, *both) for name, both in came.items() if both[0])
+
+    def note_gone(self) -> None:
+        """Tell who went after what was read of them."""
+        gone, self._gone = self._gone, {}
+        for link, changes in gone.values():
+            self._note(link, changes)
+
+    def _received(self, link: Link) -> list[tuple[Peer, bytes]]:
+        stream = self._streams.get(link.name)
+        if stream is None:
+            return link.receive(DRAIN)
+        while before := stream.take_changes():  # to tell of some may show others
+            self._note(stream, before)
+        pieces = stream.receive(DRAIN)
+        changes = stream.take_changes()
+        self._note(stream, [change for change in changes if change.state is PeerState.UP])
+        gone = [change for change in changes if change.state is not PeerState.UP]
+        if gone:
+            self._gone[link.name] = stream, gone
+        return pieces

@@ -1,0 +1,108 @@
+"""The thread that writes halts into their record, whatever the database is doing meanwhile.
+
+A halt that the record does not take may yet be kept by the database. Only when neither has it for
+GRACE seconds is it reported, and again each REPORT seconds; it is tried until it is kept.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from queue import Empty, SimpleQueue
+from threading import Thread
+
+from mav_tasks.store.base import HaltNotKept
+from mav_tasks.store.failures import words_for
+from mav_tasks.store.halt_record import HaltRecord, Word
+from mav_tasks.store.mailbox import Mailbox
+from mav_tasks.tasks.events import QueuePaused
+
+RETRY = 0.25  # s, until what failed is tried again
+GRACE = 1.0  # s, in which the database may keep what the record does not take
+REPORT = 10.0  # s, between two reports of a halt that is not kept
+
+
+class HaltKeeper:
+    """Owns the cells of vehicles in a record. Times are monotonic seconds."""
+
+    def __init__(
+        self,
+        record: HaltRecord,
+        mail: Mailbox,
+        *,
+        name: str,
+        kept_through: Callable[[], int],
+    ) -> None:
+        """``kept_through`` returns the number of the database's last event."""
+        self._record = record
+        self._mail = mail
+        self._name = name
+        self._kept_through = kept_through
+        self._waiting: SimpleQueue[Sequence[Word] | None] = SimpleQueue()
+        self._unkept: dict[int, Word] = {}  # by register
+        self._report_at: dict[int, float] = {}  # by register
+        self._is_closing = False
+        self._thread = Thread(target=self._run, name="halts", daemon=True)
+
+    def __repr__(self) -> str:
+        return f"HaltKeeper({self._record!r}, {len(self._unkept)} not kept)"
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def append(self, words: Sequence[Word]) -> None:
+        """Take words; called by the loop's thread, which waits for nothing."""
+        self._waiting.put(words)
+
+    def close(self, *, within: float) -> None:
+        """Try once more what is left, and end."""
+        self._waiting.put(None)
+        self._thread.join(within)
+
+    def report_lost(self) -> None:
+        """Report each halt that nothing has kept, when both this and the database have ended."""
+        for word in self._unkept.values():
+            if word.is_halt and word.number > self._kept_through():
+                self._mail.put(
+                    HaltNotKept(word.vehicle, f"store {self._name}: lost: {_told(word)}")
+                )
+
+    def _run(self) -> None:
+        try:
+            while not self._is_closing:
+                self._collect()
+                for word in tuple(self._unkept.values()):
+                    self._keep(word)
+        except Exception as mistake:  # noqa: BLE001 - ours: raised where the engine's are
+            self._mail.put_mistake(mistake)
+
+    def _collect(self) -> None:
+        """Wait for words, or until it is time to try again."""
+        try:
+            words = self._waiting.get(timeout=RETRY if self._unkept else None)
+            while words is not None:
+                self._unkept.update((word.key, word) for word in words)
+                words = self._waiting.get_nowait()
+            self._is_closing = True
+        except Empty:
+            pass
+
+    def _keep(self, word: Word) -> None:
+        try:
+            self._record.write(word)
+        except OSError as error:
+            if word.number > self._kept_through():
+                self._report(word, words_for(error))
+                return
+        del self._unkept[word.key]
+        self._report_at.pop(word.key, None)
+
+    def _report(self, word: Word, why: str) -> None:
+        now = time.monotonic()
+        if word.is_halt and now >= self._report_at.setdefault(word.key, now + GRACE):
+            self._report_at[word.key] = now + REPORT
+            text = f"store {self._name}: record of halts: {why}: not kept: {_told(word)}"
+            self._mail.put(HaltNotKept(word.vehicle, text))
+
+
+def _told(word: Word) -> str:
+    return str(QueuePaused(word.vehicle, word.reason, word.actor, at=0.0))

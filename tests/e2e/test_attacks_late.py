@@ -1,0 +1,83 @@
+"""Attacks D3 and D4: the machine is asleep for a while, or the process gets no time; real ones.
+
+What the engine makes of a backlog is in ``scenarios/attacks``; here is that it gets it whole.
+"""
+
+import os
+import signal
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from mav_tasks.engine.inputs import Backlog
+from mav_tasks.recording.reading import read
+from mav_tasks.recording.record_lines import input_of
+from tests.kit.processes import command_long, free_udp_ports, stand, submit, wait_for, wait_until
+
+MOVE, STOP, CONTINUE = 54000, 54003, 193
+ASLEEP = 20.0  # s
+STOPPED = 5.0  # s
+TIMEOUT = 3.0  # s, the rover's own, of setpoints
+
+
+def test_a_rover_is_not_driven_on_by_a_machine_that_was_asleep(tmp_path: Path) -> None:
+    module = ("tests.kit.asleep", str(ASLEEP))
+    with stand(tmp_path, module=module) as running:
+        link = running.connect()
+        running.drive(link, 50.0)
+        os.kill(running.server.popen.pid, signal.SIGUSR1)
+        wait_for(link, "STATUSTEXT", "'held: late' in STATUSTEXT.text", within=2)
+        wait_until(lambda: running.speed() < 0.01, within=5, what="the rover to stand")
+        assert "Traceback" not in running.server.text
+
+
+def test_time_in_which_the_machine_was_asleep_counts_for_a_deadline(tmp_path: Path) -> None:
+    module = ("tests.kit.asleep", str(ASLEEP))
+    with stand(tmp_path, module=module) as running:
+        link = running.connect()
+        submit(link, CONTINUE, 0)
+        ack = command_long(link, 54012, submit(link, MOVE, 1.0), 3, 0.5 * ASLEEP)
+        assert ack.result == 0, ack
+        os.kill(running.server.popen.pid, signal.SIGUSR1)
+        running.server.wait_for("task 1 expired", within=3)
+
+
+def test_what_waited_on_all_links_comes_as_a_whole_with_its_age(tmp_path: Path) -> None:
+    """A continue that was sent before a STOP on another link can be told from a new one."""
+    (second,) = free_udp_ports(1)
+    records = tmp_path / "records"
+    options = ("--record", str(records), "--client", f"udpin:127.0.0.1:{second}")
+    with stand(tmp_path, *options) as running:
+        link, other = running.connect(), running.heard(f"udpout:127.0.0.1:{second}", 254)
+        running.drive(link, 50.0)
+        server = running.server.popen.pid
+        os.kill(server, signal.SIGSTOP)
+        say(other, CONTINUE, 1)
+        stopped_at = monotonic()
+        wait_until(lambda: monotonic() > stopped_at + STOPPED, within=2 * STOPPED)
+        say(link, STOP)
+        os.kill(server, signal.SIGCONT)
+        wait_for(link, "COMMAND_ACK", f"COMMAND_ACK.command=={STOP}")
+        wait_until(lambda: running.speed() < 0.01, within=TIMEOUT, what="the rover to stand")
+        running.server.end()
+    (path,) = records.glob("*.decisions.gz")
+    inputs = [input_of(entry.values) for entry in read(path).entries() if entry.kind != "out"]
+    (backlog,) = [item for item in inputs if isinstance(item, Backlog)]
+    ages = {
+        command: waited
+        for packets in backlog.packets
+        for (_, data), waited in zip(packets.datagrams, packets.waited, strict=True)
+        for command in (STOP, CONTINUE)
+        if is_command(data, command)
+    }
+    assert STOPPED <= ages[CONTINUE] < STOPPED + 1.0
+    assert ages[STOP] < 0.5
+
+
+def say(link: Any, command: int, *params: float) -> None:
+    link.mav.command_long_send(1, 191, command, 0, *params, *(0.0,) * (7 - len(params)))
+
+
+def is_command(data: bytes, command: int) -> bool:
+    """Whether a datagram is a COMMAND_LONG of this number."""
+    return data[7] == 76 and data[10 + 28 : 10 + 30] == command.to_bytes(2, "little")

@@ -1,0 +1,115 @@
+"""Attack D8: STOP with a full disk, then the server is killed or ended and starts again.
+
+Processes are real. The disk is full for every file but the record of halts, whose blocks have been
+its own since it was made: what that is like on a file system is in unit/store/test_halt_record.py.
+"""
+
+import resource
+import signal
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.store.halt_record import SIZE
+from mav_tasks.tasks.lifecycle import TaskReason
+from tests.kit.processes import (
+    Process,
+    Stand,
+    command_long,
+    process,
+    stand,
+    submit,
+    wait_for,
+    wait_until,
+)
+
+MOVE, STOP, CONTINUE, ARM = 54000, 54003, 193, 400
+AUTOPILOT = (1, 1)
+DELAY = 6.0  # s, until the task that waits would drive
+GOES_ON = ("--set", "rules.on_restart=continue")
+NO_FILE_AT_ALL = 1  # byte
+
+
+def limit_files(running: Stand, largest: int) -> None:
+    """Let no write of the server go beyond this many bytes of a file."""
+    _, hard = resource.prlimit(running.server.popen.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(running.server.popen.pid, resource.RLIMIT_FSIZE, (largest, hard))
+
+
+def is_latched(path: Path) -> bool:
+    """Whether the latch of STOP is in the database."""
+    return row_of(path, "SELECT paused FROM vehicles WHERE vehicle = 1") == (TaskReason.STOPPED,)
+
+
+def row_of(path: Path, query: str) -> tuple[object, ...]:
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as file:
+        return tuple(file.execute(query).fetchone() or ())
+
+
+@contextmanager
+def restarted(running: Stand, folder: Path, *options: str) -> Iterator[Process]:
+    """Run another server on the same store and ports."""
+    serve = ["-m", "mav_tasks.cli", "serve", "--no-push", *options]
+    serve += ["--client", f"udpin:127.0.0.1:{running.client_port}"]
+    serve += ["--vehicle", f"udpout:127.0.0.1:{running.rover_port}"]
+    serve += ["--store", str(folder / "tasks.sqlite3")]
+    with process(*serve, folder=folder, name="second") as server:
+        server.wait_for("vehicle 1: found")
+        yield server
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
+def test_a_stop_outlives_a_full_disk_and_the_end_of_the_server(
+    tmp_path: Path, end: signal.Signals
+) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    with stand(tmp_path, *GOES_ON, serve_store=str(path)) as running:
+        link = running.connect()
+        submit(link, MOVE, 5.0, 0, 0, 11, 0, DELAY)
+        limit_files(running, SIZE)
+        assert command_long(link, STOP).result == 0
+        wait_until(lambda: "the disk" in running.server.text, within=5, what="the full disk")
+        running.server.end(end)
+        with restarted(running, tmp_path, *GOES_ON):
+            link = running.connect()
+            refused = command_long(link, ARM, 1, target=AUTOPILOT)
+            began = running.truth()[-1]
+            wait_until(
+                lambda: running.truth()[-1]["time"] > began["time"] + DELAY + 4.0,
+                within=30,
+                what="the time at which it would have driven",
+            )
+            assert running.truth()[-1]["north"] == pytest.approx(began["north"], abs=0.01)
+            assert (refused.result, refused.result_param2) == (1, TaskReason.STOPPED)
+            assert command_long(running.connect(), CONTINUE, 1).result == 0  # the way out
+            wait_until(lambda: running.speed() > 0.2, within=15, what="the rover to drive")
+
+
+def test_a_continue_outlives_a_full_disk_too(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    with stand(tmp_path, *GOES_ON, serve_store=str(path)) as running:
+        link = running.connect()
+        assert command_long(link, STOP).result == 0
+        wait_until(lambda: is_latched(path), within=5, what="the latch on the disk")
+        limit_files(running, SIZE)
+        assert command_long(link, CONTINUE, 1).result == 0
+        wait_until(lambda: "the disk" in running.server.text, within=5, what="the full disk")
+        running.server.end(signal.SIGKILL)
+        with restarted(running, tmp_path, *GOES_ON):
+            submit(running.connect(), MOVE, 5.0)
+            wait_until(lambda: running.speed() > 0.2, within=15, what="the rover to drive")
+
+
+def test_a_stop_that_nothing_keeps_is_said_to_everybody(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    with stand(tmp_path, serve_store=str(path)) as running:
+        link, other = running.connect(), running.connect(source_system=254)
+        limit_files(running, NO_FILE_AT_ALL)
+        assert command_long(link, STOP).result == 0
+        for each in (link, other):
+            wait_for(each, "STATUSTEXT", "'STOP in force, but not kept' in STATUSTEXT.text")
+        running.server.end(signal.SIGTERM)
+    assert row_of(path, "SELECT ended_well FROM meta") == (0,)
