@@ -11,13 +11,12 @@ from math import inf
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
-from mav_tasks.engine.vehicles.frame_monitor import Seen
 from mav_tasks.engine.vehicles.hold_before import HoldBefore
 from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.known_profile import KnownProfile
 from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
-from mav_tasks.engine.vehicles.motion_monitor import is_finite
 from mav_tasks.engine.vehicles.own_failsafes import News, OwnFailsafes
+from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
 from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.vehicles.start_mark import StartMark
@@ -237,18 +236,17 @@ class Vehicle:
                 self._note_component(component_id, now=now)
         elif isinstance(message, m.Heartbeat):
             self._receive_heartbeat(message, now=now)
-        elif isinstance(message, m.Attitude | m.LocalPositionNed):
-            if not is_finite(message):
-                return
-            # read after a delay, it may have come at any time since
-            self.where.motion.receive(message, now=min(now, self._clock.next_at))
-            if self.where.motion.rebooted:
+        elif isinstance(message, Stamped):
+            due = self._clock.next_at  # a setpoint that is late is followed by a zero
+            if self.where.receive(message, now=now, not_after=due) is Heard.RESTART:
                 self._rebooted(booted_at=now - message.time_boot_ms / 1000, now=now)
-            self._receive_of_frame(message, now=now)
+                self.where.receive(message, now=now, not_after=due)
+            self._look_at_frame(now=now)
             if not self._clock.is_running and not self.tasks.is_idle:
                 self.step(now=now)
-        elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt):
-            self._receive_of_frame(message, now=now)
+        elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):
+            self.where.frame.receive(message)
+            self._look_at_frame(now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
         elif isinstance(message, m.MissionCurrent):
@@ -303,8 +301,7 @@ class Vehicle:
         elif news:
             self._book.record(VehicleSeen(self.system_id, news, now))
 
-    def _receive_of_frame(self, message: Seen, *, now: float) -> None:
-        self.where.frame.receive(message, now=now)
+    def _look_at_frame(self, *, now: float) -> None:
         if self.where.frame.changed:
             self.where.frame.changed = False
             self._note("has another origin", now=now)

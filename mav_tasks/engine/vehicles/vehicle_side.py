@@ -4,6 +4,7 @@ Any bytes may come in here; only a packet with a good CRC from a known or newly 
 changes anything.
 """
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
@@ -26,6 +27,8 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 
+NANO = 1e9  # TIMESYNC is in ns
+ASKED = 64  # questions for the time, one a second and link, to which an answer may come
 OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
 MAX_PEERS = 256  # endpoints on one vehicle link
 BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
@@ -53,6 +56,7 @@ USED = frozenset(
         m.RcChannels.id,
         m.Statustext.id,
         m.SysStatus.id,
+        m.Timesync.id,
     }
     | SETPOINTS
 )
@@ -92,6 +96,8 @@ class VehicleSide:
         self._agenda = Agenda()
         self._old_until = -inf
         self._noted: set[str] = set()
+        self._answer: Packet | None = None  # the last that told the time
+        self._asked: deque[int] = deque(maxlen=ASKED)  # what vehicles were asked the time with, ns
         self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
         #: heartbeats of a known vehicle's id from another place: when the first one came
         self._rivals: dict[tuple[int, str, Peer], float] = {}
@@ -231,6 +237,11 @@ class VehicleSide:
             and self._moves(vehicle, link, peer, now=now)
         ):
             return None
+        if isinstance(message, m.Timesync) and message.ts1 in self._asked:
+            self._answer = packet
+            if message.tc1 and packet.component_id == AUTOPILOT:
+                offset = vehicle.where.clock.offset
+                offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if packet.component_id == AUTOPILOT:
             vehicle.count(packet.seq)
         vehicle.requests.intervals.heard(packet.message_id)
@@ -241,6 +252,10 @@ class VehicleSide:
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
         return vehicle
+
+    def is_answer_to_us(self, packet: Packet) -> bool:
+        """Whether what was just received tells the time to us; a client would misread it."""
+        return packet is self._answer
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
@@ -265,8 +280,11 @@ class VehicleSide:
         source = self.our_address
         for link in self._links.values():
             if link.heartbeat.is_due(now=now):
+                question = round(now * NANO)
+                self._asked.append(question)
                 for outlet in link.outlets.values():
                     outlet.send(gcs_heartbeat(), source)
+                    outlet.send(m.Timesync(0, question), source)
         for system_id in self._agenda.take_due(now=now):
             vehicle = self.get(system_id)
             if vehicle is not None:
