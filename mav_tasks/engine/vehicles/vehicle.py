@@ -260,7 +260,9 @@ class Vehicle:
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.RcChannels):
-            if self._sticks.look(message, armed=self.armed) and self.control.is_engaged:
+            sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
+            moved = self._sticks.look(message, armed=self.armed, sent_at=sent_at)
+            if moved and self.control.is_engaged:
                 self._stick_moved(now=now)
         elif isinstance(message, m.AutopilotVersion):
             identity = identity_of(message)
@@ -689,7 +691,7 @@ class Vehicle:
         self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
         if (
             self.persona.brakes_by_setpoints
-            and self._sticks.throttle
+            and self._sticks.throttle(now=now)
             and self._guard.is_fresh(now=now)
         ):
             self.step(now=now)
@@ -943,7 +945,7 @@ class Vehicle:
         rolls = persona.brakes_by_speed_loop and self._guard.brakes(
             rolls_out=persona.rolls_out, now=now
         )
-        self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle)
+        self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle(now=now))
 
     def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         """See that it stands when it is told to, and drives no faster than it is told to."""
