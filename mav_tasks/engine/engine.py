@@ -315,7 +315,9 @@ class Engine:
             if vehicle is not None:
                 if self._restarts.begins_anew(packet, now=now):
                     self._gcs.continue_numbers(packet)
-                if packet.message_id == m.CommandAck.id or self._reports.replaces(packet):
+                is_ours = self._vehicles.is_answer_to_us(packet)
+                is_withheld = is_ours or packet.message_id == m.CommandAck.id
+                if is_withheld or self._reports.replaces(packet):
                     self._publisher.withhold(packet)
                 else:
                     self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)

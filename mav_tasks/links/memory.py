@@ -5,9 +5,11 @@ Deterministic: the same seed and the same traffic give the same losses.
 
 import heapq
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
 from random import Random
+from typing import Protocol
 
 from mav_tasks.links.base import Peer
 
@@ -25,12 +27,58 @@ class Conditions:
     duplication: float = 0.0
 
 
+class Buffer(Protocol):
+    """What datagrams wait in, on the way from one link to another."""
+
+    def leaves_at(self, size: int, *, now: float) -> float | None:
+        """Give when a datagram of so many bytes leaves it; None: it is dropped."""
+        ...
+
+
+class Radio:
+    """A radio with a buffer: what does not fit through now waits in order, up to the buffer."""
+
+    def __init__(self, *, bytes_per_second: float, buffer: int) -> None:
+        self._rate = bytes_per_second
+        self._buffer = buffer  # bytes
+        self._free_at = 0.0
+
+    def __repr__(self) -> str:
+        return f"Radio({self._rate} bytes/s, free at {self._free_at:.3f})"
+
+    def leaves_at(self, size: int, *, now: float) -> float | None:
+        """Give when a datagram is through; None: the buffer is full."""
+        begins_at = max(now, self._free_at)
+        if (begins_at - now) * self._rate + size > self._buffer:
+            return None
+        self._free_at = begins_at + size / self._rate
+        return self._free_at
+
+
+class Queue:
+    """A delay that grows and shrinks, while nothing overtakes anything."""
+
+    def __init__(self, delay: Callable[[float], float]) -> None:
+        self._delay = delay  # s, of what is sent at a time
+        self._last_at = 0.0
+
+    def __repr__(self) -> str:
+        return f"Queue(last at {self._last_at:.3f})"
+
+    def leaves_at(self, size: int, *, now: float) -> float:  # noqa: ARG002
+        """Give when a datagram is through; never before the one in front of it."""
+        self._last_at = max(self._last_at, now + self._delay(now))
+        return self._last_at
+
+
 class MemoryNet:
     """Carries datagrams between its links; ``now`` is the caller's to move forward."""
 
     def __init__(self, *, seed: int = 0, conditions: Conditions | None = None) -> None:
         self.now = 0.0
         self.conditions = conditions or Conditions()
+        #: by source and target, where datagrams wait for each other
+        self.buffers: dict[tuple[str, str], Buffer] = {}
         self._random = Random(seed)
         self._links: dict[str, MemoryLink] = {}
         self._numbered: list[MemoryLink] = []
@@ -54,12 +102,15 @@ class MemoryNet:
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Put a datagram under way, or lose it, or double it."""
-        how = self.conditions_between(source, target)
+        how, buffer = self.conditions_between(source, target), self.buffers.get((source, target))
         copies = 0 if self._random.random() < how.loss else 1
         if copies and self._random.random() < how.duplication:
             copies = 2
         for _ in range(copies):
-            at = self.now + how.delay + self._random.random() * how.jitter
+            left_at = self.now if buffer is None else buffer.leaves_at(len(data), now=self.now)
+            if left_at is None:
+                continue
+            at = left_at + how.delay + self._random.random() * how.jitter
             heapq.heappush(self._under_way, (at, next(self._order), source, target, data))
 
     def next_arrival(self) -> float | None:

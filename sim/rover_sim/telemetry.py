@@ -20,6 +20,7 @@ from rover_sim.realism import Realism, Wire
 from rover_sim.sticks import Sticks
 
 MAVLINK_VERSION = 3
+OVERFLOW = 1 << 32  # ms; time_boot_ms begins anew after 49.7 days
 UNKNOWN_U16 = 65535
 # MAV_SYS_STATUS_SENSOR: gyro, accelerometer, compass, GPS, yaw and position control, motors, AHRS,
 # pre-arm check. MAVSDK takes "healthy" from these.
@@ -94,7 +95,10 @@ class Telemetry:
 
     def build(self, message_id: int, estimate: Estimate, *, now: float) -> Message | None:
         """Give the message of this moment; None if there is nothing to say."""
-        return self._builders[message_id](estimate, self.boot_ms(now))
+        message = self._builders[message_id](estimate, self.boot_ms(now))
+        if message is not None and hasattr(message, "time_boot_ms"):
+            message.time_boot_ms %= OVERFLOW
+        return message
 
     def boot_ms(self, now: float) -> int:
         """Milliseconds since this autopilot started."""

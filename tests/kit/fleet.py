@@ -110,7 +110,7 @@ class FleetNet(ObservedNet):
                 for observer in self._all_observers():
                     observer.asked(self.now, data, peer=source)
             for observer in self.observers_at.get(source, ()):
-                observer.heard(self.now, data)
+                observer.heard(self.now, data, sent_at=self.now)
         self._unread.clear()
 
     def _all_observers(self) -> list[Observer]:

@@ -4,7 +4,8 @@ Rules about what the server does are judged when a packet leaves it, against wha
 then: a bad net is not its fault. protocol.md, sections 6 and 7:
 
 - a setpoint is finite; one that moves, whoever sent it, goes only to a rover seen armed; ours only
-  in our mode, after a zero in that mode, on position and attitude not older than 0.3 s
+  in our mode, after a zero in that mode, on position and attitude that came not more than 0.3 s
+  ago, and left the rover not more than 0.4 s ago: its clock is known to a tenth of a second
 - order, ArduPilot: mode, zero, arm, motion; no arming in any other mode. PX4: HOLD, arm, a second
   of zeros, mode, motion; no arming but in HOLD
 - control is taken only from HOLD, from our mode, or from MANUAL while disarmed
@@ -31,6 +32,7 @@ from tests.kit.wishes import Latches, Wish, Wishes
 SERVER = (250, 191)
 
 FRESH = 0.3  # s
+SENT = 0.4  # s
 GAP = 0.12  # s between setpoints while driving: 20 Hz, one tick missed
 BURST = 4  # moving setpoints in 0.1 s
 ENGAGED = 0.2  # s since the last setpoint: the server is driving
@@ -137,6 +139,8 @@ class Observer:
     _unready_since: float | None = None  # of heartbeats that say so, one after the other
     _position_at: float = -1e9
     _attitude_at: float = -1e9
+    _position_sent_at: float = -1e9
+    _attitude_sent_at: float = -1e9
     _setpoint_at: float = -1e9
     _zeros_since: float = 1e9
     _in_row: int = 0  # of the server's setpoints
@@ -179,7 +183,7 @@ class Observer:
         elif kind in BY_HAND and _off_centre(message):
             self._take_over(now, zeros=1)
 
-    def heard(self, now: float, data: bytes) -> None:
+    def heard(self, now: float, data: bytes, *, sent_at: float) -> None:
         """A datagram from the vehicles' side reaches the server."""
         message = self._decode(data)
         if message is None or self._is_overtaken(now, data):
@@ -193,8 +197,10 @@ class Observer:
                 self._see_heartbeat(now, message)
             elif kind == "LOCAL_POSITION_NED":
                 self._position_at = now
+                self._position_sent_at = max(self._position_sent_at, sent_at)
             elif kind == "ATTITUDE":
                 self._attitude_at = now
+                self._attitude_sent_at = max(self._attitude_sent_at, sent_at)
 
     def _is_overtaken(self, now: float, data: bytes) -> bool:
         """Whether it is a heartbeat of the rover, and a newer one came before: it is history."""
@@ -387,6 +393,8 @@ class Observer:
             self._violation(now, "moving setpoint before a zero in this mode")
         if now - min(self._position_at, self._attitude_at) > FRESH:
             self._violation(now, "moving setpoint on stale data")
+        if now - min(self._position_sent_at, self._attitude_sent_at) > SENT:
+            self._violation(now, "moving setpoint on data that were sent too long ago")
 
     def _check_rate(self, now: float, *, moves: bool) -> None:
         gap = now - self._setpoint_at if self._moved_last else 0.0

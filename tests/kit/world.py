@@ -42,6 +42,9 @@ COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
 
 INT_COMMAND, MODE_COMMAND = 75, 76  # COMMAND_INT, COMMAND_LONG
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
+HEADER = 10  # bytes
+MEASURED = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
+REMEMBERED = 10_000  # of these: 20 s of ten rovers
 
 #: shows each change at once, so that a scenario's times are those of the server alone; what a
 #: second of not knowing does is test_one_hertz's
@@ -420,6 +423,7 @@ class ObservedNet(MemoryNet):
         self.observers: dict[str, Observer] = {}
         self.is_server_away = False
         self._unread: list[tuple[str, str, bytes]] = []
+        self._sent_at: dict[bytes, float] = {}  # what rovers said of their motion, the newest last
         #: whether rovers are reached by requests for a heartbeat; else they show each second only
         self.shows_on_request = True
         #: loses (source, target, datagram) for which it says so
@@ -431,6 +435,10 @@ class ObservedNet(MemoryNet):
             self.observers[target].sent(self.now, data)
         elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
             self.observers[f"rover{data[5]}"].answered(self.now, data)
+        if source in self.observers and len(data) > HEADER and data[7] in MEASURED:
+            self._sent_at.setdefault(data, self.now)
+            if len(self._sent_at) > REMEMBERED:
+                del self._sent_at[next(iter(self._sent_at))]
         hidden = not self.shows_on_request and asks_for_heartbeat(data)
         if hidden or self.loses(source, target, data):
             return
@@ -458,7 +466,8 @@ class ObservedNet(MemoryNet):
                 if link == CLIENT_LINK:
                     observer.asked(self.now, data, peer=source)
                 elif source == name or source not in self.observers:
-                    observer.heard(self.now, data)
+                    sent_at = self._sent_at.get(data, self.now)
+                    observer.heard(self.now, data, sent_at=sent_at)
         self._unread.clear()
 
 

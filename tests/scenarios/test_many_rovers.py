@@ -47,7 +47,7 @@ from tests.kit.world import near_pose, twin_of
 
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
 PRIORITY = 1
-HEARTBEAT = 0
+HEARTBEAT, TIMESYNC = 0, 111
 OFF = Faults(silent=True, deaf=True)
 GOOD = Conditions()
 BRAKING = 3.5  # s, from the speeds driven here to a stand
@@ -632,7 +632,7 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
     assert notes == ["another of this id at twin: ignored"]
     assert any("another of this id" in text for text in fleet.client.texts())
     assert (twin.truth.north, twin.truth.east) == (50.0, 5.0)
-    assert {data[7] for _, data in fleet.watched.towards["twin"]} == {HEARTBEAT}
+    assert {data[7] for _, data in fleet.watched.towards["twin"]} == {HEARTBEAT, TIMESYNC}
     assert max(m.x for m in fleet.client.of_type("LOCAL_POSITION_NED")) < 3.0
 
     mine, before = diary_of(fleet, 1), diary_of(alone, 1)
@@ -780,7 +780,7 @@ def queue_statuses(client: FakeClient) -> list[QueueStatus]:
     """Give those that a client has received."""
     found = []
     for packet in client.of_id(TASK_QUEUE_STATUS):
-        values = struct.unpack("<5I14I2B", packet.payload.ljust(78, b"\0"))
+        values = struct.unpack("<5I14I2BI", packet.payload.ljust(82, b"\0"))
         found.append(QueueStatus(packet.source[0], values[2], values[3], values[5:19], values[19]))
     return found
 

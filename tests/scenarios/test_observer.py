@@ -36,14 +36,15 @@ class Story:
 
     def rover(self, mode: int, *, armed: bool) -> "Story":
         beat = common.MAVLink_heartbeat_message(10, 3, 129 if armed else 1, mode, 4, 3)
-        self.observer.heard(self.now, packed(beat, ROVER))
+        self.observer.heard(self.now, packed(beat, ROVER), sent_at=self.now)
         return self
 
-    def position(self) -> "Story":
+    def position(self, *, age: float = 0.0) -> "Story":
+        sent_at = self.now - age
         place = common.MAVLink_local_position_ned_message(1, 0, 0, 0, 0, 0, 0)
-        self.observer.heard(self.now, packed(place, ROVER))
+        self.observer.heard(self.now, packed(place, ROVER), sent_at=sent_at)
         heading = common.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0)
-        self.observer.heard(self.now, packed(heading, ROVER))
+        self.observer.heard(self.now, packed(heading, ROVER), sent_at=sent_at)
         return self
 
     def sends(self, message: object, source: tuple[int, int] = SERVER) -> "Story":
@@ -171,6 +172,10 @@ SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
     "stale": (
         "stale data",
         lambda s: [s.driving()] + [s.later(0.05).moves() for _ in range(7)],
+    ),
+    "stale when it came": (
+        "sent too long ago",
+        lambda s: [s.driving()] + [s.later(0.05).position(age=1.0).moves() for _ in range(9)],
     ),
     "gap": ("gap of .* while", lambda s: s.driving().later(0.2).position().moves()),
     "long gap": ("gap of .* then", lambda s: s.driving().later(0.4).position().moves()),

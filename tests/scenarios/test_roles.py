@@ -48,6 +48,7 @@ CHANGE_SPEED, MISSION_START, SET_FENCE, REBOOT = 178, 300, 207, 246
 WAYPOINT, RELAY, FENCE_CIRCLE = 16, 181, 5003
 FENCE = 1  # MAV_MISSION_TYPE
 MISSION_DENIED = 14  # MAV_MISSION_RESULT
+PING = 4
 OBSERVER, SUBMITTER, OTHER, OPERATOR = 9, 10, 11, 12  # system ids
 #: of the client that every world has
 ADDRESSES = {
@@ -167,7 +168,8 @@ def test_what_it_sends_without_an_answer_goes_nowhere(with_roles: MakeRoles) -> 
         observer.send(message)
         world.run(0.1)
     names = {name for name, number in IDS.items() if number in towards}
-    assert names <= {"HEARTBEAT", "COMMAND_LONG", "COMMAND_INT", "MISSION_REQUEST_LIST"}
+    ours = {"HEARTBEAT", "TIMESYNC", "COMMAND_LONG", "COMMAND_INT", "MISSION_REQUEST_LIST"}
+    assert names <= ours
     assert world.rover.autopilot.mode is mode
     assert world.stands()
 
@@ -396,10 +398,10 @@ def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     passed = world.passed_on(who)
     world.run(1.2)
     client.send(common.MAVLink_mission_ack_message(1, 190, 15, 1))
-    client.send(common.MAVLink_timesync_message(12345, 6789))
+    client.send(common.MAVLink_ping_message(12345, 6789, 0, 0))
     client.send(common.MAVLink_param_request_list_message(1, 1))
     world.run(0.2)
-    assert not passed.intersection((MISSION_ACK, 111, 21))
+    assert not passed.intersection((MISSION_ACK, PING, 21))
 
 
 @pytest.mark.parametrize(("opcode", "passes"), [(1, True), (2, False), (4, True), (7, False)])

@@ -44,7 +44,11 @@ class FrameMonitor:
         """Where the frame begins on earth, if that is known."""
         return self._origin
 
-    def receive(self, message: Seen, *, now: float) -> None:
+    def boot(self, booted_at: float, *, now: float) -> None:
+        """Take note of when the vehicle was started, by its clock."""
+        self._booted_at, self._heard_at = booted_at, now
+
+    def receive(self, message: Seen) -> None:
         """Take a message in; one with an impossible place is dropped."""
         match message:
             case m.GpsGlobalOrigin():
@@ -56,7 +60,6 @@ class FrameMonitor:
                 self._work_out()
             case m.LocalPositionNed():
                 self._local = message
-                self._booted_at, self._heard_at = now - message.time_boot_ms / 1000, now
                 self._work_out()
 
     def frame(self) -> Frame | None:

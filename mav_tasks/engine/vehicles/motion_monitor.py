@@ -1,14 +1,16 @@
-"""A vehicle's own position, heading and standstill, from LOCAL_POSITION_NED and ATTITUDE."""
+"""A vehicle's own position, heading and standstill, from LOCAL_POSITION_NED and ATTITUDE.
+
+All of it is as old as the vehicle's own clock says, however long it was under way.
+"""
 
 from math import cos, hypot, inf, isfinite, sin
 
+from mav_tasks.engine.vehicles.sender_clock import Heard, SenderClock
 from mav_tasks.engine.vehicles.standstill import Standstill
 from mav_tasks.mavlink.messages import Attitude, LocalPositionNed
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.task import Pose
-
-REBOOT = 1000  # ms that a vehicle's clock must go back to mean a restart, not reordering
 
 
 class MotionMonitor:
@@ -22,32 +24,42 @@ class MotionMonitor:
         self._attitude_at = 0.0
         self._moved_at: float | None = None
         self._latest: Motion | None = None  # made of what came last, when it is asked for
-        self._last_boot_ms: dict[int, int] = {}
+        #: what its messages say of when they were made
+        self.clock = SenderClock()
         #: where it was lately, and what it does at rest
         self.standstill = Standstill()
         self._doubted_until = -inf
-        self.rebooted = False
 
     def apply(self, watch: Watch) -> None:
         """Take new settings."""
         self._watch = watch
 
-    def receive(self, message: Attitude | LocalPositionNed, *, now: float) -> None:
-        """Take a message in; one that is not finite, or older than the last, is dropped."""
-        if not is_finite(message) or not self._is_newer(message):
-            return
+    def receive(
+        self, message: Attitude | LocalPositionNed, *, now: float, not_after: float = inf
+    ) -> Heard:
+        """Take a message in, and return what it is; one that is not finite is dropped, too.
+
+        What is read late counts as if it had been made at ``not_after`` at the latest.
+        """
+        if not is_finite(message):
+            return Heard.OLD
+        heard = self.clock.hear(message, now=now)
+        if heard is not Heard.NEWS:
+            return heard
+        sent_at = min(self.clock.sent_at(message.time_boot_ms, now=now), not_after)
         self._latest = None
         if isinstance(message, LocalPositionNed):
             if not self._is_frozen(message):
-                self._position_at = now
+                self._position_at = sent_at
             self._position = message
         else:
-            self._attitude, self._attitude_at = message, now
+            self._attitude, self._attitude_at = message, sent_at
         if self._moved_at is None or not self._is_slow():
             self._moved_at = now
         motion = self.latest()
         if motion is not None and isinstance(message, LocalPositionNed):
-            self.standstill.receive(motion, now=now)
+            self.standstill.receive(motion, now=sent_at)
+        return heard
 
     def latest(self) -> Motion | None:
         """Give the last measured motion, or None before both messages have come."""
@@ -96,23 +108,7 @@ class MotionMonitor:
         self._position = self._attitude = self._latest = None
         self._moved_at = None
         self.standstill.forget()
-        self._last_boot_ms.clear()
-        self.rebooted = False
-
-    def _is_newer(self, message: Attitude | LocalPositionNed) -> bool:
-        last = self._last_boot_ms.get(message.id)
-        if last is None:
-            self._last_boot_ms[message.id] = message.time_boot_ms
-            return True
-        if last == message.time_boot_ms:
-            return False  # the same again, by a net or an estimator that repeats it
-        back = (last - message.time_boot_ms) & 0xFFFFFFFF  # the field overflows after 49 days
-        if 0 < back < 0x80000000:
-            if back < REBOOT:
-                return False
-            self.rebooted = True
-        self._last_boot_ms[message.id] = message.time_boot_ms
-        return True
+        self.clock = SenderClock()
 
     def _is_frozen(self, message: LocalPositionNed) -> bool:
         """Whether it says that it moves, and yet is where it was: an estimator that stands still.

@@ -11,13 +11,12 @@ from math import inf
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
-from mav_tasks.engine.vehicles.frame_monitor import Seen
 from mav_tasks.engine.vehicles.hold_before import HoldBefore
 from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.known_profile import KnownProfile
 from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
-from mav_tasks.engine.vehicles.motion_monitor import is_finite
 from mav_tasks.engine.vehicles.own_failsafes import News, OwnFailsafes
+from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
 from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.vehicles.start_mark import StartMark
@@ -238,18 +237,17 @@ class Vehicle:
                 self._note_component(component_id, now=now)
         elif isinstance(message, m.Heartbeat):
             self._receive_heartbeat(message, now=now)
-        elif isinstance(message, m.Attitude | m.LocalPositionNed):
-            if not is_finite(message):
-                return
-            # read after a delay, it may have come at any time since
-            self.where.motion.receive(message, now=min(now, self._clock.next_at))
-            if self.where.motion.rebooted:
+        elif isinstance(message, Stamped):
+            due = self._clock.next_at  # a setpoint that is late is followed by a zero
+            if self.where.receive(message, now=now, not_after=due) is Heard.RESTART:
                 self._rebooted(booted_at=now - message.time_boot_ms / 1000, now=now)
-            self._receive_of_frame(message, now=now)
+                self.where.receive(message, now=now, not_after=due)
+            self._look_at_frame(now=now)
             if not self._clock.is_running and not self.tasks.is_idle:
                 self.step(now=now)
-        elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt):
-            self._receive_of_frame(message, now=now)
+        elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):
+            self.where.frame.receive(message)
+            self._look_at_frame(now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
         elif isinstance(message, m.MissionCurrent):
@@ -263,7 +261,9 @@ class Vehicle:
         elif isinstance(message, m.ParamValue):
             self._receive_parameter(message, now=now)
         elif isinstance(message, m.RcChannels):
-            if self._sticks.look(message, armed=self.armed) and self.control.is_engaged:
+            sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
+            moved = self._sticks.look(message, armed=self.armed, sent_at=sent_at)
+            if moved and self.control.is_engaged:
                 self._stick_moved(now=now)
         elif isinstance(message, m.AutopilotVersion):
             identity = identity_of(message)
@@ -304,8 +304,7 @@ class Vehicle:
         elif news:
             self._book.record(VehicleSeen(self.system_id, news, now))
 
-    def _receive_of_frame(self, message: Seen, *, now: float) -> None:
-        self.where.frame.receive(message, now=now)
+    def _look_at_frame(self, *, now: float) -> None:
         if self.where.frame.changed:
             self.where.frame.changed = False
             self._note("has another origin", now=now)
@@ -721,7 +720,7 @@ class Vehicle:
         self.tasks.pause(TaskReason.TAKEOVER, actor=f"vehicle {self.system_id}", now=now)
         if (
             self.persona.brakes_by_setpoints
-            and self._sticks.throttle
+            and self._sticks.throttle(now=now)
             and self._guard.is_fresh(now=now)
         ):
             self.step(now=now)
@@ -987,7 +986,7 @@ class Vehicle:
         rolls = persona.brakes_by_speed_loop and self._guard.brakes(
             rolls_out=persona.rolls_out, now=now
         )
-        self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle)
+        self.control.posture = Posture(yaw, rolls=rolls, stick=self._sticks.throttle(now=now))
 
     def _guard_motion(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         """See that it stands when it is told to, and drives no faster than it is told to."""

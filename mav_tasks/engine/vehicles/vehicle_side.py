@@ -4,6 +4,7 @@ Any bytes may come in here; only a packet with a good CRC from a known or newly 
 changes anything.
 """
 
+from collections import deque
 from collections.abc import Hashable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
@@ -29,6 +30,8 @@ from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.lifecycle import TaskReason
 
+NANO = 1e9  # TIMESYNC is in ns
+ASKED = 64  # questions for the time, one a second and link, to which an answer may come
 OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
 MAX_PEERS = 256  # endpoints on one vehicle link
 MOST_NAMED = 5  # tasks in one text
@@ -57,6 +60,7 @@ USED = frozenset(
         m.RcChannels.id,
         m.Statustext.id,
         m.SysStatus.id,
+        m.Timesync.id,
     }
     | SETPOINTS
 )
@@ -98,6 +102,8 @@ class VehicleSide:
         self._old_until = -inf
         self._stood_for = 0.0  # s, that this process stood still before that
         self._noted: set[str] = set()
+        self._answer: Packet | None = None  # the last that told the time
+        self._asked: deque[int] = deque(maxlen=ASKED)  # what vehicles were asked the time with, ns
         self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
         #: heartbeats of a known vehicle's id from another place: when the first one came
         self._rivals: dict[tuple[int, str, Peer], float] = {}
@@ -285,6 +291,11 @@ class VehicleSide:
             and self._moves(vehicle, link, peer, now=now)
         ):
             return None
+        if isinstance(message, m.Timesync) and message.ts1 in self._asked:
+            self._answer = packet
+            if message.tc1 and packet.component_id == AUTOPILOT:
+                offset = vehicle.where.clock.offset
+                offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if packet.component_id == AUTOPILOT:
             vehicle.count(packet.seq)
         vehicle.requests.intervals.heard(packet.message_id)
@@ -295,6 +306,10 @@ class VehicleSide:
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
         return vehicle
+
+    def is_answer_to_us(self, packet: Packet) -> bool:
+        """Whether what was just received tells the time to us; a client would misread it."""
+        return packet is self._answer
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
@@ -320,8 +335,11 @@ class VehicleSide:
         source = self.our_address
         for link in self._links.values():
             if link.heartbeat.is_due(now=now):
+                question = round(now * NANO)
+                self._asked.append(question)
                 for outlet in link.outlets.values():
                     outlet.send(gcs_heartbeat(), source)
+                    outlet.send(m.Timesync(0, question), source)
         for system_id in self._agenda.take_due(now=now):
             vehicle = self.get(system_id)
             if vehicle is not None:

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 from mav_tasks.engine.vehicles.frame_monitor import FrameMonitor
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.sender_clock import Heard, SenderClock, Stamped
+from mav_tasks.mavlink.messages import GlobalPositionInt
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.legs import distance
@@ -21,6 +23,25 @@ class Whereabouts:
 
     def __repr__(self) -> str:
         return f"Whereabouts({self.motion.latest()}, origin={self.origin})"
+
+    @property
+    def clock(self) -> SenderClock:
+        """Return the vehicle's own clock."""
+        return self.motion.clock
+
+    def receive(self, message: Stamped, *, now: float, not_after: float) -> Heard:
+        """Take a message in, and return what it is; what is old is dropped.
+
+        What is read late counts as if it had been made at ``not_after`` at the latest.
+        """
+        if isinstance(message, GlobalPositionInt):
+            heard = self.clock.hear(message, now=now)
+        else:
+            heard = self.motion.receive(message, now=now, not_after=not_after)
+        if heard is Heard.NEWS:
+            self.frame.boot(self.clock.booted_at(now=now), now=now)
+            self.frame.receive(message)
+        return heard
 
     def forget(self) -> None:
         """It has restarted: nothing of before is true any more."""

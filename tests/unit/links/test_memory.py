@@ -3,7 +3,7 @@
 import pytest
 
 from mav_tasks.links.base import Link
-from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet, Queue, Radio
 
 BAD = Conditions(delay=0.01, jitter=0.05, loss=0.2, duplication=0.2)
 
@@ -110,3 +110,43 @@ def test_a_link_in_the_place_of_another_has_a_number_of_its_own() -> None:
     net.now = 1.0
     net.deliver()
     assert (net.is_readable(before.fileno()), net.is_readable(after.fileno())) == (False, True)
+
+
+def through(net: MemoryNet, sizes: list[int], *, every: float) -> list[tuple[float, int]]:
+    """Send datagrams from a to b; gives when each arrived, and how long it was."""
+    a, b = pair(net)
+    for number, size in enumerate(sizes):
+        net.now = number * every
+        a.send("b", bytes(size))
+    return [(round(at, 6), len(data)) for at, data in arrivals(net, b)]
+
+
+def test_a_radio_lets_through_what_its_rate_allows_and_keeps_the_rest_in_order() -> None:
+    net = MemoryNet(conditions=Conditions(delay=0.1))
+    net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=16_000)
+    assert through(net, [100, 50, 200], every=0.01) == [(0.2, 100), (0.25, 50), (0.45, 200)]
+
+
+def test_a_radio_that_is_idle_again_delays_no_more() -> None:
+    net = MemoryNet(conditions=Conditions(delay=0.0))
+    net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=16_000)
+    assert through(net, [100, 100], every=1.0) == [(0.1, 100), (1.1, 100)]
+
+
+def test_what_a_radios_buffer_does_not_hold_is_dropped() -> None:
+    net = MemoryNet(conditions=Conditions(delay=0.0))
+    net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=250)
+    assert through(net, [100, 100, 100, 40], every=0.0) == [(0.1, 100), (0.2, 100), (0.24, 40)]
+
+
+def test_a_radio_is_one_direction_only() -> None:
+    net = MemoryNet(conditions=Conditions(delay=0.0))
+    net.buffers["b", "a"] = Radio(bytes_per_second=1, buffer=16_000)
+    assert through(net, [100], every=0.0) == [(0.0, 100)]
+
+
+def test_a_delay_that_shrinks_lets_nothing_overtake() -> None:
+    net = MemoryNet(conditions=Conditions(delay=0.0))
+    net.buffers["a", "b"] = Queue(lambda now: max(0.0, 1.0 - 2 * now))
+    came = through(net, [1, 2, 3, 4], every=0.4)
+    assert came == [(1.0, 1), (1.0, 2), (1.0, 3), (1.2, 4)]

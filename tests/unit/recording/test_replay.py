@@ -123,14 +123,14 @@ def test_a_changed_engine_is_found_out_at_its_first_decision(
     code, words = said(whole)
     assert code == 1
     shown = words.splitlines()
-    assert shown[0].startswith("different after line 9 (packets at 1.001000 s, 1.001000 s into")
+    assert shown[0].startswith("different after line 10 (packets at 1.001000 s, 1.001000 s into")
     assert shown[1].startswith(
         "  expected: VehicleSeen(vehicle=1, text='found (ardupilot)', at=1.0"
     )
     assert shown[2].startswith("  came:     VehicleSeen(vehicle=1, text='FOUND', at=1.0")
     code, words = said(whole, "--json")
     assert code == 1
-    assert loads(words.splitlines()[-1])["difference"]["line"] == 9
+    assert loads(words.splitlines()[-1])["difference"]["line"] == 10
 
 
 def wrong_words(vehicle: int, text: str, at: float) -> Any:
@@ -186,10 +186,12 @@ def test_an_engine_that_fails_differs_unless_the_run_ended_there(
 
 
 def flipped(lines: list[Any]) -> list[Any]:
-    """Lets the rover's first packet say something else."""
+    """Lets the rover's first heartbeat say something else."""
     from base64 import b64decode, b64encode
 
-    packets = next(line for line in lines[1:] if line[0] == "packets")
+    packets = next(
+        line for line in lines[1:] if line[0] == "packets" and b64decode(line[3][0][1])[7] == 0
+    )
     raw = bytearray(b64decode(packets[3][0][1]))
     raw[10] ^= 1
     packets[3][0][1] = b64encode(raw).decode()

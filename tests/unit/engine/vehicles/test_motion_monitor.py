@@ -5,6 +5,7 @@ from math import inf, nan, pi
 import pytest
 
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.sender_clock import Heard
 from mav_tasks.mavlink.messages import Attitude, LocalPositionNed
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.guidance import Motion
@@ -72,10 +73,10 @@ def test_what_is_not_finite_is_dropped(bad: float) -> None:
 
 def test_what_was_overtaken_on_the_way_is_dropped() -> None:
     made = monitor((0.0, position(ms=1000, x=5.0)), (0.0, attitude(ms=1000)))
-    made.receive(position(ms=950, x=4.0), now=0.1)
+    assert made.receive(position(ms=950, x=4.0), now=0.1) is Heard.OLD
     motion = made.latest()
     assert motion is not None
-    assert (motion.pose.north, made.rebooted) == (5.0, False)
+    assert motion.pose.north == 5.0
 
 
 def test_the_same_again_is_not_news() -> None:
@@ -89,18 +90,18 @@ def test_the_same_again_is_not_news() -> None:
 
 def test_a_clock_that_goes_far_back_is_a_restart() -> None:
     made = monitor((0.0, position(ms=60_000)), (0.0, attitude(ms=60_000)))
-    made.receive(position(ms=500), now=1.0)
-    assert made.rebooted
+    assert made.receive(position(ms=500), now=1.0) is Heard.RESTART
     made.forget()
-    assert (made.rebooted, made.latest()) == (False, None)
+    assert made.latest() is None
+    assert made.receive(position(ms=500), now=1.0) is Heard.NEWS
 
 
 def test_a_clock_that_overflows_is_no_restart() -> None:
     made = monitor((0.0, position(ms=0xFFFFFFF0)), (0.0, attitude(ms=0xFFFFFFF0)))
-    made.receive(position(ms=16, x=7.0), now=0.05)
+    assert made.receive(position(ms=16, x=7.0), now=0.05) is Heard.NEWS
     motion = made.latest()
     assert motion is not None
-    assert (motion.pose.north, made.rebooted) == (7.0, False)
+    assert motion.pose.north == 7.0
 
 
 def test_it_stands_after_it_was_slow_for_a_while() -> None:
@@ -144,3 +145,12 @@ def test_nothing_heard_since_it_moved_is_no_standstill() -> None:
     assert not any(made.is_still(now=1.0 + age) for age in (0.05, 0.3, 1.9))
     made.receive(position(ms=1100, x=1.1), now=1.1)
     assert made.is_still(now=1.1)
+
+
+def test_what_is_read_late_is_no_younger_than_what_should_have_been_done_meanwhile() -> None:
+    made = monitor((1.0, position(ms=1000)), (1.0, attitude(ms=1000)))
+    made.receive(position(ms=1400), now=1.4, not_after=1.05)
+    made.receive(attitude(ms=1400), now=1.4, not_after=1.05)
+    motion = made.latest()
+    assert motion is not None
+    assert motion.at == 1.05

@@ -1,0 +1,138 @@
+"""Telemetry that comes late: what lay in a radio's buffer for two seconds is two seconds old.
+
+Attack D5: a fence of 40 m was left by 5.5 m with a delay that grew to 4 s, one of 15 m by 1.3 m
+with 2 s; by way of a radio of 57,600 baud an observer caused it by raising rates.
+"""
+
+from collections.abc import Callable
+
+import pytest
+
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Queue, Radio
+from mav_tasks.settings import Driving, Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Persona
+from tests.kit.client import ACCEPTED, DRIVE, SET_INTERVAL
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.world import PROMPT, World, at
+from tests.scenarios.conftest import MakeWorld
+
+FENCE, CORNER = 1, 5001
+DOWN, UP = ("rover1", VEHICLE_LINK), (VEHICLE_LINK, "rover1")
+BAUD = 57_600 / 10  # bytes/s: eight bits, a start and a stop bit
+BUFFER = 16 * 1024  # bytes
+TELEMETRY = (1, 22, 24, 30, 32, 33, 36, 42, 62, 65, 74, 85, 147, 241, 242, 245)
+BRISK = Settings(driving=Driving(acceleration=1.0))
+
+Delay = Callable[[float], float]
+
+
+def fenced(world: World, reach: float) -> None:
+    """Draw a square of so many metres to each side about the rover."""
+    places = [(-reach, -reach), (reach, -reach), (reach, reach), (-reach, reach)]
+    items = [Item(CORNER, **at(*p), param1=4, param4=0, frame=0) for p in places]
+    upload = Upload(world.client, items, kind=FENCE)
+    world.until(lambda: upload.result == 0, within=30)
+
+
+def drive_at(world: World, speed: float, *, seconds: float) -> float:
+    """Drive towards the fence; gives how far the rover really gets."""
+    world.client.command(DRIVE, speed, 0, 300, 0, 0, 0, 5, repeats=(0.0, 0.5, 1.0, 1.5))
+    farthest, end = 0.0, world.now + seconds
+    while world.now < end:
+        world.run(0.05)
+        farthest = max(farthest, abs(world.truth.north), abs(world.truth.east))
+    assert world.stands()
+    return farthest
+
+
+GROWS: dict[str, Delay] = {
+    "at once": lambda s: 4.0 if s > 0 else 0.0,
+    "in 4 s": lambda s: min(4.0, max(0.0, s)),
+    "in 40 s": lambda s: min(4.0, max(0.0, 0.1 * s)),
+    "in 80 s": lambda s: min(4.0, max(0.0, 0.05 * s)),
+    "and shrinks": lambda s: max(0.0, 2.0 - abs(2.0 - s % 10)) if s > 0 else 0.0,
+}
+
+
+@pytest.mark.parametrize("growth", GROWS)
+@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+def test_a_delay_that_grows_leads_nobody_over_a_fence(
+    make_world: MakeWorld, persona: Persona, growth: str
+) -> None:
+    world = make_world(settings=BRISK, persona=persona)
+    fenced(world, 40)
+    begin = world.now + 8.0
+    world.net.buffers[DOWN] = Queue(lambda now: GROWS[growth](now - begin))
+    reached = drive_at(world, 2.0, seconds=90)
+    print(f"{growth}: reached {reached:.1f} m of 40 m")
+    assert 2 < reached < 40
+
+
+@pytest.mark.parametrize("way", [DOWN, UP], ids=["telemetry", "setpoints"])
+@pytest.mark.parametrize("since", ["the start", "then"])
+@pytest.mark.parametrize("delay", [0.5, 1.0, 2.0])
+def test_nothing_is_driven_over_a_fence_on_data_that_are_always_late(
+    make_world: MakeWorld, delay: float, since: str, way: tuple[str, str]
+) -> None:
+    """One delay from the start on shows in the time that an exchange of the clocks takes."""
+    world = make_world(settings=BRISK)
+    fenced(world, 15)
+    begin = world.now + (0.0 if since == "the start" else 8.0)  # at about 5 m
+    world.net.buffers[way] = Queue(lambda now: delay if now >= begin else 0.0)
+    if since == "the start":
+        world.run(40)  # longer than any difference of the clocks is remembered
+    reached = drive_at(world, 1.0, seconds=60)
+    print(f"{delay} s since {since}: reached {reached:.1f} m of 15 m")
+    assert reached < 15
+
+
+@pytest.mark.parametrize("load", ["an observer's rates", "other traffic"])
+def test_a_radio_that_is_full_leads_nobody_over_a_fence(make_world: MakeWorld, load: str) -> None:
+    world = make_world(settings=BRISK)
+    world.net.buffers[DOWN] = Radio(bytes_per_second=BAUD, buffer=BUFFER)
+    world.net.buffers[UP] = Radio(bytes_per_second=BAUD, buffer=BUFFER)
+    fenced(world, 30)
+    world.run(5)
+    world.client.command(DRIVE, 2.0, 0, 300, 0, 0, 0, 5)
+    world.until(lambda: abs(world.truth.north) > 8, within=20)
+    observer = world.add_client("observer", system_id=77)
+    farthest, end = 0.0, world.now + 60
+    for number in TELEMETRY if load.startswith("an") else ():
+        observer.command(SET_INTERVAL, number, 20_000, target=(1, 1))
+    while world.now < end:
+        world.run(0.05)
+        if not load.startswith("an"):
+            world.net.send(*DOWN, bytes(250))  # 5 kB/s beside the telemetry
+        farthest = max(farthest, abs(world.truth.north))
+    print(f"{load}: reached {farthest:.1f} m of 30 m")
+    assert world.stands()
+    assert 8 < farthest < 30
+
+
+def test_what_comes_in_time_again_drives_on_to_the_exact_end(make_world: MakeWorld) -> None:
+    world = make_world()
+    world.client.move(4)
+    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
+    begin = world.now
+    world.net.buffers[DOWN] = Queue(lambda now: 2.0 if now < begin + 5 else 0.0)
+    world.run(2.5)
+    assert world.stands()
+    assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
+    world.until_state(1, S.COMPLETED, within=40)
+    assert world.truth.north == pytest.approx(4.0, abs=0.03)
+
+
+def test_a_link_that_is_merely_slow_is_driven_over_as_ever(make_world: MakeWorld) -> None:
+    """0.08 s each way is a telemetry radio's own; nothing of that is a queue."""
+    world = make_world()
+    for way in (DOWN, UP):
+        world.net.buffers[way] = Queue(lambda _: 0.08)
+    sent = world.client.move(4)
+    world.until_state(1, S.COMPLETED, within=30)
+    assert sent.result == ACCEPTED
+    assert S.PAUSED not in [state for state, _ in world.history(1)]
+    assert world.truth.north == pytest.approx(4.0, abs=0.05)
