@@ -6,7 +6,8 @@
     tools/soak.py --fuzz 10                            so many minutes of fuzzing
     tools/soak.py --hour                               memory over an hour of 5 rovers, 10 clients
 
-Exit code 0: nothing was wrong; 1: something was, and its seed is printed; 2: wrong arguments.
+Exit code 0: nothing was wrong; 1: something was, and its seed is printed; 2: wrong arguments; 3: a
+rover that somebody had halted moved before somebody said go.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from tests.kit.soak.figures import Figures  # noqa: E402
 from tests.kit.soak.fuzz import fuzz_for  # noqa: E402
 from tests.kit.soak.hour import Hour, HourSettings  # noqa: E402
 from tests.kit.soak.life import Life, live  # noqa: E402
-from tests.kit.soak.many import many_lives, printed, python  # noqa: E402
+from tests.kit.soak.many import BROKEN, many_lives, printed, python  # noqa: E402
 from tests.kit.soak.signing import signed_only  # noqa: E402
 
 BATCH = 10_000  # packets between two lines of progress
@@ -76,11 +77,13 @@ def _one(seed: int, seconds: float, *, only_figures: bool) -> int:
         print(f"seed {seed} FAILED; again: tools/soak.py --seed {seed} --minutes {seconds / 60:g}")
         return 1
     print(printed(figures) if only_figures else "\n".join(figures.lines()))
-    return 0
+    return BROKEN if figures.broken else 0
 
 
 def _say_digest(life: Life) -> None:
     """Say what all packets of a life add up to: another one of the seed has the same."""
+    for broken in life.world.broken:
+        print(f"RULE BROKEN {broken}")
     print(f"digest {life.world.digest:08x}")
 
 
@@ -96,12 +99,14 @@ def _many(arguments: argparse.Namespace) -> int:
             print(f"\nseed {ended.seed} FAILED\n{ended.fault}", flush=True)
         else:
             total.add(ended.figures)
+            if ended.figures.broken:
+                print(f"seed {ended.seed}: rule broken {dict(ended.figures.broken)}", flush=True)
         done = total.lives + len(failed)
         print(f"{done} of {count}, {len(failed)} failed (seed {ended.seed})", flush=True)
     print("\n".join(total.lines()))
     print(f"wall         {time.monotonic() - began:.0f} s")
     print(f"failed       {len(failed)}: {' '.join(map(str, sorted(failed)))}")
-    return 1 if failed else 0
+    return 1 if failed else BROKEN if total.broken else 0
 
 
 def _packets(seed: int, count: int) -> int:

@@ -6,7 +6,7 @@ if asked to. What it hears is kept raw and decoded when a test looks at it: most
 
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
@@ -156,6 +156,8 @@ class FakeClient:
     #: says so as soon as it hears of a rover: TASK_STATUS goes to no other
     reads_dialect: bool = True
     received: list[Received] = field(default_factory=list)
+    #: told of each message that it sends, with its bytes, before these leave
+    on_sent: Callable[[Message, bytes], None] = lambda *_: None
 
     def __post_init__(self) -> None:
         self.link = self.net.link(self.name)
@@ -206,7 +208,14 @@ class FakeClient:
         """Send one message now; gives its bytes."""
         raw: bytes = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
+        self.on_sent(message, raw)
         self.link.send(self.server, raw)
+        return raw
+
+    def send_repeated(self, message: Message) -> bytes:
+        """Pack a message as the next one, for whoever sends it in this client's place."""
+        raw: bytes = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
         return raw
 
     def send_raw(self, data: bytes) -> None:

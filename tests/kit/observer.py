@@ -22,7 +22,7 @@ armed and in our mode, unless what changed that could not be known yet.
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import isfinite
+from math import atan2, isfinite, remainder, tau
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import common
@@ -47,6 +47,8 @@ STICKS = 50
 SAME_PACKET = 5.0  # s; then numbers may have begun anew, and it is another one
 REMEMBERED = 64  # commands of clients
 ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops by itself: ArduPilot's; PX4's is 1
+ANOTHER_COURSE = 0.05  # rad
+TURN = 8.0  # s, half a turn at the slowest that tasks ask for here
 FAR = 60.0  # s of driving by itself, to a place or in a mode of the rover's own
 
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
@@ -155,6 +157,8 @@ class Observer:
     _moved_last: bool = False
     _stop_due: tuple[float, set[str]] | None = None
     _last_source: tuple[float, tuple[int, int]] | None = None
+    _course: float | None = None  # rad, of the last setpoint that arrived without speed
+    _course_at: float = -1e9  # when it became another one
     _given_to: tuple[int, int] | None = None  # who last asked the rover for our mode
 
     def __post_init__(self) -> None:
@@ -246,6 +250,8 @@ class Observer:
         if message is None:
             return
         self.may_move_until = max(self.may_move_until, now + self._keeps_moving(message))
+        if message.get_type() in SETPOINTS and self._turns(now, message):
+            self.may_move_until = max(self.may_move_until, now + ROVER_TIMEOUT)
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self._is_wish_for_our_mode(message):
             self._given_to = source  # whoever asks for our mode drives from here on
@@ -478,6 +484,16 @@ class Observer:
             return never if self.ways.mode_of(message) in quiet else FAR
         goes = message.command in MOVING_COMMANDS and not _is_to_stay(message)
         return FAR if goes else never
+
+    def _turns(self, now: float, message: Any) -> bool:
+        """Whether a setpoint without speed turns the rover: a PX4 one faces along its course."""
+        if _moves(message) or not (message.vx or message.vy):
+            return False
+        course = atan2(message.vy, message.vx)
+        if self._course is not None and abs(remainder(course - self._course, tau)) > ANOTHER_COURSE:
+            self._course_at = now
+        self._course = course
+        return now - self._course_at <= TURN
 
     def _check_stop(self, now: float) -> None:
         """Zero and HOLD left in the step in which STOP, or a pause, came."""

@@ -428,6 +428,10 @@ class ObservedNet(MemoryNet):
         self.shows_on_request = True
         #: loses (source, target, datagram) for which it says so
         self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
+        #: told of (client, datagram) when the server reads it
+        self.on_read: Callable[[str, bytes], None] = lambda *_: None
+        #: told of (rover, source, datagram) when it arrives there
+        self.on_arrival: Callable[[str, str, bytes], None] = lambda *_: None
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Show what the server sends to a rover."""
@@ -448,6 +452,7 @@ class ObservedNet(MemoryNet):
         """Show what arrives at a rover or at the server."""
         if link.name in self.observers:
             self.observers[link.name].arrived(self.now, data)
+            self.on_arrival(link.name, source, data)
         elif link.name in (VEHICLE_LINK, CLIENT_LINK):
             self._unread.append((link.name, source, data))
         super().arrive(link, source, data)
@@ -462,6 +467,8 @@ class ObservedNet(MemoryNet):
         if self.is_server_away:
             return
         for link, source, data in self._unread:
+            if link == CLIENT_LINK:
+                self.on_read(source, data)
             for name, observer in self.observers.items():
                 if link == CLIENT_LINK:
                     observer.asked(self.now, data, peer=source)

@@ -2,18 +2,35 @@
 
 Everything is on loopback, bounded in count and time. ``--profile FILE`` with one of ``commands``,
 ``forwarding`` and ``uploads`` writes cProfile's figures of the server process.
+``--against REVISION`` measures a server of that revision as well, turn and turn about with this
+one, by the same clients. ``--names N`` with ``turns`` prints the functions that are called most.
 """
 
 import argparse
+import json
 from collections.abc import Callable
+from dataclasses import asdict
 
-from . import commands, floods, forwarding, queue, setpoints, simulation, start, stop, uploads
+from . import (
+    against,
+    commands,
+    floods,
+    forwarding,
+    queue,
+    setpoints,
+    simulation,
+    start,
+    stop,
+    turns,
+    uploads,
+)
 from .table import Row, render
 
 MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "commands": commands.measure,
     "durable": commands.measure_durable,
     "recorded": commands.measure_recorded,
+    "turns": turns.measure,
     "stop": stop.measure,
     "floods": floods.measure,
     "setpoints": setpoints.measure,
@@ -28,6 +45,17 @@ PROFILED: dict[str, Callable[[str], list[Row]]] = {
     "forwarding": forwarding.measure,
     "uploads": uploads.measure,
 }
+#: those of a server in a process of its own, which may be another revision's
+OF_A_SERVER = (
+    "commands",
+    "durable",
+    "recorded",
+    "stop",
+    "floods",
+    "setpoints",
+    "forwarding",
+    "uploads",
+)
 
 
 def main() -> None:
@@ -35,6 +63,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="tools/bench/run", description=__doc__)
     parser.add_argument("what", nargs="*", help=", ".join(MEASUREMENTS) + "; default: all")
     parser.add_argument("--profile", metavar="FILE", help="profile the server of one measurement")
+    parser.add_argument("--against", metavar="REVISION", help="measure that revision's server, too")
+    parser.add_argument("--rounds", type=int, default=3, metavar="N", help="with --against; 3")
+    parser.add_argument("--names", type=int, default=0, metavar="N", help="with turns: functions")
+    parser.add_argument("--json", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     unknown = set(arguments.what) - MEASUREMENTS.keys()
     if unknown:
@@ -44,8 +76,31 @@ def main() -> None:
             parser.error(f"--profile goes with one of {', '.join(PROFILED)}")
         print(render(PROFILED[arguments.what[0]](arguments.profile)))
         return
-    rows = [row for name in arguments.what or MEASUREMENTS for row in MEASUREMENTS[name]()]
-    print(render(rows))
+    if arguments.against is not None:
+        _measure_against(parser, arguments)
+        return
+    rows = [row for name in arguments.what or MEASUREMENTS for row in _measured(name, arguments)]
+    print(json.dumps([asdict(row) for row in rows]) if arguments.json else render(rows))
+
+
+def _measured(name: str, arguments: argparse.Namespace) -> list[Row]:
+    if name == "turns":
+        return turns.measure(names=arguments.names)
+    return MEASUREMENTS[name]()
+
+
+def _measure_against(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    what = arguments.what or [*OF_A_SERVER, "turns"]
+    alone = [name for name in what if name not in (*OF_A_SERVER, "turns")]
+    if alone:
+        parser.error(f"--against does not go with {', '.join(alone)}")
+    if arguments.rounds < 1:
+        parser.error("--rounds: expected a number from 1 on")
+    if "turns" in what:
+        print(render(turns.measure(arguments.against, names=arguments.names)))
+    servers = [name for name in what if name != "turns"]
+    if servers:
+        print(against.render(against.measure(arguments.against, servers, rounds=arguments.rounds)))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Processes that a measurement talks to: started, waited for, ended by their own id."""
 
+import os
 import socket
 import subprocess
 import sys
@@ -8,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+#: names a folder whose server is measured in place of this one: another revision's (``against``)
+SERVER_FROM = "MAV_TASKS_BENCH_SERVER_FROM"
 HOST = "127.0.0.1"
 READY = "ready"  # what a child prints once its sockets are open
 END_WITHIN = 10.0  # s
@@ -19,13 +22,14 @@ def child(
 ) -> Iterator[list[str]]:
     """Run a module of this package as a process of its own while the block runs.
 
-    What a ``quiet`` one writes to stderr, its log, is thrown away by the system. The list that it
-    gives holds, after the block, the lines that the process printed in the end.
+    A server is that of the folder that SERVER_FROM names, if it names one. What a ``quiet`` one
+    writes to stderr, its log, is thrown away by the system. The list that it gives holds, after the
+    block, the lines that the process printed in the end.
     """
     said: list[str] = []
     process = subprocess.Popen(
         [sys.executable, "-m", f"tools.bench.{module}", *arguments],
-        cwd=ROOT,
+        cwd=os.environ.get(SERVER_FROM, ROOT) if module == "server" else ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL if quiet else None,
         text=True,

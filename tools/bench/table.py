@@ -28,7 +28,12 @@ def render(rows: Sequence[Row]) -> str:
     cells = [HEAD] + [
         (row.what, row.figure, row.yardstick, row.ratio, row.goal, verdict[row.met]) for row in rows
     ]
-    widths = [max(len(line[column]) for line in cells) for column in range(len(HEAD))]
+    return aligned(cells)
+
+
+def aligned(cells: Sequence[Sequence[str]]) -> str:
+    """Give cells as text, columns aligned, with a line under the first row."""
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(c, widths, strict=True)) for c in cells]
     lines.insert(1, "  ".join("-" * width for width in widths))
     return "\n".join(line.rstrip() for line in lines)

@@ -68,6 +68,14 @@ class Stage:
         count = len(self.world.rovers)
         return 1 if count == 1 else self.random.randint(1, count)
 
+    def person_turns(self, number: int, mode: Mode) -> None:
+        """Let a person turn the mode switch at a rover."""
+        self.world.rovers[number - 1].autopilot.operator_mode(mode, now=self.world.now)
+
+    def person_arms(self, number: int, armed: bool) -> None:
+        """Let a person arm or disarm a rover."""
+        self.world.rovers[number - 1].autopilot.operator_arm(armed, now=self.world.now)
+
     def place(self) -> dict[str, Any]:
         """Give a place within a few metres of where the first rover began."""
         return at(self.random.uniform(-3, 3), self.random.uniform(-3, 3))
@@ -106,15 +114,15 @@ def deeds(stage: Stage) -> list[Deed]:
 
 def at_the_rover(stage: Stage) -> list[Deed]:
     """Give what a person at a rover does."""
-    world, random = stage.world, stage.random
+    random = stage.random
 
     def turn_switch() -> None:
         mode = random.choice((Mode.HOLD, Mode.HOLD, *Mode))
-        world.rovers[stage.rover() - 1].autopilot.operator_mode(mode, now=world.now)
+        stage.person_turns(stage.rover(), mode)
 
     def arm() -> None:
         armed = random.random() < 0.7
-        world.rovers[stage.rover() - 1].autopilot.operator_arm(armed, now=world.now)
+        stage.person_arms(stage.rover(), armed)
 
     return [turn_switch, arm]
 

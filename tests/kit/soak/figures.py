@@ -3,6 +3,8 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
+COUNTED = ("faults", "deeds", "halts", "refused", "broken")
+
 
 @dataclass
 class Figures:
@@ -15,6 +17,11 @@ class Figures:
     packets: int = 0
     restarts: int = 0
     faults: Counter[str] = field(default_factory=Counter)
+    deeds: Counter[str] = field(default_factory=Counter)  # of attackers
+    halts: Counter[str] = field(default_factory=Counter)  # acknowledged, or at the rover
+    refused: Counter[str] = field(default_factory=Counter)  # go words
+    in_flight: int = 0  # go words that passed a halt on their way
+    broken: Counter[str] = field(default_factory=Counter)  # the rule of halts
 
     def add(self, other: "Figures") -> None:
         """Add another life's."""
@@ -24,7 +31,9 @@ class Figures:
         self.tasks += other.tasks
         self.packets += other.packets
         self.restarts += other.restarts
-        self.faults.update(other.faults)
+        self.in_flight += other.in_flight
+        for name in COUNTED:
+            getattr(self, name).update(getattr(other, name))
 
     def lines(self) -> list[str]:
         """Give them in words, one line each."""
@@ -35,6 +44,16 @@ class Figures:
             f"tasks        {self.tasks}",
             f"packets      {self.packets}",
             f"restarts     {self.restarts}",
-            f"faults       {self.faults.total()}",
-            *(f"  {name:<22} {count}" for name, count in sorted(self.faults.items())),
+            *_counted("faults", self.faults),
+            *_counted("attacks", self.deeds),
+            *_counted("halts", self.halts),
+            *_counted("go refused", self.refused),
+            f"in flight    {self.in_flight}",
+            *_counted("RULE BROKEN", self.broken),
         ]
+
+
+def _counted(title: str, counts: Counter[str]) -> list[str]:
+    width = max(map(len, counts), default=0)
+    each = (f"  {name:<{max(22, width)}} {count}" for name, count in sorted(counts.items()))
+    return [f"{title:<12} {counts.total()}", *each]

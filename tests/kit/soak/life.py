@@ -1,5 +1,6 @@
 """One life: a seed says who takes part, what goes wrong and what anybody does, and when."""
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -13,9 +14,10 @@ from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Clients, Driving, Queueing, Settings
 from mav_tasks.tasks.lifecycle import TERMINAL
 from rover_sim.faults import Faults
-from rover_sim.personas import PX4
+from rover_sim.personas import PX4, Mode
 from tests.kit import px4
 from tests.kit.client import HOLD, FakeClient
+from tests.kit.soak.attacks import Attacks
 from tests.kit.soak.deeds import Deed, Stage, deeds, px4_deeds, upload
 from tests.kit.soak.figures import Figures
 from tests.kit.soak.mutants import Mutants
@@ -32,6 +34,20 @@ NETS = (
 PAUSES = (0.01, 0.1, 0.5, 2.0)  # s, between two deeds
 CANCEL, CLEAR, MODIFY, RELEASE = 54010, 54011, 54012, 54013
 SPEEDS = ("TSK_SPEED", "TSK_TURN", "TSK_ACCEL", "TSK_ACC_RAD", "no such one")
+
+
+class SoakStage(Stage):
+    """A stage whose world is told what people at the rovers do."""
+
+    def person_turns(self, number: int, mode: Mode) -> None:
+        """Let a person turn the mode switch at a rover."""
+        assert isinstance(self.world, SoakWorld)
+        self.world.person_turns(number, mode)
+
+    def person_arms(self, number: int, armed: bool) -> None:
+        """Let a person arm or disarm a rover."""
+        assert isinstance(self.world, SoakWorld)
+        self.world.person_arms(number, armed=armed)
 
 
 class Life:
@@ -65,11 +81,13 @@ class Life:
             self.world.add_soaked_client(f"client{number}", system_id=200 + number)
             for number in range(random.choice((1, 2, 3)))
         ]
-        self._stage = Stage(world, random, self.world.disk_store, clients, self._note)
+        self._stage = SoakStage(world, random, self.world.disk_store, clients, self._note)
         is_px4 = persona.name != PROMPT.name
         of_chaos = (px4_deeds if is_px4 else deeds)(self._stage)
         wishes = self._wishes()
+        attacks = Attacks(self.world, self._stage)
         self._deeds = [*of_chaos, *wishes, *wishes, *self._surroundings(), self._bad_input]
+        self._deeds += attacks.deeds()
         self._mutants = Mutants(random)
 
     def __repr__(self) -> str:
@@ -93,6 +111,11 @@ class Life:
             packets=world.packets,
             restarts=world.restarts,
             faults=world.faults,
+            deeds=world.deeds,
+            halts=sum((each.halted for each in world.halts), Counter()),
+            refused=sum((each.refused for each in world.halts), Counter()),
+            in_flight=sum(each.in_flight for each in world.halts),
+            broken=Counter(each.kind for each in world.broken),
         )
 
     def _end(self) -> None:

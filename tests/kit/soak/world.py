@@ -1,24 +1,40 @@
 """A world that lives long: links go down, servers end and come back, rules hold at each step."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import ceil, inf
 from pathlib import Path
+from random import Random
 from zlib import crc32
 
+from mav_tasks import runner
 from mav_tasks.engine.inputs import WallClock
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason
-from rover_sim.personas import Persona
-from tests.kit.client import ACCEPTED, DRIVE, MOVE, ROTATE, TASK_STATUS, FakeClient, TaskStatus
+from mav_tasks.tasks.events import Event, TaskChanged
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from rover_sim.personas import Mode, Persona
+from tests.kit.client import (
+    ACCEPTED,
+    ACK,
+    DRIVE,
+    MOVE,
+    ROTATE,
+    SET_MODE,
+    TASK_STATUS,
+    FakeClient,
+    Message,
+    TaskStatus,
+)
+from tests.kit.halts import Broken, Halts
 from tests.kit.mission import MISSION_ACK, Ack
 from tests.kit.soak.bounds import too_large
 from tests.kit.soak.disk import Disk, UncertainStore
 from tests.kit.soak.ledger import Ledger
 from tests.kit.soak.stillness import Stillness
-from tests.kit.world import World
+from tests.kit.soak.words import Said, WordLog
+from tests.kit.world import MODE_COMMAND, World
 
 UTC = 1.8e9  # s, when the worlds begin
 GRAIN = 0.01  # s; what is due within it is done together, as by a machine with other things to do
@@ -26,6 +42,16 @@ CONTROL_STEP = 0.025  # s, between two looks at where the rovers are
 FORGET = 5.0  # s, after which nobody looks back at what clients heard
 LOOK_THROUGH = 20.0  # s, between two walks through all that the server remembers
 TASK_COMMANDS = (MOVE, ROTATE, DRIVE)
+COMMAND_OF_ACK = slice(10, 12)  # of a whole COMMAND_ACK packet
+RESULT_OF_ACK = 12
+COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG
+SET_MODE_MESSAGE = 11
+ENDS_WITHIN = 2.0  # s, of a server that is ended in order
+ROUNDED = 1e-9  # s, more than what is lost by adding and taking off the same time
+MEANWHILE = (0.1, 0.5, 2.0)  # s, between two deeds of clients while the server stands still
+#: whether the time that the runner tells the engine stands still with a suspended machine, as
+#: CLOCK_MONOTONIC does and CLOCK_BOOTTIME does not
+LOSES_TIME = "CLOCK_BOOTTIME" not in Path(runner.__file__).read_text("utf-8")
 
 
 class Violation(AssertionError):
@@ -66,12 +92,25 @@ class SoakWorld(World):
             Stillness(vehicle, observer)
             for vehicle, observer in zip(self.rovers, self.observers, strict=True)
         ]
+        self.words = WordLog(self.observers[0].ways)
+        self.halts = [
+            Halts(vehicle, observer.system_id)
+            for vehicle, observer in zip(self.rovers, self.observers, strict=True)
+        ]
+        self.deeds: Counter[str] = Counter()  # of attackers, by name
+        self.broken: list[Broken] = []
+        self._luck = Random(seed)  # of what happens while the server stands still
+        self._behind = 0.0  # s that the server's clock has lost
+        self._held: tuple[str, bytes | None] | None = None  # whose word is to be overtaken
         self._followed = 0  # events of the present server
         self._read: dict[str, int] = {}  # packets of each client
         self._look_at = self._compare_at = self._forget_at = self._walk_at = 0.0
         for observer in self.observers:
             observer.expects_gaps = observer.batches = True
         self.watched.loses = self._passes_by
+        self.watched.on_read = self._server_reads
+        self.watched.on_arrival = self._rover_hears
+        self._listen_to(self.client)
         self.watch(self._judge)
 
     def next_due(self) -> float | None:
@@ -92,18 +131,72 @@ class SoakWorld(World):
         for still in self._stillness:
             if number in (0, still.observer.system_id):
                 still.disturbed_at = max(still.disturbed_at, self.now + seconds)
+        for halts in self.halts:
+            if number in (0, halts.system_id):
+                halts.disturb(self.now + seconds)
 
     def step_wall_clock(self, seconds: float) -> None:
         """Let the clock on the wall of the server's machine jump."""
         self.faults["wall clock jumps"] += 1
         self.disk.wall_offset += seconds
-        self.server.pump.handle(WallClock(self.disk.wall_offset), now=self.now)
-        self.server.pump.turn(now=self.now)
+        now = self.now - self._behind
+        self.server.pump.handle(WallClock(self.disk.wall_offset + self._behind), now=now)
+        self.server.pump.turn(now=now)
 
     def restart(self, *, away: float) -> None:
         """Let the server be killed, and another go on with what the disk has."""
         self.faults["server killed"] += 1
+        self._restart(away=away)
+
+    def restart_in_order(self, *, away: float) -> None:
+        """Let the server be ended by SIGTERM, and another go on with what the disk has."""
+        self.faults["server ended"] += 1
+        server = self.server
+        server.shut_down(now=self.now - self._behind)
+        self.run_until(lambda: server.pump.is_over, within=ENDS_WITHIN)
+        self._restart(away=away)
+
+    def freeze(self, seconds: float, meanwhile: Callable[[], object]) -> None:
+        """Let the server's process stand still, and clients go on: what they say waits for it."""
+        end = self.now + seconds
+        self.leave(self.server)
+        self.watched.is_server_away = True
+        while self.now < end:
+            meanwhile()
+            self.run(min(self._luck.choice(MEANWHILE), end - self.now))
+        self.watched.is_server_away = False
+        self.join(self.server)
+
+    def suspend_machine(self, seconds: float, meanwhile: Callable[[], object]) -> None:
+        """Let the server's machine be suspended; its clock may not know of it afterwards."""
+        self.freeze(seconds, meanwhile)
+        if LOSES_TIME:
+            self._set_back(seconds)
+
+    def swap_next_two(self, client: FakeClient) -> None:
+        """Let the packet after the next one of a client overtake that."""
+        self._held = client.name, None
+
+    def repeat(self, said: Said, message: Message) -> None:
+        """Let a client send a word once more, as a library does that had no answer."""
+        data = said.client.send_repeated(message)
+        self.words.note(said.client, data, first=said.first)
+        self.net.send(said.client.name, said.client.server, data)
+
+    def person_turns(self, number: int, mode: Mode) -> None:
+        """Let a person turn the mode switch at a rover."""
+        self.rovers[number - 1].autopilot.operator_mode(mode, now=self.now)
+        drives = mode is not Mode.HOLD
+        self.halts[number - 1].person("HOLD at the rover", drives=drives, now=self.now)
+
+    def person_arms(self, number: int, *, armed: bool) -> None:
+        """Let a person arm or disarm a rover."""
+        self.rovers[number - 1].autopilot.operator_arm(armed, now=self.now)
+        self.halts[number - 1].person("disarmed at the rover", drives=armed, now=self.now)
+
+    def _restart(self, *, away: float) -> None:
         self.restarts += 1
+        self._behind = 0.0
         self._follow()
         self.disk.write(self.disk_store.committed(), now=self.now)
         self.end_server()
@@ -128,6 +221,7 @@ class SoakWorld(World):
     def add_soaked_client(self, name: str, *, system_id: int) -> FakeClient:
         """Let a client take part whose acks count."""
         client = self.add_client(name, system_id=system_id)
+        self._listen_to(client)
         self.clients.append(client)
         return client
 
@@ -144,6 +238,8 @@ class SoakWorld(World):
             self._look_at = now + CONTROL_STEP
             for still in self._stillness:
                 self._raise(still.look(now))
+            for halts in self.halts:
+                self.broken += halts.look(now)
             for observer in self.observers:
                 if observer.violations:
                     self._raise(iter([f"rover {observer.system_id}: {observer.violations[0]}"]))
@@ -162,6 +258,7 @@ class SoakWorld(World):
         events = self.disk_store.events
         if self._followed < len(events):
             self._raise(self.ledger.follow(events[self._followed :]))
+            self._see_beginnings(events[self._followed :])
             self._followed = len(events)
         for client in self.clients:
             heard = client.received
@@ -190,8 +287,80 @@ class SoakWorld(World):
     def _passes_by(self, source: str, target: str, data: bytes) -> bool:
         self.packets += 1
         self.digest = crc32(f"{self.now!r} {source} {target} ".encode() + data, self.digest)
+        if source == CLIENT_LINK and data[7:10] == ACK.to_bytes(3, "little"):
+            self._server_answers(target, data)
+        if target == CLIENT_LINK and self._held is not None and self._held[0] == source:
+            return self._is_overtaken(source, data)
         rover = target if source == VEHICLE_LINK else source
         return self._down_until.get(rover, -inf) > self.now
+
+    # for the rule of halts
+
+    def _listen_to(self, client: FakeClient) -> None:
+        client.on_sent = lambda message, data: self.words.said(client, message, data, now=self.now)
+
+    def _server_reads(self, peer: str, data: bytes) -> None:
+        word = self.words.word(peer, data)
+        if word is None:
+            return
+        seen = {v.system_id: v for v in self.server.engine.snapshot(now=self.now).vehicles}
+        for halts in self.halts:
+            vehicle = seen.get(halts.system_id)
+            begun = None if vehicle is None else vehicle.begun
+            running = None if begun is None else int(begun.id)
+            halts.read(word, running=running, now=self.now)
+
+    def _server_answers(self, peer: str, data: bytes) -> None:
+        command = int.from_bytes(data[COMMAND_OF_ACK], "little")
+        result = data[RESULT_OF_ACK] if data[1] > RESULT_OF_ACK - 10 else 0
+        for halts in self.halts:
+            if halts.system_id == data[5]:
+                halts.answered(peer, command, result, now=self.now)
+
+    def _rover_hears(self, rover: str, source: str, data: bytes) -> None:
+        halts = self.halts[int(rover.removeprefix("rover")) - 1]
+        if source != VEHICLE_LINK:
+            halts.pushed()
+        elif data[7] == SET_MODE_MESSAGE or (
+            data[7] == MODE_COMMAND and data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
+        ):
+            halts.mode_arrived(now=self.now)
+
+    def _see_beginnings(self, events: list[Event]) -> None:
+        vehicles = {task_id: mark[2] for task_id, mark in self.ledger.given.items()}
+        for event in events:
+            if isinstance(event, TaskChanged) and event.new is TaskState.STARTING:
+                for halts in self.halts:
+                    if halts.system_id == vehicles.get(int(event.task_id)):
+                        halts.began_task()
+
+    def _is_overtaken(self, source: str, data: bytes) -> bool:
+        """Hold a packet back until the next one of its sender is under way."""
+        assert self._held is not None
+        _, first = self._held
+        if first is None:
+            self._held = source, data
+            return True
+        self._held = None
+        self.net.send(source, CLIENT_LINK, data)
+        self.net.send(source, CLIENT_LINK, first)
+        return True
+
+    def _set_back(self, seconds: float) -> None:
+        """Let the server's clock have stood still for so long; what it says is moved back."""
+        self._behind += seconds
+        behind, server = self._behind, self.server
+        kind = type(server)
+
+        def next_deadline() -> float | None:
+            due = kind.next_deadline(server)
+            return None if due is None else due + behind
+
+        def turn(*, now: float) -> None:
+            kind.turn(server, now=now - behind + ROUNDED)
+
+        server.next_deadline = next_deadline  # type: ignore[method-assign]
+        server.turn = turn  # type: ignore[method-assign]
 
     def _raise(self, faults: Iterator[str]) -> None:
         for text in faults:

@@ -1,0 +1,267 @@
+"""One rule, judged by where a rover truly is: what somebody halted stands until somebody says go.
+
+After an acknowledged halt (STOP, pause, HOLD, disarm; a switch at the rover; cancel of what runs)
+the rover comes to a stand within its stopping distance, and stays there until a go word that was
+*first sent* after the server had read the halt, or which the sender of the halt itself sent after
+it. After STOP only a *continue* is such a word; a submission never is. What is refused lets nothing
+go.
+
+It looks at clients' packets when the server reads them, at answers when they are sent, and at the
+rover's body; nothing of the server's own state is asked. Not judged: a rover that hears nothing, or
+that a person or another station drives by its own ways.
+"""
+
+from collections import Counter, deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import hypot, remainder, tau
+
+from rover_sim.body import BodyState
+from rover_sim.personas import Mode
+from rover_sim.vehicle import Vehicle
+from tests.kit.soak.words import Kind, Word
+
+ACCEPTED, IN_PROGRESS = 0, 5  # MAV_RESULT
+STOPS_WITHIN = 2.5  # s, by repeated requests over a net that loses a fifth, from 1 m/s
+SLACK, SLACK_ANGLE = 0.3, 0.4  # m, rad; beyond speed times STOPS_WITHIN while it brakes
+MOVED, TURNED = 0.1, 0.2  # m, rad, of a rover that had come to a stand
+UNHEARD = 6.0  # s after something was wrong with the way to the rover
+LATE = 1.0  # s on its way
+FLIGHT = 0.1  # s, longer than the net takes: two words of two people that passed each other there
+MODE_TAKES = 0.5  # s from a mode request's arrival until the rover shows the mode
+BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL})
+REMEMBERED = 50  # go words
+WEIGHTS = {Kind.WISH: 1, Kind.MOTION: 2, Kind.GO: 3}
+CONTINUE, CANCEL, STOP = "continue", "cancel", "STOP"
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """The rule was broken: which halt, and what was read since then that was older than it."""
+
+    at: float
+    halt: str
+    since: str
+    moved: float  # m
+    turned: float  # rad
+
+    @property
+    def kind(self) -> str:
+        """Name it without its figures."""
+        return f"{self.halt}, then {self.since}"
+
+    def __str__(self) -> str:
+        moved = f"moved {self.moved:.2f} m, turned {self.turned:.2f} rad"
+        return f"{self.at:.3f} s: {moved}, after {self.kind}"
+
+
+@dataclass(slots=True)
+class _Halt:
+    name: str
+    word: Word | None  # None: a person at the rover
+    read_at: float
+    at: float  # acknowledged
+    pose: BodyState
+    is_stop: bool
+    has_stood: bool = False
+    since: str = "no word"  # what was read since then and does not end it, the likeliest of it
+    weight: int = 0  # of that
+    fresh: set[tuple[str, int]] = field(default_factory=set)  # go words that nobody answered yet
+
+    def note(self, word: Word, text: str) -> None:
+        """Keep what may be why the rover moves in spite of it: a go word before all others."""
+        weight = WEIGHTS[word.kind]
+        if weight >= self.weight:
+            self.weight, self.since = weight, text
+
+    def note_older(self, word: Word, *, now: float) -> None:
+        """Keep a word that is older than the halt."""
+        how = "a copy of an older" if word.is_copy else "an older"
+        late = " that was late" if now - word.first_sent > LATE else ""
+        self.note(word, f"{how} {word.name}{late}")
+
+
+@dataclass(slots=True)
+class _Go:
+    word: Word
+    read_at: float
+    granted: bool | None = None  # None: not answered
+
+
+class Halts:
+    """Watches one rover."""
+
+    def __init__(self, vehicle: Vehicle, system_id: int) -> None:
+        self.system_id = system_id
+        self._vehicle = vehicle
+        self._halt: _Halt | None = None
+        self._suspended: _Halt | None = None  # let go by a word that may still be refused
+        self._asked: dict[tuple[str, int], tuple[Word, float]] = {}
+        self._gos: deque[_Go] = deque(maxlen=REMEMBERED)  # that were read last
+        self._disturbed_at = -1e9
+        self._mode = vehicle.autopilot.mode
+        self._mode_sent_at = -1e9  # a request of the server for a mode reached the rover
+        self._is_by_itself = False  # in a mode of its own, and not by the server
+        self.halted: Counter[str] = Counter()  # by name
+        self.refused: Counter[str] = Counter()  # go words
+        self.in_flight = 0  # go words that passed a halt on their way
+        self.broken: list[Broken] = []
+
+    def __repr__(self) -> str:
+        return f"Halts({self.system_id}, {self._halt})"
+
+    # what it is told
+
+    def disturb(self, until: float) -> None:
+        """The rover may not hear the server until then."""
+        self._disturbed_at = max(self._disturbed_at, until)
+
+    def person(self, name: str, *, drives: bool, now: float) -> None:
+        """Somebody at the rover has turned its switch, or armed or disarmed it."""
+        self._halt = self._suspended = None
+        if not drives:
+            self._begin(name, None, read_at=now, now=now)
+
+    def pushed(self) -> None:
+        """Another station, past the server, has sent the rover somewhere."""
+        self._halt = self._suspended = None
+
+    def mode_arrived(self, *, now: float) -> None:
+        """A request of the server for a mode reaches the rover."""
+        self._mode_sent_at = now
+
+    def began_task(self) -> None:
+        """Another task begins: what was called off before has nothing to do with it."""
+        if self._halt is not None and self._halt.name == CANCEL:
+            self._halt = None
+
+    def read(self, word: Word, *, running: int | None, now: float) -> None:
+        """The server reads a word of a client; ``running`` is the task that is being driven."""
+        if word.system_id not in (0, self.system_id):
+            return
+        if word.kind is Kind.HALT:
+            of_what_runs = running is not None and word.param1 in (0.0, float(running))
+            if word.name != CANCEL or of_what_runs:
+                self._asked[word.peer, word.command] = word, now
+        elif word.kind in (Kind.GO, Kind.MOTION):
+            self._read_go(word, now=now)
+        elif word.kind is Kind.WISH and self._halt is not None:
+            self._halt.note(word, f"a {'copy of a ' if word.is_copy else ''}{word.name}")
+
+    def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
+        """The server answers a client."""
+        key = peer, command
+        is_granted = result in (ACCEPTED, IN_PROGRESS)
+        word, read_at = self._asked.pop(key, (None, 0.0))
+        if word is None:
+            return
+        if word.kind is Kind.HALT:
+            if is_granted:
+                self._begin(word.name, word, read_at=read_at, now=now)
+            return
+        if not is_granted:
+            self.refused[word.name] += 1
+        for go in self._gos:
+            if go.word is word:
+                go.granted = is_granted
+        self._settle(key, is_granted=is_granted)
+
+    def look(self, now: float) -> Iterator[Broken]:
+        """Give the rule's breach, once for each halt."""
+        self._look_at_mode(now)
+        halt = self._halt
+        if halt is None:
+            return
+        truth = self._vehicle.truth
+        if self._is_excused(now):
+            halt.pose = truth
+            return
+        moved = hypot(truth.north - halt.pose.north, truth.east - halt.pose.east)
+        turned = abs(remainder(truth.yaw - halt.pose.yaw, tau))
+        if now - halt.at <= STOPS_WITHIN:
+            speed = hypot(halt.pose.forward_speed, halt.pose.lateral_speed)
+            far = moved > speed * STOPS_WITHIN + SLACK
+            far |= turned > abs(halt.pose.yaw_rate) * STOPS_WITHIN + SLACK_ANGLE
+        elif not halt.has_stood:
+            halt.has_stood, halt.pose, far = True, truth, False
+        else:
+            far = moved > MOVED or turned > TURNED
+        if far:
+            found = Broken(now, halt.name, halt.since, moved, turned)
+            self.broken.append(found)
+            self._halt = None  # once
+            yield found
+
+    # how it comes to that
+
+    def _begin(self, name: str, word: Word | None, *, read_at: float, now: float) -> None:
+        self.halted[name] += 1
+        is_stop = name == STOP or (self._halt is not None and self._halt.is_stop)
+        halt = _Halt(name, word, read_at, now, self._vehicle.truth, is_stop)
+        newer = [go for go in self._gos if go.granted is not False and self._ends(go.word, halt)]
+        self._halt = self._suspended = None
+        for go in self._gos:
+            if go.read_at >= read_at and not self._ends(go.word, halt):
+                halt.note_older(go.word, now=now)
+        if not newer:
+            self._halt = halt
+        elif not any(go.granted for go in newer):
+            halt.fresh.update((go.word.peer, go.word.command) for go in newer)
+            self._suspended = halt
+
+    def _read_go(self, word: Word, *, now: float) -> None:
+        if word.command:
+            self._asked[word.peer, word.command] = word, now
+            self._gos.append(_Go(word, now))
+        halt = self._halt or self._suspended
+        if halt is None or (halt.is_stop and word.name != CONTINUE):
+            return
+        if not self._ends(word, halt):
+            halt.note_older(word, now=now)
+            return
+        self.in_flight += _passed(word, halt)
+        if word.command:
+            halt.fresh.add((word.peer, word.command))
+            self._suspended, self._halt = halt, None
+        else:
+            self._halt = self._suspended = None
+
+    def _settle(self, key: tuple[str, int], *, is_granted: bool) -> None:
+        halt = self._suspended
+        if halt is None or key not in halt.fresh:
+            return
+        halt.fresh.discard(key)
+        if is_granted:
+            self._suspended = None
+        elif not halt.fresh:  # all were refused: it holds as before
+            self._suspended, self._halt = None, halt
+
+    def _ends(self, word: Word, halt: _Halt) -> bool:
+        """Whether a go word is newer than a halt, if it is granted."""
+        if halt.is_stop and word.name != CONTINUE:
+            return False
+        if word.first_sent > halt.read_at:
+            return True
+        if halt.word is not None and halt.word.peer == word.peer:
+            return word.order > halt.word.order
+        return _passed(word, halt)
+
+    def _look_at_mode(self, now: float) -> None:
+        mode = self._vehicle.autopilot.mode
+        if mode is not self._mode:
+            self._mode = mode
+            by_server = now - self._mode_sent_at <= MODE_TAKES
+            self._is_by_itself = mode in BY_ITSELF and not by_server
+
+    def _is_excused(self, now: float) -> bool:
+        faults = self._vehicle.autopilot.faults
+        if faults.deaf or faults.refuse_mode:
+            self._disturbed_at = max(self._disturbed_at, now)
+        return self._is_by_itself or now - self._disturbed_at <= UNHEARD
+
+
+def _passed(word: Word, halt: _Halt) -> bool:
+    """Whether it was on its way, from somebody else, when the halt was read."""
+    of_another = halt.word is None or halt.word.peer != word.peer
+    is_older = word.first_sent <= halt.read_at
+    return of_another and is_older and not word.is_copy and word.first_sent > halt.read_at - FLIGHT

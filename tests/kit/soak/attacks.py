@@ -1,0 +1,183 @@
+"""Moves of attackers and of bad luck: late copies, overtaken words, freezes, full disks at the end.
+
+Each succeeded once; ``tests/kit/halts.py`` says what must not come of them.
+"""
+
+from random import Random
+
+from pymavlink.dialects.v20 import common
+
+from tests.kit import px4
+from tests.kit.client import ARM, AUTO, PAUSE_CONTINUE, FakeClient, setpoint, sticks
+from tests.kit.soak.deeds import Deed, Stage
+from tests.kit.soak.words import MISSION_START, RELEASE, Kind, Said
+from tests.kit.soak.world import SoakWorld
+
+LATE = 20.0  # s, the oldest word that comes once more
+FREEZES = (0.6, 0.6, 2.0, 5.0, 20.0)  # s
+SUSPENSIONS = (2.0, 5.0, 20.0)  # s
+APART = (0.005, 0.02, 0.2)  # s, between two words of which the second overtakes the first
+AFTER = (0.3, 1.0, 3.0, 8.0)  # s, until a copy comes
+COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
+COPIED = (Kind.GO, Kind.WISH, Kind.MOTION)
+
+
+def radio(world: SoakWorld, *, rate: float, room: int) -> bool:
+    """Put a radio of ``rate`` bytes/s with ``room`` bytes of buffer between server and rovers.
+
+    False: the memory net has no model of one yet, and nothing was done.
+    """
+    lay = getattr(world.net, "radio", None)
+    if lay is None:
+        return False
+    lay(rate=rate, room=room)
+    return True
+
+
+class Attacks:
+    """What may be done to a world beside all that its people do."""
+
+    def __init__(self, world: SoakWorld, stage: Stage) -> None:
+        self._world = world
+        self._stage = stage
+        self._random: Random = stage.random
+        self._ways = world.observers[0].ways
+        self._auto = px4.MISSION if self._ways.sub_modes else AUTO
+
+    def deeds(self) -> list[Deed]:
+        """Give them; the more often one is named, the more often it happens."""
+        return [
+            *[self.copy] * 6,
+            *[self.late_copy_of_a_go] * 3,
+            *[self.overtaken] * 2,
+            self.freeze,
+            self.suspend,
+            self.lay_radio,
+            self.end_on_full_disk,
+        ]
+
+    def copy(self) -> None:
+        """Something that a client has said comes once more."""
+        now = self._world.now
+        told = [
+            s for s in self._world.words.recent if s.kind in COPIED and now - s.first.at <= LATE
+        ]
+        if told:
+            self._again(self._random.choice(told))
+
+    def late_copy_of_a_go(self) -> None:
+        """A word lets the rover go, a newer one halts it, then a copy of the older one comes."""
+        world, random = self._world, self._random
+        client, number = self._stage.client(), self._stage.rover()
+        self._go(client, number)
+        word = world.words.recent[-1]
+        world.run(random.choice(AFTER))
+        self._halt(self._stage.client(), number)
+        world.run(random.choice(AFTER))
+        self._again(word)
+
+    def overtaken(self) -> None:
+        """Two words of one client, the second of which arrives first."""
+        client, number = self._stage.client(), self._stage.rover()
+        self._note("overtaken words")
+        self._world.swap_next_two(client)
+        self._go(client, number)
+        self._world.run(self._random.choice(APART))
+        self._halt(client, number)
+
+    def freeze(self) -> None:
+        """The server's process stands still; what was sent meanwhile waits in its sockets."""
+        self._note("server frozen")
+        self._world.freeze(self._random.choice(FREEZES), self._meanwhile)
+
+    def suspend(self) -> None:
+        """The server's machine is suspended, and with it the clock that counts its uptime."""
+        self._note("machine suspended")
+        self._world.suspend_machine(self._random.choice(SUSPENSIONS), self._meanwhile)
+
+    def lay_radio(self) -> None:
+        """A slow radio with a large buffer stands between server and rovers."""
+        if radio(self._world, rate=5_760.0, room=16_384):
+            self._note("radio with a buffer")
+
+    def end_on_full_disk(self) -> None:
+        """The disk is full, somebody halts the rover, the server is ended by SIGTERM."""
+        self._note("ended on a full disk")
+        world, number = self._world, self._stage.rover()
+        world.disk_store.break_for(5.0)
+        self._halt(self._stage.client(), number)
+        world.run(self._random.choice(AFTER))
+        world.restart_in_order(away=self._random.choice((0.5, 8.0)))
+        self._stage.store = world.disk_store
+
+    def _meanwhile(self) -> None:
+        """Let a client do something while the server stands still."""
+        client, number = self._stage.client(), self._stage.rover()
+        self._random.choice(
+            (
+                lambda: self._go(client, number),
+                lambda: self._halt(client, number),
+                lambda: client.move(
+                    0.5, nonce=self._random.randrange(1, 1 << 24), target=(number, 191)
+                ),
+                lambda: client.send(sticks(300, system=number)),
+                lambda: client.send(setpoint(0.3, system=number)),
+            )
+        )()
+
+    def _note(self, name: str) -> None:
+        self._world.deeds[name] += 1
+
+    def _again(self, said: Said) -> None:
+        """Let a word come once more: the same packet, or as its sender would repeat it."""
+        how = self._random.choice(("the same packet", "with a new number", "confirmed higher"))
+        name = f"copy of {said.name}: {how}"
+        if how == "the same packet" or said.message.get_type() not in COMMANDS:
+            self._note(name if how == "the same packet" else f"copy of {said.name}: again")
+            self._world.net.send(said.client.name, said.client.server, said.data)
+            return
+        if how == "confirmed higher" and said.message.get_type() == "COMMAND_LONG":
+            higher = common.MAVLink_command_long_message(
+                *_fields(said.message, confirmation=self._random.randint(1, 10))
+            )
+        else:
+            higher, name = said.message, f"copy of {said.name}: with a new number"
+        self._note(name)
+        self._world.repeat(said, higher)
+
+    def _ask_mode(self, client: FakeClient, number: int, mode: int) -> None:
+        if self._ways.sub_modes:
+            px4.ask_mode(client, mode, target=(number, 1))
+        else:
+            client.mode(mode, target=(number, 1))
+
+    def _go(self, client: FakeClient, number: int) -> None:
+        own, rover = (number, 191), (number, 1)
+        self._random.choice(
+            (
+                lambda: client.proceed(target=own),
+                lambda: client.proceed(target=own),
+                lambda: client.command(PAUSE_CONTINUE, 1, target=rover),
+                lambda: client.command(RELEASE, 0, self._random.randrange(3), target=own),
+                lambda: client.command(MISSION_START, target=rover),
+                lambda: self._ask_mode(client, number, self._auto),
+                lambda: client.command(ARM, 1, target=rover),
+            )
+        )()
+
+    def _halt(self, client: FakeClient, number: int) -> None:
+        own, rover = (number, 191), (number, 1)
+        self._random.choice(
+            (
+                lambda: client.stop(target=own),
+                lambda: client.pause(target=own),
+                lambda: self._ask_mode(client, number, self._ways.hold),
+                lambda: client.arm(False, target=rover),
+            )
+        )()
+
+
+def _fields(message: common.MAVLink_message, *, confirmation: int) -> list[float]:
+    values = {name: getattr(message, name) for name in message.fieldnames}
+    values["confirmation"] = confirmation
+    return list(values.values())

@@ -1,0 +1,98 @@
+"""The same measurements of this server and of another revision's, turn and turn about in one run.
+
+Clients, floods and simulated rovers are this revision's for both: only the server differs. Each
+measurement is repeated, and who goes first changes, so that a machine that gets slower in between
+wrongs neither. Of each figure the median counts.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+from tests.kit.other_revision import checked_out
+
+from . import table
+from .child import ROOT, SERVER_FROM
+
+NUMBER = re.compile(r"-?[\d,]*\.?\d+")
+HEAD = ("what", "here", "there", "here/there", "here, all rounds", "there, all rounds")
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """One figure of both, as many times as there were rounds."""
+
+    what: str
+    unit: str
+    here: tuple[float, ...]
+    there: tuple[float, ...]
+
+
+def measure(revision: str, names: Sequence[str], *, rounds: int) -> list[Pair]:
+    """Give what each measurement says of both servers."""
+    pairs: list[Pair] = []
+    with checked_out(revision) as tree:
+        for name in names:
+            figures: dict[Path, list[dict[str, str]]] = {ROOT: [], tree: []}
+            for number in range(rounds):
+                for each in (ROOT, tree) if number % 2 else (tree, ROOT):
+                    figures[each].append(_figures(name, each))
+            pairs += _paired(figures[ROOT], figures[tree])
+    return pairs
+
+
+def render(pairs: Sequence[Pair]) -> str:
+    """Give the table as text."""
+    return table.aligned([HEAD, *map(_cells, pairs)])
+
+
+def _figures(name: str, tree: Path) -> dict[str, str]:
+    """Run one measurement in a process of its own; gives its figures by what they are."""
+    print(f"{name}: {'here' if tree == ROOT else 'there'}", file=sys.stderr, flush=True)
+    ended = subprocess.run(
+        [sys.executable, "-m", "tools.bench", "--json", name],
+        cwd=ROOT,
+        env={**os.environ, SERVER_FROM: str(tree)},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    rows = json.loads(ended.stdout.splitlines()[-1])
+    return {row["what"]: row["figure"] for row in rows}
+
+
+def _paired(here: Sequence[dict[str, str]], there: Sequence[dict[str, str]]) -> list[Pair]:
+    return [
+        Pair(what, _unit(figure), _numbers(here, what), _numbers(there, what))
+        for what, figure in here[0].items()
+        if NUMBER.search(figure)
+    ]
+
+
+def _numbers(rounds: Sequence[dict[str, str]], what: str) -> tuple[float, ...]:
+    found = (NUMBER.search(figures[what]) for figures in rounds)
+    return tuple(float(number[0].replace(",", "")) for number in found if number is not None)
+
+
+def _unit(figure: str) -> str:
+    """Give what stands behind the first number."""
+    behind = NUMBER.split(figure, maxsplit=1)[1]
+    return behind.partition(",")[0].strip()
+
+
+def _cells(pair: Pair) -> tuple[str, ...]:
+    here, there = median(pair.here), median(pair.there)
+    return (
+        pair.what,
+        f"{here:,g} {pair.unit}",
+        f"{there:,g} {pair.unit}",
+        f"{here / there:.2f}" if there else "",
+        " ".join(f"{each:g}" for each in pair.here),
+        " ".join(f"{each:g}" for each in pair.there),
+    )

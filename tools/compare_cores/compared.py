@@ -1,0 +1,144 @@
+"""One record through both cores: what differs, and by which entry of the table that is meant."""
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .differences import Difference, Kind, differences
+from .intended import INTENDED, After, Intended
+from .new_core import NewCore, sent_of
+from .wire import Layouts, Sent
+
+MOST_WAKE_UPS = 1_000  # that only the new core wants, between two inputs
+
+
+@dataclass
+class Compared:
+    """What came of one record."""
+
+    whose: str
+    seconds: float = 0.0  # of its run that were compared
+    inputs: int = 0
+    packets: int = 0  # of the old core, compared
+    left_out: int = 0  # of the old core, after the runs had diverged
+    skipped: int = 0  # wake-ups that only the old core wanted
+    added: int = 0  # and only the new one
+    intended: Counter[str] = field(default_factory=Counter)
+    diverged: str = ""  # the entry, and when
+    unexplained: list[str] = field(default_factory=list)  # the first of them in words
+    unusable: str = ""  # why it could not be compared
+
+
+class Comparison:
+    """Reads what ``inside/expand`` says of one record, and runs this checkout's core beside it."""
+
+    def __init__(
+        self,
+        whose: str,
+        *,
+        old: Layouts,
+        new: Layouts,
+        secrets: Mapping[str, bytes],
+        table: tuple[Intended, ...] = INTENDED,
+    ) -> None:
+        """``old`` and ``new`` are the layouts of both revisions' messages."""
+        self.result = Compared(whose)
+        self._old, self._new = old, new
+        self._secrets = secrets
+        self._table = table
+        self._sent: list[Sent] = []  # by the old core, in this instant
+        self._counts_numbers = True
+        self._is_over = False
+        self._began: float | None = None
+        self._now = 0.0
+
+    def run(self, lines: Iterator[str]) -> Compared:
+        """Read to the line that says it is the end."""
+        head = json.loads(next(lines))
+        if isinstance(head, list):  # the end at once
+            self.result.unusable = head[1]
+            return self.result
+        core, waiting, due = None, [], None
+        for line in lines:
+            values = json.loads(line)
+            kind = values[0]
+            if kind == "end":
+                self._end(values[1])
+                return self.result
+            if kind == "task":
+                waiting.append(values[1])
+                continue
+            if self._is_over:
+                self.result.left_out += len(values[2]) if kind == "out" else 0
+                continue
+            try:
+                if core is None:
+                    core = NewCore(head, waiting, self._secrets)
+                due = self._step(core, values, due)
+                self.result.skipped, self.result.added = core.skipped, core.added
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is what is looked for
+                text = f"{type(error).__name__}: {error}"
+                self._judge([Difference(Kind.CRASHED, self._now, None, None, text)])
+        raise RuntimeError("the other revision's process ended")
+
+    def _step(self, core: NewCore, values: list[Any], due: float | None) -> float | None:
+        match values:
+            case ["in", now, line]:
+                self._wake(core, due, now)
+                self._now = now
+                self._began = now if self._began is None else self._began
+                self.result.inputs += 1
+                core.feed(line, now=now)
+                return None
+            case ["out", _, packets, events]:
+                core.old_turn(events)
+                self._sent += sent_of(packets, self._old)
+                return None
+            case ["next", due]:
+                self._compare(core)
+                return due if due is None else float(due)
+            case _:
+                raise ValueError(f"unknown: {values[0]!r}")
+
+    def _wake(self, core: NewCore, due: float | None, until: float) -> None:
+        """Wake the new core when it alone wants to be, between two instants of the old one."""
+        if self._began is None or until <= self._now:
+            return
+        for _ in range(MOST_WAKE_UPS):
+            times = core.wake_between(due, until)
+            if not times:
+                return
+            self._now = times[0]
+            self._compare(core)
+
+    def _compare(self, core: NewCore) -> None:
+        new = core.end_instant(self._new, now=self._now)
+        old, self._sent = self._sent, []
+        self.result.packets += len(old)
+        self.result.seconds = self._now - (self._began if self._began is not None else self._now)
+        if self._is_over or not (old or new):
+            return
+        self._judge(differences(old, new, now=self._now, counts_numbers=self._counts_numbers))
+
+    def _judge(self, found: list[Difference]) -> None:
+        for difference in found:
+            entry = next((each for each in self._table if each.matches(difference)), None)
+            if entry is None:
+                self.result.unexplained = list(difference.lines())
+                self._is_over = True
+                return
+            self.result.intended[entry.name] += 1
+            if difference.kind is not Kind.CHANGED:
+                self._counts_numbers = False
+            if entry.after is After.DIVERGES:
+                self.result.diverged = f"{entry.name}, from {difference.now:.3f} s on"
+                self._is_over = True
+                return
+
+    def _end(self, said: str) -> None:
+        """The old core's own replay may fail late: then nothing that was found counts."""
+        if said != "same":
+            whose = self.result.whose
+            self.result = Compared(whose, unusable=said)
