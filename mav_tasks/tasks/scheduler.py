@@ -19,7 +19,7 @@ def start_blocker(
         return TaskReason.VEHICLE_SILENT
     if view.other_controller:
         return TaskReason.OTHER_CONTROLLER
-    if is_driven_by_others(view) or view.mode in (ModeKind.OTHER, ModeKind.THEIRS):
+    if view.mode is ModeKind.OTHER or (view.mode is ModeKind.MANUAL and view.armed):
         return TaskReason.WRONG_MODE
     if view.motion is None or now - view.motion.at > watch.motion_fresh:
         return TaskReason.NO_POSITION
@@ -34,11 +34,6 @@ def start_blocker(
     if view.drives_on:
         return TaskReason.LOSS_FAILSAFE
     return TaskReason.NONE
-
-
-def is_driven_by_others(view: VehicleView) -> bool:
-    """Whether a person or the vehicle itself may be driving: it is armed in a mode for that."""
-    return view.armed and view.mode in (ModeKind.MANUAL, ModeKind.OTHER)
 
 
 def place_of(goal: GoTo, view: VehicleView) -> LocalPlace | None:

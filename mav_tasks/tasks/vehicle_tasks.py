@@ -36,7 +36,7 @@ from mav_tasks.tasks.goal import GlobalPlace, MoveTurned, Plan, Rotate, SingleGo
 from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import Rank, TaskQueue
-from mav_tasks.tasks.scheduler import is_driven_by_others, outranks, start_blocker
+from mav_tasks.tasks.scheduler import outranks, start_blocker
 from mav_tasks.tasks.task import Draft, Frame, Progress, Submitter, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.view import Demand, VehicleView
@@ -772,11 +772,6 @@ class VehicleTasks:
             self._begin_next(seen, now=now)
             return
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal_of(task))
-        if blocker is R.WRONG_MODE and is_driven_by_others(seen):  # a person lets tasks go on
-            actor = f"vehicle {self.vehicle}"
-            self.halt(R.TAKEOVER, actor=actor, now=now)
-            self._pause_queue(R.TAKEOVER, actor=actor, now=now)
-            return
         self._note_blocker(first, blocker, now=now)
         if not blocker and self._book.is_durable(first):
             self._begin(task, seen, now=now)

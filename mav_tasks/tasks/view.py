@@ -19,9 +19,7 @@ class ModeKind(Enum):
     HOLD = auto()
     #: a person drives
     MANUAL = auto()
-    #: takes our setpoints, but it was somebody else who set it
-    THEIRS = auto()
-    #: anything else: its own mission, return, or a mode in which somebody drives
+    #: anything else: its own mission, return, or a mode that somebody else set
     OTHER = auto()
 
 

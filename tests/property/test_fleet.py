@@ -299,7 +299,12 @@ class Lives(RuleBasedStateMachine):
                 if (new, event.reason) == (S.PAUSED, R.PREEMPTED):
                     self.interrupted = task
                 self.tasks[task_id] = replace(
-                    task, state=new, reason=event.reason, version=version, progress=event.progress
+                    task,
+                    state=new,
+                    reason=event.reason,
+                    version=version,
+                    progress=event.progress,
+                    changed_at=event.at,
                 )
             case TaskModified(task_id=task_id, version=version):
                 task = self.tasks[task_id]

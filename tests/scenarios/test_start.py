@@ -57,6 +57,10 @@ def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, m
     assert shown(world, 1) == (S.QUEUED, R.WRONG_MODE)
     assert [name for name in world.observer.sent_since(at) if name != "511"] == []
     world.operator_mode(Mode.HOLD)
+    if mode is not Mode.GUIDED:  # in which nobody drives by hand
+        world.run(3)
+        assert world.paused() is R.TAKEOVER
+        world.client.proceed()
     world.until_idle(tasks=1)
 
 

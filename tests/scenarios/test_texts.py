@@ -81,6 +81,7 @@ def test_what_needs_a_hand_is_a_warning(world: World) -> None:
     world.operator_mode(Mode.MANUAL)
     world.run(1)
     world.client.proceed()  # refused, with the reason
+    world.run(0.1)
     world.client.stop()
     world.run(1)
     said = severities(world)

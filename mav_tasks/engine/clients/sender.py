@@ -9,7 +9,7 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import CommandReceiver
 
 COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
-DOUBLED = 30.0  # s, the same for the very same packet: what a net delivers twice, it may hold long
+DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
 REMEMBERED = 64  # words
 
 
@@ -31,12 +31,17 @@ class Sender:
     def __repr__(self) -> str:
         return f"Sender({self.line!r}, {len(self._said)} words)"
 
-    def first_epoch(self, content: Hashable, packet: Packet, *, now: float) -> int | None:
-        """Return the epoch at which the first copy of this word came; None: it is none."""
+    def first_epoch(
+        self, content: Hashable, packet: Packet, *, is_counted: bool, now: float
+    ) -> int | None:
+        """Return the epoch at which the first copy of this word came; None: it is none.
+
+        ``is_counted``: it says itself that it is a copy.
+        """
         said = self._said.get(content)
         if said is None or said.life != self.line.lives:
             return None
-        within = DOUBLED if said.packet == packet.raw else COPIED
+        within = DOUBLED if is_counted or said.packet == packet.raw else COPIED
         return said.epoch if now - said.at <= within else None
 
     def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:

@@ -109,8 +109,7 @@ class Commands:
         asked = Asked(client, vehicle, packet, pending)
         epoch = vehicle.tasks.halts.epoch
         try:
-            now_too = self._settings.guided == "now"
-            kind = kind_of(command, vehicle.persona, runs_goals_now=now_too)
+            kind = kind_of(command, vehicle.persona)
             if kind is Kind.GO:
                 require_newer(asked, now=now)
             elif client.is_late and kind is Kind.MOTION:

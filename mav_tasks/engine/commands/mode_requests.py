@@ -92,7 +92,7 @@ class ModeRequests:
         vehicle = asked.vehicle
         epoch = vehicle.tasks.halts.epoch
         try:
-            if kind_of(asked.command, vehicle.persona, runs_goals_now=False) is Kind.GO:
+            if kind_of(asked.command, vehicle.persona) is Kind.GO:
                 require_newer(asked, now=now)
             if not self.asked(asked, now=now):
                 vehicle.requests.forward(asked.packet)

@@ -7,8 +7,9 @@ stood still. Who is refused may send it anew; that is told.
 
 from math import isfinite
 
+from mav_tasks.engine.clients.sender import COPIED, DOUBLED
 from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import CHANGE_MODE, has_place, reposition_flags
+from mav_tasks.engine.commands.goals import has_place
 from mav_tasks.engine.policy import DISARM, PAUSE, PAUSE_HERE, Kind, Row, row_of_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
@@ -40,15 +41,12 @@ def row_said(command: Command) -> Row:
             return row_of_command(number)
 
 
-def kind_of(command: Command, persona: Persona, *, runs_goals_now: bool) -> Kind:
-    """Return what a command does; ``runs_goals_now``: a "go to" comes before what runs."""
-    row, number = row_said(command), command.command
-    if number == MavCmd.DO_SET_MODE:
+def kind_of(command: Command, persona: Persona) -> Kind:
+    """Return what a command does."""
+    if command.command == MavCmd.DO_SET_MODE:
         is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
         return Kind.HALT if is_hold else Kind.GO
-    if number == MavCmd.DO_REPOSITION and runs_goals_now and row.kind is not Kind.HALT:
-        return Kind.GO if reposition_flags(command) & CHANGE_MODE else row.kind
-    return row.kind
+    return row_said(command).kind
 
 
 def kind_of_message(message: Message | None, persona: Persona) -> Kind:
@@ -56,7 +54,7 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
     if isinstance(message, SetMode):
         return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
     if isinstance(message, CommandLong | CommandInt):
-        return kind_of(command_of(message), persona, runs_goals_now=True)
+        return kind_of(command_of(message), persona)
     return Kind.WISH
 
 
@@ -69,10 +67,13 @@ def require_newer(asked: Asked, *, now: float) -> None:
     sent_by = sender.line.sent_by(number, now=now)
     named = _epoch_in(asked.command)
     content = (asked.command.target, asked.command.command, repr(asked.command.params))
-    first = sender.first_epoch(content, packet, now=now)
+    copies = asked.command.confirmation
+    first = sender.first_epoch(content, packet, is_counted=copies > 0, now=now)
+    if first is None and copies:  # the first one was lost, and had left before this one
+        sent_by = min(sent_by, now - min(copies * COPIED, DOUBLED))
     # its sender has said the last halt itself, and before this
     follows = halts.by is sender and number > halts.number
-    if follows and asked.command.confirmation == 0:
+    if follows and not copies:
         epoch = halts.epoch
     else:
         epoch = halts.epoch if halts.at < sent_by else halts.epoch - 1

@@ -9,6 +9,7 @@ from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwise
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import wish_of
+from mav_tasks.engine.commands.ordering import require_newer
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -110,6 +111,7 @@ class Submissions:
             vehicle.end_driving_of(asked.client.key, now=now)
         if self._settings.guided == "now" and asked.is_go_to:
             asked.rights.require(OPERATOR, "interrupt what a rover does")
+            require_newer(asked, now=now)
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
         else:
             task = vehicle.tasks.submit(draft, now=now)

@@ -57,7 +57,7 @@ RESULT_OF: dict[int, MavResult] = {
 WAITS_FOR = {
     R.VEHICLE_SILENT: "the rover is silent",
     R.OTHER_CONTROLLER: "somebody else drives",
-    R.WRONG_MODE: "wrong mode, set HOLD",
+    R.WRONG_MODE: "wrong mode; set HOLD, then continue",
     R.QUEUE_PAUSED: "released, and goes on when continued",
     R.NO_POSITION: "no position",
     R.DISARMED: "disarmed; arm, or continue",

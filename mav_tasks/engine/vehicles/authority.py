@@ -122,8 +122,8 @@ class Authority:
         is_home = self._persona.arms_in_hold and not armed and mode in at_rest
         if mode == self._persona.hold_mode or (is_home and not self._mode_is_ours):
             return ModeKind.HOLD
-        if mode == self._persona.control_mode:
-            return ModeKind.OURS if self._mode_is_ours else ModeKind.THEIRS
+        if mode == self._persona.control_mode and self._mode_is_ours:
+            return ModeKind.OURS
         return ModeKind.MANUAL if mode in self._persona.manual_modes else ModeKind.OTHER
 
     def has_granted(self, client: Hashable) -> bool:

@@ -396,9 +396,17 @@ class Vehicle:
             self._authority.withdraw_arming()
             may_be_lost = self.control.is_streaming and mode == self.persona.hold_mode
             self._take_over_by_mode(mode, now=now)
+            self._note_parking(was_mode, mode, now=now)
             if may_be_lost and self.persona.has_loss_failsafe:
                 self.control.ask_to_stay(now=now)
                 self.requests.flush(now=now)
+
+    def _note_parking(self, was_mode: int, mode: int, *, now: float) -> None:
+        """Somebody who was driving sets HOLD: what waits does not drive it off from there."""
+        drove = was_mode not in (self.persona.hold_mode, self.persona.control_mode)
+        if drove and mode == self.persona.hold_mode and self.armed and not self.tasks.is_empty:
+            actor = f"vehicle {self.system_id}"
+            self.tasks.pause(TaskReason.TAKEOVER, actor=actor, now=now)
 
     def _mode_changed_in_spite_of_stop(self, mode: int, *, now: float) -> None:
         """A request from before the STOP was late. Later, it is a person at the vehicle."""
@@ -530,8 +538,8 @@ class Vehicle:
             self.control.keep_armed()
         if disarms:
             self.tasks.halt(TaskReason.DISARMED, actor=actor, now=now)
+            self._authority.withdraw_arming()  # also where it is disarmed already
         if disarms and self.control.is_engaged and self.control.phase is not Phase.STOPPING:
-            self._authority.withdraw_arming()
             self._zero_what_is_kept()
             self._take_over("disarmed by a client", now=now)
         elif disarms:

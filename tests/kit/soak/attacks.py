@@ -7,12 +7,15 @@ from random import Random
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Radio
 from tests.kit import px4
 from tests.kit.client import ARM, AUTO, PAUSE_CONTINUE, FakeClient, setpoint, sticks
 from tests.kit.soak.deeds import Deed, Stage
 from tests.kit.soak.words import MISSION_START, RELEASE, Kind, Said
 from tests.kit.soak.world import SoakWorld
 
+REPEATED = 3.0  # s, within which stock clients send again what is not answered
 LATE = 20.0  # s, the oldest word that comes once more
 FREEZES = (0.6, 0.6, 2.0, 5.0, 20.0)  # s
 SUSPENSIONS = (2.0, 5.0, 20.0)  # s
@@ -22,16 +25,11 @@ COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 COPIED = (Kind.GO, Kind.WISH, Kind.MOTION)
 
 
-def radio(world: SoakWorld, *, rate: float, room: int) -> bool:
-    """Put a radio of ``rate`` bytes/s with ``room`` bytes of buffer between server and rovers.
-
-    False: the memory net has no model of one yet, and nothing was done.
-    """
-    lay = getattr(world.net, "radio", None)
-    if lay is None:
-        return False
-    lay(rate=rate, room=room)
-    return True
+def radio(world: SoakWorld, *, bytes_per_second: float, buffer: int) -> None:
+    """Put a radio with a buffer between the server and each rover, each way."""
+    for number in range(1, len(world.rovers) + 1):
+        for way in ((f"rover{number}", VEHICLE_LINK), (VEHICLE_LINK, f"rover{number}")):
+            world.net.buffers[way] = Radio(bytes_per_second=bytes_per_second, buffer=buffer)
 
 
 class Attacks:
@@ -96,8 +94,11 @@ class Attacks:
         self._world.suspend_machine(self._random.choice(SUSPENSIONS), self._meanwhile)
 
     def lay_radio(self) -> None:
-        """A slow radio with a large buffer stands between server and rovers."""
-        if radio(self._world, rate=5_760.0, room=16_384):
+        """A slow radio with a large buffer stands between server and rovers, or no more."""
+        if self._world.net.buffers:
+            self._world.net.buffers.clear()
+        else:
+            radio(self._world, bytes_per_second=5_760.0, buffer=16_384)
             self._note("radio with a buffer")
 
     def end_on_full_disk(self) -> None:
@@ -130,13 +131,19 @@ class Attacks:
 
     def _again(self, said: Said) -> None:
         """Let a word come once more: the same packet, or as its sender would repeat it."""
-        how = self._random.choice(("the same packet", "with a new number", "confirmed higher"))
+        ways = ["the same packet", "confirmed higher"]
+        if self._world.now - said.first.at <= REPEATED:  # later, nobody sends it by itself
+            ways.append("with a new number")
+        how = self._random.choice(ways)
         name = f"copy of {said.name}: {how}"
         if how == "the same packet" or said.message.get_type() not in COMMANDS:
             self._note(name if how == "the same packet" else f"copy of {said.name}: again")
             self._world.net.send(said.client.name, said.client.server, said.data)
             return
-        if how == "confirmed higher" and said.message.get_type() == "COMMAND_LONG":
+        if how == "confirmed higher" and said.message.get_type() == "COMMAND_INT":
+            self._world.net.send(said.client.name, said.client.server, said.data)  # it has no count
+            return
+        if how == "confirmed higher":
             higher = common.MAVLink_command_long_message(
                 *_fields(said.message, confirmation=self._random.randint(1, 10))
             )

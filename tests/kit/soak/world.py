@@ -7,7 +7,6 @@ from pathlib import Path
 from random import Random
 from zlib import crc32
 
-from mav_tasks import runner
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.memory import Conditions
@@ -47,11 +46,7 @@ RESULT_OF_ACK = 12
 COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG
 SET_MODE_MESSAGE = 11
 ENDS_WITHIN = 2.0  # s, of a server that is ended in order
-ROUNDED = 1e-9  # s, more than what is lost by adding and taking off the same time
 MEANWHILE = (0.1, 0.5, 2.0)  # s, between two deeds of clients while the server stands still
-#: whether the time that the runner tells the engine stands still with a suspended machine, as
-#: CLOCK_MONOTONIC does and CLOCK_BOOTTIME does not
-LOSES_TIME = "CLOCK_BOOTTIME" not in Path(runner.__file__).read_text("utf-8")
 
 
 class Violation(AssertionError):
@@ -100,7 +95,6 @@ class SoakWorld(World):
         self.deeds: Counter[str] = Counter()  # of attackers, by name
         self.broken: list[Broken] = []
         self._luck = Random(seed)  # of what happens while the server stands still
-        self._behind = 0.0  # s that the server's clock has lost
         self._held: tuple[str, bytes | None] | None = None  # whose word is to be overtaken
         self._followed = 0  # events of the present server
         self._read: dict[str, int] = {}  # packets of each client
@@ -139,9 +133,8 @@ class SoakWorld(World):
         """Let the clock on the wall of the server's machine jump."""
         self.faults["wall clock jumps"] += 1
         self.disk.wall_offset += seconds
-        now = self.now - self._behind
-        self.server.pump.handle(WallClock(self.disk.wall_offset + self._behind), now=now)
-        self.server.pump.turn(now=now)
+        self.server.pump.handle(WallClock(self.disk.wall_offset), now=self.now)
+        self.server.pump.turn(now=self.now)
 
     def restart(self, *, away: float) -> None:
         """Let the server be killed, and another go on with what the disk has."""
@@ -152,7 +145,7 @@ class SoakWorld(World):
         """Let the server be ended by SIGTERM, and another go on with what the disk has."""
         self.faults["server ended"] += 1
         server = self.server
-        server.shut_down(now=self.now - self._behind)
+        server.shut_down(now=self.now)
         self.run_until(lambda: server.pump.is_over, within=ENDS_WITHIN)
         self._restart(away=away)
 
@@ -168,10 +161,8 @@ class SoakWorld(World):
         self.join(self.server)
 
     def suspend_machine(self, seconds: float, meanwhile: Callable[[], object]) -> None:
-        """Let the server's machine be suspended; its clock may not know of it afterwards."""
+        """Let the server's machine be suspended: its clock goes on (CLOCK_BOOTTIME)."""
         self.freeze(seconds, meanwhile)
-        if LOSES_TIME:
-            self._set_back(seconds)
 
     def swap_next_two(self, client: FakeClient) -> None:
         """Let the packet after the next one of a client overtake that."""
@@ -196,7 +187,6 @@ class SoakWorld(World):
 
     def _restart(self, *, away: float) -> None:
         self.restarts += 1
-        self._behind = 0.0
         self._follow()
         self.disk.write(self.disk_store.committed(), now=self.now)
         self.end_server()
@@ -345,22 +335,6 @@ class SoakWorld(World):
         self.net.send(source, CLIENT_LINK, data)
         self.net.send(source, CLIENT_LINK, first)
         return True
-
-    def _set_back(self, seconds: float) -> None:
-        """Let the server's clock have stood still for so long; what it says is moved back."""
-        self._behind += seconds
-        behind, server = self._behind, self.server
-        kind = type(server)
-
-        def next_deadline() -> float | None:
-            due = kind.next_deadline(server)
-            return None if due is None else due + behind
-
-        def turn(*, now: float) -> None:
-            kind.turn(server, now=now - behind + ROUNDED)
-
-        server.next_deadline = next_deadline  # type: ignore[method-assign]
-        server.turn = turn  # type: ignore[method-assign]
 
     def _raise(self, faults: Iterator[str]) -> None:
         for text in faults:
