@@ -60,13 +60,13 @@ class Word(NamedTuple):
 
 def command(row: Row, number: int, *params: float, component: int = 1) -> Word:
     message = command_long(number, *params, target=(1, component))
-    return Word(row, number, True, lambda client: client.packed(message), component)
+    return Word(row, number, True, lambda client: client.send_repeated(message), component)
 
 
 def commands() -> Iterator[Word]:
     for number in (*COMMANDS, *COMMANDS_OF_NOBODY, 54020):
         row = row_of_command(number)
-        second = 0 if number in (DO_SET_MODE, REPOSITION) else 1
+        second = 0 if number in (DO_SET_MODE, REPOSITION, PAUSE_CONTINUE) else 1
         if row.kind is not Kind.HALT or number >= 54000:
             yield command(row, number, 1, second)
             if number not in OURS_EVERYWHERE:
@@ -108,7 +108,7 @@ def messages() -> Iterator[Word]:
 
 
 def verified(message: Any) -> Callable[[FakeClient], bytes]:
-    return lambda client: client.packed(message)
+    return lambda client: client.send_repeated(message)
 
 
 def unverified(number: int) -> Callable[[FakeClient], bytes]:

@@ -111,6 +111,8 @@ def test_whatever_interrupts_it_ends_where_it_would_have_ended(
         else:
             world.client.pause() if kind == "pause" else world.operator_mode(Mode.HOLD)
             world.run(random.uniform(1.0, 3.0))
+            if kind == "takeover":  # a continue of just before it would be taken for an older one
+                world.run(3.6)
             world.client.proceed()
     world.until_idle(tasks=others, within=240)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * others
