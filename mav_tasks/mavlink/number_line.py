@@ -18,6 +18,7 @@ class NumberLine:
     def __init__(self) -> None:
         self.last = -1  #: the highest number so far, counted on beyond 255; -1: none has come
         self._passed = [0.0] * 256  # s, when each number came, or a higher one
+        self._came = [-1] * 256  # which numbers came themselves, before any higher one
         self._behind: list[tuple[int, float]] = []  # number and s, of those since the last ahead
         self._heard_at = 0.0
         self._is_at_0 = False  # the last one was number 0, after a silence
@@ -51,12 +52,15 @@ class NumberLine:
 
         The last number again says nothing: some senders do not count.
         """
-        return now if number >= self.last else self._passed[(number + 1) & 0xFF]
+        if number >= self.last:
+            return now
+        came_before = self._came[number & 0xFF] == number
+        return self._passed[number & 0xFF if came_before else (number + 1) & 0xFF]
 
     def _move_on(self, number: int, by: int, now: float) -> int:
         for each in range(number, number - min(by, 256), -1):
             self._passed[each & 0xFF] = now
-        self._passed[number & 0xFF] = now
+        self._came[number & 0xFF] = number
         self._behind.clear()
         self.last = number
         return number

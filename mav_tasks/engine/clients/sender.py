@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Hashable
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.mavlink.number_line import NumberLine
@@ -11,13 +12,14 @@ from mav_tasks.services.command_receiver import CommandReceiver
 COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
 DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
 REMEMBERED = 64  # words
+COPIES = 32  # of one word
 
 
 class _Said(NamedTuple):
     life: int  # of the sender: a program that is run again says all anew
     epoch: int  # of the vehicle, when the first copy came
     at: float  # s, of the last copy
-    packet: bytes
+    packets: frozenset[bytes]  # the latest copies
 
 
 class Sender:
@@ -41,12 +43,18 @@ class Sender:
         said = self._said.get(content)
         if said is None or said.life != self.line.lives:
             return None
-        within = DOUBLED if is_counted or said.packet == packet.raw else COPIED
+        within = DOUBLED if is_counted or packet.raw in said.packets else COPIED
         return said.epoch if now - said.at <= within else None
+
+    def last_copy_at(self, content: Hashable) -> float:
+        """Return when the last copy of this word came, s; -inf: none has."""
+        said = self._said.get(content)
+        return -inf if said is None or said.life != self.line.lives else said.at
 
     def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:
         """Remember a word, or that one more copy of it has come."""
-        self._said.pop(content, None)
-        self._said[content] = _Said(self.line.lives, epoch, now, packet.raw)
+        before = self._said.pop(content, None)
+        packets = frozenset() if before is None or len(before.packets) >= COPIES else before.packets
+        self._said[content] = _Said(self.line.lives, epoch, now, packets | {packet.raw})
         if len(self._said) > REMEMBERED:
             self._said.popitem(last=False)

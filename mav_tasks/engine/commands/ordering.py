@@ -24,6 +24,7 @@ EPOCH_IN: dict[int, int] = {
     MavCmd.TASK_RELEASE: 2,
     MavCmd.MISSION_START: 2,
 }
+REPEATED = 2.0  # s, within which MAVSDK sends again, unmarked, what it has no answer to: 1.5
 EPOCHS = 1 << 24  # that a float32 tells apart
 AGAIN = "if you still mean it, send it again in 4 s"
 
@@ -71,9 +72,10 @@ def require_newer(asked: Asked, *, now: float) -> None:
     first = sender.first_epoch(content, packet, is_counted=copies > 0, now=now)
     if first is None and copies:  # the first one was lost, and had left before this one
         sent_by = min(sent_by, now - min(copies * COPIED, DOUBLED))
-    # its sender has said the last halt itself, and before this
+    # its sender has said the last halt itself, and before this, which it does not repeat by itself
+    is_anew = not copies and now - sender.last_copy_at(content) > REPEATED
     follows = halts.by is sender and number > halts.number
-    if follows and not copies:
+    if follows and is_anew:
         epoch = halts.epoch
     else:
         epoch = halts.epoch if halts.at < sent_by else halts.epoch - 1

@@ -15,7 +15,7 @@ from tests.kit.soak.deeds import Deed, Stage
 from tests.kit.soak.words import MISSION_START, RELEASE, Kind, Said
 from tests.kit.soak.world import SoakWorld
 
-REPEATED = 3.0  # s, within which stock clients send again what is not answered
+REPEATED = 2.0  # s, within which a stock client sends again, unmarked, what is not answered
 LATE = 20.0  # s, the oldest word that comes once more
 FREEZES = (0.6, 0.6, 2.0, 5.0, 20.0)  # s
 SUSPENSIONS = (2.0, 5.0, 20.0)  # s

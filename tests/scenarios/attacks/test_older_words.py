@@ -187,6 +187,24 @@ def test_halts_of_one_moment_come_first_whatever_link_they_came_on(world: World)
         assert world.paused() is R.STOPPED
 
 
+@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, halt: str) -> None:
+    """Its repetitions have a number of their own, and no count."""
+    client = world.client
+    client.move(20)
+    world.until_state(1, S.EXECUTING)
+    world.add_client("person").pause()
+    world.run(4)
+    client.send(CONTINUE)
+    world.run(0.4)
+    HALTS[halt](world, client)
+    for _ in range(3):
+        world.run(0.4)
+        client.send(command_long(PAUSE_CONTINUE, 1))
+    assert driven_since(world, 3) < 0.2  # on its way to a stand
+    assert world.stands()
+
+
 # people are not locked out
 
 
@@ -197,7 +215,7 @@ def test_who_held_it_may_go_on_at_once(world: World) -> None:
         world.client.pause()
         world.run(0.3)
         going = world.client.proceed()
-        world.run(0.7)
+        world.run(1.8)
         assert going.answer == (ACCEPTED, 1)
 
 

@@ -31,6 +31,11 @@ def test_a_sender_that_does_not_count_is_taken_at_its_word() -> None:
     assert line.sent_by(line.place(0, now=20.0), now=20.0) == 20.0
 
 
+def test_the_same_packet_again_had_left_when_it_came_first() -> None:
+    line = line_of((10, 1.0), (11, 2.0), (12, 3.0))
+    assert line.sent_by(line.place(11, now=20.0), now=20.0) == 2.0
+
+
 def test_what_was_lost_in_between_was_passed_by_what_came_after_it() -> None:
     line = line_of((250, 1.0), (5, 2.0))
     for seq in (251, 255, 0, 4):
