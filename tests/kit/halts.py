@@ -32,7 +32,7 @@ MODE_TAKES = 0.5  # s from a mode request's arrival until the rover shows the mo
 BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL})
 REMEMBERED = 50  # go words
 WEIGHTS = {Kind.WISH: 1, Kind.MOTION: 2, Kind.GO: 3}
-CONTINUE, CANCEL, STOP = "continue", "cancel", "STOP"
+CONTINUE, CANCEL, STOP, HOLD = "continue", "cancel", "STOP", "HOLD"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +66,7 @@ class _Halt:
     has_stood: bool = False
     since: str = "no word"  # what was read since then and does not end it, the likeliest of it
     weight: int = 0  # of that
+    pauses: bool = True  # else what is submitted after it may drive: a HOLD with nothing to hold
     fresh: set[tuple[str, int]] = field(default_factory=set)  # go words that nobody answered yet
 
     def note(self, word: Word, text: str) -> None:
@@ -101,6 +102,7 @@ class Halts:
         self._disturbed_at = -1e9
         self._mode = vehicle.autopilot.mode
         self._mode_sent_at = -1e9  # a request of the server for a mode reached the rover
+        self._pauses = True  # of the last halt that was read
         self._is_by_itself = False  # in a mode of its own, and not by the server
         self.halted: Counter[str] = Counter()  # by name
         self.refused: Counter[str] = Counter()  # go words
@@ -135,17 +137,24 @@ class Halts:
         if self._halt is not None and self._halt.name == CANCEL:
             self._halt = None
 
-    def read(self, word: Word, *, running: int | None, now: float) -> None:
-        """The server reads a word of a client; ``running`` is the task that is being driven."""
+    def read(self, word: Word, *, running: int | None, now: float, has_tasks: bool = True) -> None:
+        """The server reads a word of a client; ``running`` is the task that is being driven.
+
+        ``has_tasks``: some task of the rover is not over.
+        """
         if word.system_id not in (0, self.system_id):
             return
         if word.kind is Kind.HALT:
             of_what_runs = running is not None and word.param1 in (0.0, float(running))
             if word.name != CANCEL or of_what_runs:
                 self._asked[word.peer, word.command] = word, now
+                self._pauses = word.name != HOLD or has_tasks
         elif word.kind in (Kind.GO, Kind.MOTION):
             self._read_go(word, now=now)
         elif word.kind is Kind.WISH and self._halt is not None:
+            if not self._halt.pauses and word.first_sent > self._halt.read_at:
+                self._halt = None
+                return
             self._halt.note(word, f"a {'copy of a ' if word.is_copy else ''}{word.name}")
 
     def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
@@ -198,6 +207,7 @@ class Halts:
         self.halted[name] += 1
         is_stop = name == STOP or (self._halt is not None and self._halt.is_stop)
         halt = _Halt(name, word, read_at, now, self._vehicle.truth, is_stop)
+        halt.pauses = is_stop or self._pauses
         newer = [go for go in self._gos if go.granted is not False and self._ends(go.word, halt)]
         self._halt = self._suspended = None
         for go in self._gos:

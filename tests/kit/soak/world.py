@@ -298,7 +298,8 @@ class SoakWorld(World):
             vehicle = seen.get(halts.system_id)
             begun = None if vehicle is None else vehicle.begun
             running = None if begun is None else int(begun.id)
-            halts.read(word, running=running, now=self.now)
+            has_tasks = begun is not None or (vehicle is not None and bool(vehicle.waiting))
+            halts.read(word, running=running, has_tasks=has_tasks, now=self.now)
 
     def _server_answers(self, peer: str, data: bytes) -> None:
         command = int.from_bytes(data[COMMAND_OF_ACK], "little")
