@@ -358,7 +358,7 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
     upload(world, submitter, target=(1, 1))
     at = world.now
     assert answer(world, submitter.command(MISSION_START, target=(1, 1))) == NOT_ALLOWED
-    assert "may not start a plan while tasks are paused, operator" in " ".join(submitter.texts())
+    assert "may not end driving by hand, operator may" in " ".join(submitter.texts())
     world.run(3)
     assert world.observer.sent_since(at) == []
     assert world.rover.autopilot.mode is Mode.MANUAL

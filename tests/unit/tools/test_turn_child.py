@@ -51,4 +51,4 @@ def test_idle_wake_ups_are_those_of_a_server_that_has_nothing_to_do(answers: lis
     wake_ups = answers[1]["wake_ups"]
     assert 10 <= len(wake_ups) <= 50  # in 10 s
     packets = {name for each in wake_ups for name in each["packets"]}
-    assert packets <= {"HEARTBEAT", "MISSION_CURRENT", "COMMAND_LONG"}
+    assert packets <= {"HEARTBEAT", "MISSION_CURRENT", "COMMAND_LONG", "TIMESYNC"}
