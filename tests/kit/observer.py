@@ -147,6 +147,7 @@ class Observer:
     _zeros_since: float = 1e9
     _in_row: int = 0  # of the server's setpoints
     _hold_at: float = -1e9
+    _sticks_at: float = -2e9
     _disarm_at: float = -1e9
     _mode_at: float = -1e9  # when it was last heard that the mode is another one
     _hold_wished_at: float = -1e9  # when a client last asked for HOLD
@@ -185,6 +186,7 @@ class Observer:
         elif kind == "SET_MODE":
             self._see_wish_of_client(now, message.custom_mode)
         elif kind in BY_HAND and _off_centre(message):
+            self._sticks_at = now
             self._take_over(now, zeros=1)
 
     def heard(self, now: float, data: bytes, *, sent_at: float) -> None:
@@ -350,6 +352,10 @@ class Observer:
     def _is_known_unready(self, now: float) -> bool:
         return self._unready_since is not None and now - self._unready_since > KNOWN
 
+    def _is_held_for_sticks(self, now: float) -> bool:
+        """Whether it was asked for HOLD in the step of a stick: with zeros until it shows that."""
+        return self._hold_at == self._sticks_at and now - self._hold_at <= OWN_REQUEST
+
     def _take_over(self, now: float, *, zeros: int) -> None:
         """Somebody else has the rover; of interest only while the server is driving."""
         self._in_row = 0  # it may have been handing it back, and ends that, too
@@ -376,9 +382,9 @@ class Observer:
             # no other pause does a zero belong
             if now == self._pause_at and not moves:
                 self._hold_due = now
-            elif moves or self._zeros_left == 0:
+            elif moves or (self._zeros_left == 0 and not self._is_held_for_sticks(now)):
                 self._violation(now, f"setpoint after a takeover: {self._name(message)}")
-            self._zeros_left -= 1
+            self._zeros_left = max(0, self._zeros_left - 1)
         self._check_rate(now, moves=moves)
         if moves:
             self._check_motion(now)
