@@ -4,7 +4,7 @@ What a killed server had committed is on the disk, and nothing else. It is writt
 writes the real file, when the next server asks for it, so that virtual time costs no real disk.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from mav_tasks.settings import Retention
@@ -14,9 +14,11 @@ from mav_tasks.store.codec import Encoder
 from mav_tasks.store.database import Database
 from mav_tasks.store.reading import read_restored
 from mav_tasks.store.retention import Trimmer
-from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleHalted
 from mav_tasks.tasks.restored import Restored
 from tests.kit.store import LateStore
+
+HALTS = (QueuePaused, QueueContinued, VehicleHalted)
 
 
 class Disk:
@@ -79,8 +81,15 @@ class UncertainStore(LateStore):
         return outcomes
 
     def committed(self) -> list[Event]:
-        """Give what would survive if the machine stopped now: perhaps more than was told."""
-        if self.clock() < self.broken_until:
-            return self.events[: self.kept]
-        due = (end for at, end in self._under_way if at + self.delay <= self.clock())
-        return self.events[: max(due, default=self.kept)]
+        """Give what would survive if the machine stopped now: perhaps more than was told.
+
+        Halts have a record of their own, which takes them on a full disk, too.
+        """
+        due: Iterable[int] = ()
+        if self.clock() >= self.broken_until:
+            due = (end for at, end in self._under_way if at + self.delay <= self.clock())
+        end = max(due, default=self.kept)
+        return [
+            *self.events[:end],
+            *(each for each in self.events[end:] if isinstance(each, HALTS)),
+        ]
