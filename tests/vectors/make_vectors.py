@@ -50,6 +50,7 @@ TASK_STATUS: list[Field] = [
     ],
     ("char", "text", 50),
 ]
+HALT_EPOCH: list[Field] = [("uint32_t", "halt_epoch", 0)]
 TASK_QUEUE_STATUS: list[Field] = [
     *[
         ("uint32_t", name, 0)
@@ -239,8 +240,9 @@ def _by_hand() -> list[dict[str, Any]]:
         "submitter_component": 190,
         "submitter_link": 0,
         "text": "move 2 m: executing",
+        "halt_epoch": 0,
     }
-    full = status | {"text": "x" * 50, "state": 9, "progress": 100}
+    full = status | {"text": "x" * 50, "state": 9, "progress": 100, "halt_epoch": 1 << 24}
     queue = {
         "time_boot_ms": 1000,
         "version": 7,
@@ -250,6 +252,7 @@ def _by_hand() -> list[dict[str, Any]]:
         "counts": list(range(14)),
         "paused_reason": 35,
         "flags": 0,
+        "halt_epoch": 12,
     }
     timing = {
         "time_boot_ms": 1000,
@@ -278,10 +281,13 @@ def _by_hand() -> list[dict[str, Any]]:
         "opaque_id": 16777215,
     }
     extended = MISSION_ACK_EXTENSIONS
+    text = "a text without room for a zero"
     return [
-        _hand_made("a task under way", "TASK_STATUS", 54000, TASK_STATUS, [], status),
-        _hand_made("a text without room for a zero", "TASK_STATUS", 54000, TASK_STATUS, [], full),
-        _hand_made("a stopped queue", "TASK_QUEUE_STATUS", 54001, TASK_QUEUE_STATUS, [], queue),
+        _hand_made("a task under way", "TASK_STATUS", 54000, TASK_STATUS, HALT_EPOCH, status),
+        _hand_made(text, "TASK_STATUS", 54000, TASK_STATUS, HALT_EPOCH, full),
+        _hand_made(
+            "a stopped queue", "TASK_QUEUE_STATUS", 54001, TASK_QUEUE_STATUS, HALT_EPOCH, queue
+        ),
         _hand_made("even setpoints", "TASK_TIMING", 54002, TASK_TIMING, [], timing),
         _hand_made("versions", "PROTOCOL_VERSION", 300, PROTOCOL_VERSION, [], version),
         _hand_made("an upload's id", "MISSION_ACK", 47, MISSION_ACK, extended, plan),

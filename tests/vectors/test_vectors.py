@@ -82,6 +82,6 @@ def test_the_table_is_what_its_script_makes() -> None:
 def test_our_messages_have_the_sizes_of_the_contract() -> None:
     lengths = {v["message"]: len(bytes.fromhex(v["packet"])) for v in VECTORS}
     whole = {v["name"]: bytes.fromhex(v["packet"])[1] for v in VECTORS}
-    assert whole["a text without room for a zero"] == 104
-    assert whole["a stopped queue"] == 77  # of 78: the last byte is 0
-    assert lengths["TASK_STATUS"] == 10 + 104 + 2
+    assert whole["a text without room for a zero"] == 108
+    assert whole["a stopped queue"] == 79  # of 82: the last 3 bytes are 0
+    assert lengths["TASK_STATUS"] == 10 + 108 + 2
