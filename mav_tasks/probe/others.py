@@ -2,8 +2,9 @@
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavComponent, MavType
+from mav_tasks.mavlink.enums import MavComponent, MavResult, MavType
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.tasks.lifecycle import TaskReason
 
 MOST = 32  # of each kind that are remembered
 SETPOINTS = frozenset(
@@ -45,7 +46,9 @@ class Others:
             _note(self.servers, source)
         elif isinstance(message, m.CommandAck) and source.system_id == self.system_id:
             asker = Address(message.target_system, message.target_component)
-            if not asker.reaches(self._ours):
+            if _denies_our_address(message):
+                _note(self.servers, source)
+            elif not asker.reaches(self._ours):
                 _note(self.commanding, asker)
 
     @property
@@ -84,6 +87,11 @@ class Others:
             *(f"{each} commands it" for each in self.commanding),
             *(f"{each} sends setpoints" for each in self.setpoints),
         ]
+
+
+def _denies_our_address(ack: m.CommandAck) -> bool:
+    """We speak as a task server does: another one heeds nobody who does."""
+    return (ack.result, ack.result_param2) == (MavResult.DENIED, TaskReason.NOT_ALLOWED)
 
 
 def _is_server_like(address: Address) -> bool:

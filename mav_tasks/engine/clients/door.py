@@ -1,7 +1,8 @@
 """What of a client's packets is seen to: none of a borrowed address, and not too many requests.
 
 Who calls itself the server, or a rover, is heeded by nobody, whatever it sends: a loop in the net
-does so, or somebody who hides. STOP alone comes in from anybody, and is never too many.
+does so, or somebody who hides; a command of theirs is denied, so that a station that is set up so
+says why nothing happens. STOP alone comes in from anybody, and is never too many.
 
 What belongs to a transfer that is under way is asked for, and not counted; nor is what says that
 somebody is there, or drives by hand: its rate is bounded where it comes in. But all that goes on to
@@ -45,7 +46,7 @@ class Door:
             return True
         self.left_out += 1
         if isinstance(message, m.CommandLong | m.CommandInt) and client.may_be_refused(now=now):
-            self._refuse(client, packet, message, now=now)
+            self._tell_rate(client, packet, message, now=now)
         return False
 
     def _is_ours(self, source: Address) -> bool:
@@ -63,9 +64,13 @@ class Door:
             return  # noise may look like it, and nobody waits for what comes of a heartbeat
         words = f"{packet.source} is an address of the server or of a rover"
         refusal = Rejection(TaskReason.NOT_ALLOWED, words)
-        self._refusals.stream(client, target_of(message).system_id, packet, refusal, now=now)
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            if client.may_be_refused(now=now):
+                self._refuse(client, packet, message, MavResult.DENIED, refusal, now=now)
+        else:
+            self._refusals.stream(client, target_of(message).system_id, packet, refusal, now=now)
 
-    def _refuse(
+    def _tell_rate(
         self,
         client: GcsClient,
         packet: Packet,
@@ -73,20 +78,30 @@ class Door:
         *,
         now: float,
     ) -> None:
+        rights = client.rights
+        words = f"role {rights.role} may send {rights.limits.rate:g} requests a second"
+        refusal = Rejection(TaskReason.RATE_LIMITED, words)
+        result = MavResult.TEMPORARILY_REJECTED
+        self._refuse(client, packet, message, result, refusal, now=now)
+
+    def _refuse(
+        self,
+        client: GcsClient,
+        packet: Packet,
+        message: m.CommandLong | m.CommandInt,
+        result: MavResult,
+        refusal: Rejection,
+        *,
+        now: float,
+    ) -> None:
+        self._refusals.stream(client, message.target_system, packet, refusal, now=now)
         vehicle = self._vehicles.look_at(message.target_system)
         if vehicle is None:
             return
         component = message.target_component or vehicle.server_component
         source = Address(vehicle.system_id, component)
-        answer = Answer(
-            message.command, MavResult.TEMPORARILY_REJECTED, TaskReason.RATE_LIMITED, source
-        )
-        client.answer(answer, packet.source)
-        rights = client.rights
-        words = f"role {rights.role} may send {rights.limits.rate:g} requests a second"
-        client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-        refusal = Rejection(TaskReason.RATE_LIMITED, words)
-        self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
+        client.answer(Answer(message.command, result, refusal.reason, source), packet.source)
+        client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
 
 
 def _is_uncounted(client: GcsClient, packet: Packet, message: m.Message | None) -> bool:

@@ -1,6 +1,7 @@
 """Attack S6: who calls itself the server, or a rover, is heeded by nobody, whatever it sends.
 
-STOP alone is: it only stops, and it is never too late to find out who has sent it.
+A command of theirs is denied. STOP alone is heeded: it only stops, and it is never too late to find
+out who has sent it.
 """
 
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
-from tests.kit.client import GUIDED, FakeClient, heartbeat, set_mode
+from tests.kit.client import DENIED, GUIDED, FakeClient, heartbeat, set_mode
 from tests.kit.world import World
 
 #: of the server towards rovers, of a rover, and of the server in that rover
@@ -62,7 +63,7 @@ def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
     reached = len(of_source(world, source))
     SENT[what](client)
     world.run(1.0)
-    assert client.acks == []
+    assert {(ack.result, ack.result_param2) for ack in client.acks} <= {(DENIED, R.NOT_ALLOWED)}
     assert MISSION_COUNT not in [packet.message_id for packet in client.received]
     assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (armed, mode)
     assert world.rover.autopilot.parameters["CRUISE_SPEED"] == speed
