@@ -30,6 +30,8 @@ class Halts:
         self.at = -inf  #: s, when the last came
         self.by: Hashable = None  #: whose word it was; None: nobody's
         self.number = -1  #: of that word, among those of its sender
+        self.command = 0  #: of that word, if it is one
+        self.is_undone = False  #: somebody has let the queue go on since
         self._reason, self._actor = TaskReason.NONE, ""
         self._was_asked = False  # to go on, since the last
 
@@ -49,13 +51,18 @@ class Halts:
         if is_same and now - self.at < SAME and not self._was_asked:
             return False
         self.epoch += 1
-        self.at, self.by, self.number = now, None, -1
+        self.at, self.by, self.number, self.command = now, None, -1, 0
         self._reason, self._actor, self._was_asked = reason, actor, False
+        self.is_undone = False
         return True
 
-    def was_said_by(self, sender: Hashable, number: int) -> None:
-        """Note whose word the last halt was, and its number among the sender's."""
-        self.by, self.number = sender, number
+    def lets_go(self) -> None:
+        """Note that the queue goes on; that does not arm what was disarmed."""
+        self.is_undone = self._reason is not TaskReason.DISARMED
+
+    def was_said_by(self, sender: Hashable, number: int, *, command: int = 0) -> None:
+        """Note whose word the last halt was, its number among the sender's, and its command."""
+        self.by, self.number, self.command = sender, number, command
 
     def was_asked_to_go_on(self) -> None:
         """Note that a word that lets go has come, whatever became of it."""

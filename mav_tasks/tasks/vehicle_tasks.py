@@ -602,6 +602,7 @@ class VehicleTasks:
             self._check_start(seen, goal_of(begun), now=now)
         if self._paused:
             self._paused = R.NONE
+            self.halts.lets_go()
             self._book.record(QueueContinued(self.vehicle, actor, now))
             self._led_away.given_back(seen, self._aside)
         if resumes:

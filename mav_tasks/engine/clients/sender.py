@@ -46,6 +46,11 @@ class Sender:
         within = DOUBLED if is_counted or packet.raw in said.packets else COPIED
         return said.epoch if now - said.at <= within else None
 
+    def has_said(self, content: Hashable, packet: Packet) -> bool:
+        """Return whether this very packet has come before."""
+        said = self._said.get(content)
+        return said is not None and said.life == self.line.lives and packet.raw in said.packets
+
     def last_copy_at(self, content: Hashable) -> float:
         """Return when the last copy of this word came, s; -inf: none has."""
         said = self._said.get(content)

@@ -72,10 +72,12 @@ def require_newer(asked: Asked, *, now: float) -> None:
     first = sender.first_epoch(content, packet, is_counted=copies > 0, now=now)
     if first is None and copies:  # the first one was lost, and had left before this one
         sent_by = min(sent_by, now - min(copies * COPIED, DOUBLED))
-    # its sender has said the last halt itself, and before this, which it does not repeat by itself
-    is_anew = not copies and now - sender.last_copy_at(content) > REPEATED
+    # its sender has said the last halt itself, and before this, which it does not repeat by itself:
+    # no stock client has two commands of one number under way; or that halt has been let go since
     follows = halts.by is sender and number > halts.number
-    if follows and is_anew:
+    is_over = halts.is_undone or halts.command == asked.command.command
+    is_repeated = copies > 0 or sender.has_said(content, packet)
+    if follows and not is_repeated and (is_over or now - sender.last_copy_at(content) > REPEATED):
         epoch = halts.epoch
     else:
         epoch = halts.epoch if halts.at < sent_by else halts.epoch - 1
@@ -100,8 +102,8 @@ def note_halt(asked: Asked, *, before: int) -> None:
     """Note whose word the last halt was, if there was one since the epoch ``before``."""
     halts = asked.vehicle.tasks.halts
     if halts.epoch != before:
-        sender = asked.sender
-        halts.was_said_by(sender, sender.line.number_of(asked.packet.seq))
+        number = asked.sender.line.number_of(asked.packet.seq)
+        halts.was_said_by(asked.sender, number, command=asked.command.command)
 
 
 def _epoch_in(command: Command) -> int:

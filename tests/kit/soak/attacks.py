@@ -132,8 +132,8 @@ class Attacks:
     def _again(self, said: Said) -> None:
         """Let a word come once more: the same packet, or as its sender would repeat it."""
         ways = ["the same packet", "confirmed higher"]
-        if self._world.now - said.first.at <= REPEATED:  # later, nobody sends it by itself
-            ways.append("with a new number")
+        if self._world.now - said.first.at <= REPEATED and not self._is_over(said):
+            ways.append("with a new number")  # later, nobody sends it by itself
         how = self._random.choice(ways)
         name = f"copy of {said.name}: {how}"
         if how == "the same packet" or said.message.get_type() not in COMMANDS:
@@ -151,6 +151,16 @@ class Attacks:
             higher, name = said.message, f"copy of {said.name}: with a new number"
         self._note(name)
         self._world.repeat(said, higher)
+
+    def _is_over(self, said: Said) -> bool:
+        """Say whether its client has sent a halt by the same command since: it repeats no more."""
+        return any(
+            later.kind is Kind.HALT
+            and later.client is said.client
+            and later.first.order > said.first.order
+            and later.message.command == getattr(said.message, "command", 0)
+            for later in self._world.words.recent
+        )
 
     def _ask_mode(self, client: FakeClient, number: int, mode: int) -> None:
         if self._ways.sub_modes:

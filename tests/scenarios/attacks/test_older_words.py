@@ -187,7 +187,7 @@ def test_halts_of_one_moment_come_first_whatever_link_they_came_on(world: World)
         assert world.paused() is R.STOPPED
 
 
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+@pytest.mark.parametrize("halt", ["STOP", "HOLD", "disarm"])
 def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, halt: str) -> None:
     """Its repetitions have a number of their own, and no count."""
     client = world.client
@@ -215,8 +215,23 @@ def test_who_held_it_may_go_on_at_once(world: World) -> None:
         world.client.pause()
         world.run(0.3)
         going = world.client.proceed()
-        world.run(1.8)
+        world.run(0.5)
         assert going.answer == (ACCEPTED, 1)
+
+
+@pytest.mark.parametrize("drives", [AUTO, GUIDED])
+def test_a_mode_that_drives_counts_at_once_after_the_hold_of_the_same_client(
+    world: World, drives: int
+) -> None:
+    """MAVSDK's start, pause and start again: it has one command of a number under way at a time."""
+    world.client.move(20)
+    world.until_state(1, S.EXECUTING)
+    for _ in range(5):
+        world.client.mode(HOLD)
+        world.run(0.1)
+        going = world.client.mode(drives)
+        world.run(0.3)
+        assert going.result == ACCEPTED
 
 
 def test_a_script_that_is_run_again_from_the_same_port_is_heard(world: World) -> None:
