@@ -54,6 +54,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "speeds": list(restored.speeds.items()),
         "homes": [_home_to_json(home) for home in restored.homes.values()],
         "halt_epochs": list(restored.halt_epochs.items()),
+        "disarmed": sorted(restored.disarmed),
         "plans": [[*key, *plan] for key, plan in restored.plans.items()],
         "parameters": list(restored.parameters.items()),
         "signatures": [
@@ -77,6 +78,7 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         speeds=dict(values["speeds"]),
         homes={row[0]: _home_of(row) for row in values.get("homes", ())},
         halt_epochs=dict(values.get("halt_epochs", ())),
+        disarmed=frozenset(values.get("disarmed", ())),
         plans={
             (vehicle, kind): (plan_id, source) for vehicle, kind, plan_id, source in values["plans"]
         },

@@ -17,6 +17,7 @@ from mav_tasks.tasks.events import (
     TaskProgressed,
     TaskSubmitted,
     TaskWithdrawn,
+    VehicleArmingSet,
     VehicleHalted,
     VehicleHomeSet,
     VehicleIdentified,
@@ -116,5 +117,7 @@ class Batch:
                 self.plans[event.vehicle, event.kind] = row
             case ParameterSet():
                 self.parameters[event.name] = (event.name, event.value)
+            case VehicleArmingSet():
+                self.vehicles["may_arm", event.vehicle] = event.may_arm
             case VehicleSpeedSet():
                 self.vehicles["speed", event.vehicle] = event.speed

@@ -263,6 +263,19 @@ class VehicleHomeSet:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleArmingSet:
+    """Whether the server may arm it, as far as that is a person's word: who disarms says no."""
+
+    vehicle: int
+    may_arm: bool
+    at: float
+
+    def __str__(self) -> str:
+        words = "may be armed again" if self.may_arm else "is armed only after a continue"
+        return f"vehicle {self.vehicle} {words}"
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleSpeedSet:
     """The speed of tasks that name none was changed; None: as in the settings."""
 
@@ -396,6 +409,7 @@ Event = (
     | QueueContinued
     | VehicleHalted
     | VehicleIdentified
+    | VehicleArmingSet
     | VehicleSpeedSet
     | VehicleHomeSet
     | ParameterSet

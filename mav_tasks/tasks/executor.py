@@ -30,7 +30,7 @@ from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
 from mav_tasks.tasks.driving.way_back import is_off_line, way_back
 from mav_tasks.tasks.events import SERVER, TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
-from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Progress, Task, TaskId
 from mav_tasks.tasks.timing import Timing, TimingMeter
@@ -46,7 +46,6 @@ MISSES = 3
 ASK_AGAIN = 4.0  # s, from the end of a try to arm to the next one, while a vehicle is not ready
 KEEP_EACH = 1.0  # s between two writes of the progress of a task that is being driven
 #: interruptions that end by themselves when the vehicle is back
-LOSSES = frozenset({R.LINK_LOST, R.POSITION_LOST})
 
 
 def has_moved(task: Task) -> bool:

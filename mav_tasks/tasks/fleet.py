@@ -78,7 +78,7 @@ class Fleet:
         pauses = self._settings.on_restart == "pause"
         self._began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
-        of_note |= restored.halt_epochs.keys()
+        of_note |= restored.halt_epochs.keys() | restored.disarmed
         for vehicle in begun.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
@@ -93,6 +93,7 @@ class Fleet:
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),
                 halt_epoch=restored.halt_epochs.get(vehicle, 1),
+                may_be_armed=vehicle not in restored.disarmed,
                 now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)

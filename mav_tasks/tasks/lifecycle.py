@@ -109,6 +109,8 @@ class TaskReason(IntEnum):
 
 #: a task is paused because a person, another program or the rover's own failsafe drives the rover
 TAKEN = frozenset({TaskReason.TAKEOVER, TaskReason.FAILSAFE})
+#: a task goes on by itself when that is over
+LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST})
 
 #: where the name of a reason is not what people say
 _WORDS = {

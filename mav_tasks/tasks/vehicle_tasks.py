@@ -25,6 +25,7 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     TaskWaits,
+    VehicleArmingSet,
     VehicleHalted,
     VehicleHomeSet,
     VehicleIdentified,
@@ -89,6 +90,7 @@ class VehicleTasks:
         self._cruise: float | None = None  # m/s, at which the vehicle itself would drive
         self._stop: tuple[float, float] | None = None  # m/s and m of one that was measured
         self._paused = R.NONE
+        self._may_be_armed = True  # nobody has disarmed it, or somebody has let go since
         #: what made the vehicle stand, and when
         self.halts = Halts()
         self._urgent: TaskId | None = None  # runs although the queue is paused
@@ -266,9 +268,11 @@ class VehicleTasks:
         speed: float | None,
         uid: str,
         halt_epoch: int = 1,
+        may_be_armed: bool = True,
         now: float,
     ) -> None:
         """Take on what had begun in an earlier run, as it was left."""
+        self._may_be_armed = may_be_armed
         self.halts = Halts(epoch=halt_epoch)
         self.halt(R.RESTARTED, actor=SERVER, now=now)
         self._paused = paused
@@ -293,6 +297,17 @@ class VehicleTasks:
 
         "" is what a vehicle says that does not know.
         """
+    @property
+    def may_be_armed(self) -> bool:
+        """Whether the vehicle may be armed, as far as that is a person's word."""
+        return self._may_be_armed
+
+    def let_arm(self, *, may_be_armed: bool, now: float) -> None:
+        """Keep, over a restart too, whether somebody has disarmed it."""
+        if may_be_armed != self._may_be_armed:
+            self._may_be_armed = may_be_armed
+            self._book.record(VehicleArmingSet(self.vehicle, may_be_armed, now))
+
         if not uid or uid == self._uid:
             return
         before, self._uid = self._uid, uid

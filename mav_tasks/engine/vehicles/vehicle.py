@@ -39,7 +39,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.guidance import ZERO
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace, ends_at_home
-from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
@@ -202,10 +202,11 @@ class Vehicle:
     def come_back(self, *, was_driven: bool, now: float) -> None:
         """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
 
-        If somebody else had taken it over, we do not arm it before a person lets us go on.
+        If somebody else had taken it over or disarmed it, we do not arm it before a person lets us
+        go on.
         """
-        if self.tasks.paused in TAKEN:
-            self._authority.withdraw_arming()
+        if self.tasks.paused in TAKEN or not self.tasks.may_be_armed:
+            self._withdraw_arming(now=now)
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
         elif was_driven and self._may_still_be_driven:
@@ -393,7 +394,7 @@ class Vehicle:
         elif self._shows_restart:
             pass  # a restart, which its clock has told of before, and nobody's doing
         elif not ours and was_mode != booting:
-            self._authority.withdraw_arming()
+            self._withdraw_arming(now=now)
             may_be_lost = self.control.is_streaming and mode == self.persona.hold_mode
             self._take_over_by_mode(mode, now=now)
             self._note_parking(was_mode, mode, now=now)
@@ -412,7 +413,7 @@ class Vehicle:
         """A request from before the STOP was late. Later, it is a person at the vehicle."""
         if mode == self.persona.hold_mode:
             return
-        self._authority.withdraw_arming()
+        self._withdraw_arming(now=now)
         if now - self.stopped_at <= LATE_REQUESTS and not self.control.is_engaged:
             self._begin_stop(now=now)
 
@@ -423,7 +424,7 @@ class Vehicle:
             was_allowed = before.may_arm or self._authority.is_withdrawn_by_restart
             self._authority.restarted(was_allowed=was_allowed)
             return
-        self._authority.withdraw_arming()
+        self._withdraw_arming(now=now)
         self._zero_what_is_kept()
         self._take_over("disarmed", now=now)
         self._authority.note_disarmed(before)  # a restart may turn out to have done it
@@ -508,6 +509,31 @@ class Vehicle:
         """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
         if self.control.is_streaming:
             self.requests.send_zero()
+    @property
+    def _goes_on_by_itself(self) -> bool:
+        """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
+        begun = self.tasks.begun
+        return begun is not None and begun.state is TaskState.PAUSED and begun.reason in LOSSES
+
+    def _withdraw_arming(self, *, now: float) -> None:
+        """Somebody else has a hand on it: it is armed no more, also after a restart of ours."""
+        self._authority.withdraw_arming()
+        self.tasks.let_arm(may_be_armed=False, now=now)
+
+    def _restore_arming(self, *, now: float) -> None:
+        """A person said that all is well."""
+        self._authority.restore_arming()
+        self.tasks.let_arm(may_be_armed=True, now=now)
+
+    def _take_back(self, *, is_hold: bool = False) -> None:
+        """A halt: nothing that was asked for before it moves the vehicle later."""
+        if not is_hold:
+            self.hold_before.forget()
+        self.forget_start()
+        self.tasks.forget_release()
+        self._authority.revoke()  # a stream that goes on must not drive when the mode comes back
+        self.requests.drop_what_waits()
+
 
     def _note_component(self, component_id: int, *, now: float) -> None:
         before = self.server_component
@@ -538,7 +564,7 @@ class Vehicle:
             self.control.keep_armed()
         if disarms:
             self.tasks.halt(TaskReason.DISARMED, actor=actor, now=now)
-            self._authority.withdraw_arming()  # also where it is disarmed already
+            self._withdraw_arming(now=now)  # also where it is disarmed already
         if disarms and self.control.is_engaged and self.control.phase is not Phase.STOPPING:
             self._zero_what_is_kept()
             self._take_over("disarmed by a client", now=now)
@@ -853,7 +879,7 @@ class Vehicle:
             task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
         )
         if restores:
-            self._authority.restore_arming()
+            self._restore_arming(now=now)
         self.wake(now=now)
 
     def skip(self, task: Task, *, actor: str, now: float) -> None:
@@ -912,7 +938,7 @@ class Vehicle:
         seen = replace(self.view(now=now), may_arm=may_arm)
         allows = may_arm and not self._authority.may_arm
         going_on = self.tasks.proceed(seen, allows=allows, actor=actor, now=now)
-        self._authority.restore_arming()
+        self._restore_arming(now=now)
         held = self.tasks.held
         if held is not None:
             self._note(f"has task {held.id} on hold: release it ({BUTTONS})", now=now)

@@ -32,6 +32,7 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     TaskWaits,
     TaskWithdrawn,
+    VehicleArmingSet,
     VehicleHalted,
     VehicleHomeSet,
     VehicleIdentified,
@@ -81,6 +82,7 @@ SAMPLES: list[tuple[Event, dict[str, object]]] = [
     (QueuePaused(1, TaskReason.STOPPED, "a", AT), {"reason": "stopped", "actor": "a"}),
     (QueueContinued(1, "a", AT), {"actor": "a"}),
     (VehicleIdentified(1, "uid", AT), {"uid": "uid"}),
+    (VehicleArmingSet(1, False, AT), {"may_arm": False}),
     (VehicleSpeedSet(1, 0.5, "a", AT), {"speed": 0.5, "actor": "a"}),
     (
         VehicleHomeSet(1, 473_977_418, 85_455_938, Frame(None, None, AT - 50), "a", AT),
