@@ -12,7 +12,7 @@ clients that have fewer before them. Clients that ask for the same message share
 """
 
 from bisect import insort
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
@@ -173,6 +173,15 @@ class CommandSender:
             self._answer(lane.in_flight, None)
             lane.in_flight = None
             lane.quiet_until = now + LATE
+
+    def drop(self, is_dropped: Callable[[int], bool]) -> None:
+        """Answer clients' commands that wait, of the ids that ``is_dropped`` names, unsent."""
+        for (_, command), lane in self._lanes.items():
+            if lane.waiting and is_dropped(command):
+                clients = [request for request in lane.waiting if request.origin is not None]
+                lane.waiting = [request for request in lane.waiting if request.origin is None]
+                for request in clients:
+                    self._answer(request, None)
 
     def is_pending(self, component: int, command: int) -> bool:
         """Whether a command of ours of this id is in flight or waits."""

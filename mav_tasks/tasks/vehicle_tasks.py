@@ -287,16 +287,16 @@ class VehicleTasks:
                 self._aside[task.id] = None
 
     def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Note that the vehicle is to stand: what lets it go on has to be newer than this."""
+        """Note that the vehicle is to stand: what lets it go on has to be newer than this.
+
+        What was to run at once and has not begun waits as any other.
+        """
+        if self._urgent is not None and (self.begun is None or self.begun.id != self._urgent):
+            self._urgent = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):
             epoch = self.halts.epoch
             self._book.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
 
-    def identified(self, uid: str, *, now: float) -> None:
-        """The vehicle has said which one it is; another one does not run this one's tasks unasked.
-
-        "" is what a vehicle says that does not know.
-        """
     @property
     def may_be_armed(self) -> bool:
         """Whether the vehicle may be armed, as far as that is a person's word."""
@@ -308,6 +308,11 @@ class VehicleTasks:
             self._may_be_armed = may_be_armed
             self._book.record(VehicleArmingSet(self.vehicle, may_be_armed, now))
 
+    def identified(self, uid: str, *, now: float) -> None:
+        """The vehicle has said which one it is; another one does not run this one's tasks unasked.
+
+        "" is what a vehicle says that does not know.
+        """
         if not uid or uid == self._uid:
             return
         before, self._uid = self._uid, uid
@@ -574,15 +579,13 @@ class VehicleTasks:
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
         """Let the begun task and the queue stand; gives the task's id. Never undoes a STOP.
 
-        What was to run at once and has not begun waits as any other. Where somebody else has the
-        vehicle, nobody waits for it to stand before a cancelled task is over.
+        Where somebody else has the vehicle, nobody waits for it to stand before a cancelled task is
+        over.
         """
         self.halt(reason, actor=actor, now=now)
         self._release = None
         self._executor.pause(reason, actor=actor, now=now)
         self._pause_queue(reason, actor=actor, now=now)
-        if self._urgent is not None and self._urgent in self._queue:
-            self._urgent = None
         begun = self.begun
         if reason in TAKEN:
             last = self._jumps.last

@@ -16,7 +16,7 @@ from rover_sim.body import Body, Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode
 from tests.kit import px4
-from tests.kit.client import HOLD, MANUAL, MOVE
+from tests.kit.client import HOLD, MANUAL, MOVE, PAUSE_CONTINUE
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -139,7 +139,10 @@ class Renamed(MemoryNet):
 
 
 def test_a_second_server_waits_as_long_as_the_first_one_drives(driving: World) -> None:
-    """Of whom the rover does not tell: each is alone with it on a link of its own."""
+    """Of whom the rover does not tell: each is alone with it on a link of its own.
+
+    The HOLD at the end of the first one's task might be a person's, who parks it.
+    """
     world = driving
     second = InMemoryServer(Renamed(world), vehicles=("rover1",), now=world.now)
     world.join(second)
@@ -153,6 +156,11 @@ def test_a_second_server_waits_as_long_as_the_first_one_drives(driving: World) -
 
     assert isinstance(second.store, MemoryStore)
     theirs = second.store.events
+    world.until_state(1, S.COMPLETED, within=30)
+    world.run(10)
+    assert near_pose(world.pose(), (4.0, 0.0, 0.0))
+    goes_on = common.MAVLink_command_long_message(1, 191, PAUSE_CONTINUE, 0, 1.0, *(0.0,) * 6)
+    client.send(f"second {CLIENT_LINK}", goes_on.pack(mav))
     world.until(lambda: change_to(S.COMPLETED, theirs), within=30)
     assert near_pose(world.pose(), (5.0, 0.0, 0.0))
     waits = [event.reason for event in theirs if isinstance(event, TaskWaits)]

@@ -105,6 +105,7 @@ class Vehicle:
         self._was_heard = True
         self._shows_restart = False  # until the heartbeat comes that does, too
         self._failsafes = OwnFailsafes()
+        self._others_drive = False  # it moved in a mode in which nothing of ours drove it
         self._is_closing = False
         self._is_back_home = False  # by its last task; it is disarmed also where others wait
         self._stops_task = False  # which the end of the server has interrupted
@@ -342,6 +343,8 @@ class Vehicle:
         """What it measures at rest is learnt while nothing can be telling it to move."""
         driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
         follows = (self.persona.hold_mode, self.persona.control_mode)
+        if self._monitor.custom_mode != follows[0] and self.armed and not self.control.is_engaged:
+            self._others_drive |= not self.where.motion.is_still(now=now)
         if self.armed and (driven or self._monitor.custom_mode not in follows):
             self.where.motion.standstill.may_move()
         else:
@@ -404,8 +407,11 @@ class Vehicle:
 
     def _note_parking(self, was_mode: int, mode: int, *, now: float) -> None:
         """Somebody who was driving sets HOLD: what waits does not drive it off from there."""
-        drove = was_mode not in (self.persona.hold_mode, self.persona.control_mode)
-        if drove and mode == self.persona.hold_mode and self.armed and not self.tasks.is_empty:
+        others_drove, self._others_drive = self._others_drive, False
+        if mode != self.persona.hold_mode or not self.armed or self.tasks.is_empty:
+            return
+        was_of_others = was_mode not in (self.persona.hold_mode, self.persona.control_mode)
+        if (was_of_others or others_drove) and self.tasks.paused not in TAKEN:
             actor = f"vehicle {self.system_id}"
             self.tasks.pause(TaskReason.TAKEOVER, actor=actor, now=now)
 
@@ -493,11 +499,9 @@ class Vehicle:
         self.tasks.halt(reason, actor=actor, now=now)
         if self.tasks.is_stopped:
             return
-        self.hold_before.forget()
-        self.forget_start()
+        self._take_back()
         self.control.lose()
         self.requests.end_performing()
-        self.tasks.forget_release()
         begun = self.tasks.begun
         if begun is None:
             return
@@ -505,10 +509,6 @@ class Vehicle:
             self._note(f"taken over: {what}", now=now)
             self.tasks.pause(reason, actor=actor, now=now)
 
-    def _zero_what_is_kept(self) -> None:
-        """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
-        if self.control.is_streaming:
-            self.requests.send_zero()
     @property
     def _goes_on_by_itself(self) -> bool:
         """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
@@ -534,6 +534,10 @@ class Vehicle:
         self._authority.revoke()  # a stream that goes on must not drive when the mode comes back
         self.requests.drop_what_waits()
 
+    def _zero_what_is_kept(self) -> None:
+        """Leave no velocity behind: the vehicle keeps the last one and drives off when armed."""
+        if self.control.is_streaming:
+            self.requests.send_zero()
 
     def _note_component(self, component_id: int, *, now: float) -> None:
         before = self.server_component
@@ -570,7 +574,7 @@ class Vehicle:
             self._take_over("disarmed by a client", now=now)
         elif disarms:
             is_driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
-            self._authority.revoke()  # a client's stream would leave a velocity behind
+            self._take_back()  # a client's stream would leave a velocity behind
             if is_driven and not self.persona.has_loss_failsafe:
                 self.requests.send_zero()
         self.requests.relay(
@@ -793,9 +797,7 @@ class Vehicle:
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: zero and HOLD leave in this very step."""
-        self.hold_before.forget()
-        self.forget_start()
-        self._authority.revoke()
+        self._take_back()
         self.stopped_at = now
         killed = self.tasks.stop(clear=clear, actor=actor, now=now)
         self._begin_stop(now=now)
@@ -820,11 +822,10 @@ class Vehicle:
         if self.tasks.is_stopped:
             self._begin_stop(now=now)
             return None
-        self._authority.revoke()  # a stream that goes on must not drive when the mode comes back
+        self._take_back(is_hold=True)
         was_paused, paused = self.tasks.paused, None
         if not self.tasks.is_empty:
             paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)
-        self.forget_start()
         if self.persona.is_held_before_places and self.control.phase is Phase.CONTROL:
             self.hold_before.note(sender, has_paused=not was_paused, now=now)
             self.step(now=now)
@@ -854,7 +855,7 @@ class Vehicle:
         if begun_too:
             self.tasks.halt(TaskReason.CLEARED, actor=actor, now=now)
             self.end_driving_of(self._driver(now=now), now=now)
-            self._authority.revoke()
+            self._take_back()
         if begun_too and self.control.is_engaged:
             self.step(now=now)
 
@@ -900,7 +901,8 @@ class Vehicle:
         self.tasks.forget_release()
         begun = self.tasks.begun
         is_running = begun is not None and begun.state in RUNNING
-        if self.tasks.is_empty or (self.tasks.paused and not is_running):
+        goes_on = is_running or self._goes_on_by_itself or self.tasks.urgent is not None
+        if self.tasks.is_empty or (self.tasks.paused and not goes_on):
             return
         self._note("no ground station is heard: paused", now=now)
         self.pause(actor=SERVER, now=now)
@@ -910,8 +912,7 @@ class Vehicle:
 
         A vehicle that moves without a task is stopped as by HOLD; so is one that was taken over.
         """
-        self.hold_before.forget()
-        self.forget_start()
+        self._take_back()
         begun = self.tasks.begun
         is_driven = begun is not None and begun.reason not in TAKEN
         paused = self.tasks.pause(TaskReason.OPERATOR, actor=actor, now=now)

@@ -8,6 +8,7 @@ from math import inf
 
 from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
@@ -144,6 +145,10 @@ class VehicleRequests:
         for command in self._performed:
             self._sender.withdraw(self._target.component_id, command)
         self._performed.clear()
+
+    def drop_what_waits(self) -> None:
+        """Send nothing of clients that waits for an answer to another, and might move it."""
+        self._sender.drop(lambda command: not row_of_command(command).passed_on.passes_under_stop)
 
     def write_plan(
         self, mission_type: int, items: tuple[Item, ...], done: Done, *, now: float

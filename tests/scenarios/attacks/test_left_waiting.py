@@ -1,0 +1,298 @@
+"""What was asked for before a halt, and had not begun by then, does not move the rover after it.
+
+A plan with a start delay, a mission that begins when the rover is armed, a client that was given
+control, a task that stands only while the rover is not heard, a command that waits for the answer
+to another: each of them did. So did a task after the server was started again: it armed a rover
+that somebody had disarmed.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, GUIDED, HOLD, MOVE, FakeClient, command_long, setpoint
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import HOLD as PX4_HOLD
+from tests.kit.px4 import MISSION, PROMPT_PX4, REPOSITION, ask_mode
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
+
+UTC = 1.8e9
+WAYPOINT, OPTIONS, START, RETURN, STANDARD_MODE = 16, 54014, 300, 20, 262
+SECOND_MISSION = 5  # MAV_STANDARD_MODE: mission
+ELSEWHERE = (1, 42)  # a component that nobody has heard of
+
+
+def by_switch(world: World, person: FakeClient) -> None:
+    """Let a person take the rover at its transmitter, and park it."""
+    del person
+    world.operator_mode(Mode.MANUAL)
+    world.run(2)
+    world.operator_mode(Mode.HOLD)
+
+
+HALTS: dict[str, Callable[[World, FakeClient], object]] = {
+    "HOLD": lambda _, person: person.mode(HOLD),
+    "pause": lambda _, person: person.pause(),
+    "switch": by_switch,
+    "disarm": lambda _, person: person.arm(False),
+}
+
+
+def stays(world: World, seconds: float) -> bool:
+    """Return whether the rover does not move for so long."""
+    before = world.pose()
+    for _ in range(int(seconds / 0.2)):
+        world.run(0.2)
+        if world.pose() != pytest.approx(before, abs=0.01):
+            return False
+    return True
+
+
+def unheard(world: World) -> None:
+    """Let nothing that the rover says arrive, and all that it is told."""
+    world.watched.loses = lambda source, _target, _data: source == "rover1"
+
+
+def stored(world: World, *items: Item, target: tuple[int, int] = (1, 1)) -> None:
+    """Upload a plan."""
+    upload = Upload(world.client, items, target=target)
+    world.until(lambda: upload.result == 0, within=5)
+
+
+def started_under_a_pause(world: World, delay: float) -> None:
+    """Start a plan that begins a while later; as the queue is paused, it runs before that."""
+    world.client.arm()
+    options = Item(OPTIONS, param1=5, param2=delay, param4=0)
+    stored(world, Item(WAYPOINT, frame=0, current=1), options, Item(WAYPOINT, **at(6.0, 0.0)))
+    world.client.pause()
+    world.run(1)
+    started = world.client.command(START, target=(1, 1))
+    world.run(1)
+    assert started.result == ACCEPTED
+
+
+@pytest.mark.parametrize("halt", HALTS)
+def test_a_plan_that_was_started_does_not_begin_after_a_halt(world: World, halt: str) -> None:
+    person = world.add_client("person")
+    started_under_a_pause(world, 25)
+    HALTS[halt](world, person)
+    world.run(1)
+    assert stays(world, 40)
+    going = world.client.proceed()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert going.result == ACCEPTED
+
+
+def test_nor_where_no_ground_station_is_heard_any_more(make_world: MakeWorld) -> None:
+    world = make_world(settings=replace(Settings(), operator_lost="pause"))
+    started_under_a_pause(world, 40)
+    world.client.heartbeats = False
+    assert stays(world, 60)
+
+
+def test_a_task_that_waits_for_the_rover_is_paused_without_a_ground_station(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(settings=replace(Settings(guided="now"), operator_lost="pause"))
+    world.client.mode(HOLD)
+    world.client.arm()
+    world.run(2)
+    place = at(20.0, 0.0)
+    world.client.command_int(REPOSITION, -1, 1, 0, nan, **place, frame=6, target=(1, 1))
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    unheard(world)
+    world.run(3)
+    world.client.heartbeats = False
+    world.run(8)
+    world.watched.loses = lambda _source, _target, _data: False
+    assert stays(world, 10)
+
+
+@pytest.mark.parametrize("hears", [True, False])
+def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool) -> None:
+    """Whether it was carried out nobody knows until the rover is heard again."""
+    person = world.add_client("person")
+    world.client.move(20)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.watched.loses = lambda source, target, _: (
+        source == "rover1" or (target == "rover1" and not hears)
+    )
+    world.run(5)
+    assert world.state(1)[0] is S.PAUSED
+    person.arm(False)
+    world.run(1)
+    world.watched.loses = lambda _source, _target, _data: False
+    world.run(1)
+    world.operator_arm(True)
+    assert stays(world, 10)
+    assert world.paused() is R.TAKEOVER
+
+
+@pytest.mark.parametrize("halt", ["disarm", "pause", "switch"])
+def test_a_mission_does_not_begin_at_an_arming_after_a_halt(
+    make_world: MakeWorld, halt: str
+) -> None:
+    """Towards a PX4 a mission mode on the ground begins it when the rover is armed."""
+    world = make_world(persona=PROMPT_PX4)
+    stored(world, Item(WAYPOINT, **at(3.0, 0.0)), target=(1, 191))
+    marked = ask_mode(world.client, MISSION)
+    world.run(1)
+    assert marked.result == ACCEPTED
+    person = world.add_client("person")
+    world.run(1)
+    HALTS[halt](world, person)
+    world.run(1)
+    world.operator_arm(True)
+    assert stays(world, 8)
+
+
+@pytest.mark.parametrize("halt", ["disarm", "switch"])
+def test_a_stream_does_not_drive_on_when_the_rover_may_move_again(world: World, halt: str) -> None:
+    """Both at the rover itself: no client has said anything."""
+    world.client.mode(GUIDED)
+    world.client.arm()
+    world.run(1)
+    world.client.stream(setpoint(0.5), rate=10)
+    world.run(3)
+    assert world.truth.forward_speed > 0.3
+    if halt == "disarm":
+        world.operator_arm(False)
+        world.run(3)
+        world.operator_arm(True)
+    else:
+        world.operator_mode(Mode.HOLD)
+        world.run(3)
+        world.operator_mode(Mode.GUIDED)
+    assert stays(world, 4)
+    world.client.mode(GUIDED)
+    world.run(2)
+    assert world.truth.forward_speed > 0.3, "it is asked for anew"
+
+
+def test_nor_after_a_pause_of_another_client(world: World) -> None:
+    world.client.mode(GUIDED)
+    world.run(1)
+    world.client.stream(setpoint(0.5), rate=10)
+    world.run(1)
+    paused = world.add_client("person").pause()
+    world.run(2)
+    assert paused.result == ACCEPTED
+    world.operator_arm(True)
+    assert stays(world, 4)
+
+
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.GUIDED])
+def test_a_rover_that_somebody_drove_and_parked_stays_there(world: World, mode: Mode) -> None:
+    """In GUIDED by another radio than ours."""
+    world.client.arm()
+    world.run(1)
+    world.client.command(MOVE, 3, 0, 0, 0, 0, 20, 5)
+    world.run(1)
+    world.operator_mode(mode)
+    link = world.net.link("another radio")
+    for _ in range(40):
+        link.send("rover1", packed(setpoint(0.5)))
+        world.run(0.2)
+    world.operator_mode(Mode.HOLD)
+    world.run(3)
+    assert stays(world, 30)
+    assert world.paused() is R.TAKEOVER
+
+
+def packed(message: object) -> bytes:
+    """Pack a message as another ground station does."""
+    from pymavlink.dialects.v20 import common
+
+    return bytes(message.pack(common.MAVLink(None, 254, 190)))  # type: ignore[attr-defined]
+
+
+def restarted(world: World, path: Path) -> None:
+    """End the server in order, and start it again with its store."""
+    world.run(1)
+    store = world.server.store
+    world.end_server()
+    store.close()
+    later = PromptSqliteStore(path, wall_offset=UTC)
+    world.start_server(later, later.load())
+
+
+@pytest.mark.parametrize("who", ["client", "person at the rover"])
+def test_what_somebody_has_disarmed_is_not_armed_by_the_next_run(
+    make_world: MakeWorld, tmp_path: Path, who: str
+) -> None:
+    path = tmp_path / "tasks.sqlite3"
+    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC))
+    world.client.arm()
+    world.run(1)
+    world.client.command(MOVE, 3, 0, 0, 0, 0, 30, 5)
+    world.run(1)
+    if who == "client":
+        world.add_client("person").arm(False)
+    else:
+        world.operator_arm(False)
+    world.run(2)
+    restarted(world, path)
+    assert stays(world, 40)
+    assert not world.rover.autopilot.armed
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED, within=60)
+    restarted(world, path)
+    world.run(2)
+    world.client.move(1)
+    world.until_state(2, S.COMPLETED, within=60)
+
+
+@pytest.mark.parametrize("halt", ["HOLD", "pause", "STOP"])
+def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
+    make_world: MakeWorld, halt: str
+) -> None:
+    """A mode that the rover refused, its answer lost; the next one waited for that."""
+    world = make_world(persona=PROMPT_PX4)
+    person = world.add_client("person")
+    world.client.move(5)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(3)
+    world.client.arm()
+    world.run(2)
+    world.lose_acks()
+    world.client.send(command_long(STANDARD_MODE, 77, target=(1, 1)))
+    world.run(0.55)
+    world.client.send(command_long(STANDARD_MODE, SECOND_MISSION, target=(1, 1)))
+    world.run(0.05)
+    halts = {"HOLD": lambda: ask_mode(person, PX4_HOLD), "pause": person.pause, "STOP": person.stop}
+    halted = halts[halt]()
+    world.run(0.1)
+    assert halted.result == ACCEPTED
+    assert stays(world, 6)
+
+
+@pytest.mark.parametrize("halt", ["HOLD", "pause", "STOP"])
+def test_nor_a_return_behind_another(world: World, halt: str) -> None:
+    person = world.add_client("person")
+    world.client.move(5)
+    world.until_state(1, S.COMPLETED, within=40)
+    world.run(3)
+    world.client.arm()
+    world.run(1)
+    person.mode(HOLD)
+    world.run(1)
+    world.lose_acks()
+    world.client.send(command_long(RETURN, target=ELSEWHERE))
+    world.run(0.55)
+    world.client.send(command_long(RETURN, 1, target=ELSEWHERE))
+    world.run(0.05)
+    halted = {"HOLD": lambda: person.mode(HOLD), "pause": person.pause, "STOP": person.stop}[halt]()
+    world.run(0.3)
+    assert halted.result == ACCEPTED
+    for _ in range(40):
+        world.run(0.1)
+        assert world.rover.autopilot.mode is Mode.HOLD
