@@ -145,7 +145,7 @@ class CommandReceiver:
         a repeat of it whose ack was lost."""
         return any(
             pending.at < before
-            and now - pending.at <= REPEATED
+            and now - pending.at <= COPIED
             and pending.answer is not None
             and pending.answer.result == MavResult.ACCEPTED
             and _equal(pending.command, command)

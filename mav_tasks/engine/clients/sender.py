@@ -11,7 +11,7 @@ from mav_tasks.services.command_receiver import CommandReceiver
 
 COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
 DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
-REMEMBERED = 64  # words
+REMEMBERED = 256  # words
 COPIES = 32  # of one word
 
 

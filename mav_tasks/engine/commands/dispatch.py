@@ -23,7 +23,13 @@ from mav_tasks.engine.commands.goals import (
 )
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.motion_gate import why_not_sent
-from mav_tasks.engine.commands.ordering import kind_of, note_halt, require_newer, row_said
+from mav_tasks.engine.commands.ordering import (
+    has_left_before_halt,
+    kind_of,
+    note_halt,
+    require_newer,
+    row_said,
+)
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import result_of
@@ -109,8 +115,7 @@ class Commands:
         asked = Asked(client, vehicle, packet, pending)
         epoch = vehicle.tasks.halts.epoch
         try:
-            kind = kind_of(command, vehicle.persona)
-            if kind is Kind.GO:
+            if kind_of(command, vehicle.persona) is Kind.GO:
                 require_newer(asked, now=now)
             elif client.is_late and kind is Kind.MOTION:
                 raise Rejection(R.STALE, "it waited while the server stood still")
@@ -205,6 +210,9 @@ class Commands:
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif at_server:
             self._refuse_unknown(asked, now=now)
+            lets_go = row.kind is not Kind.GO and not row.passed_on.passes_under_stop
+            if lets_go and not asked.vehicle.tasks.is_stopped:
+                require_newer(asked, now=now)
         elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
             return
         else:  # also to a component never heard of: an autopilot does what that is told
@@ -242,8 +250,9 @@ class Commands:
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
         elif is_reposition:
             held_at = asked.vehicle.hold_before.since
-            # a copy of a "go to" from before a HOLD says nothing about that
-            is_older = asked.receiver.older_copy(asked.command, before=held_at, now=now)
+            # a "go to" from before a HOLD, or a copy of one, says nothing about that
+            is_older = has_left_before_halt(asked)
+            is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
             self._submissions.submit(asked, now=now)
             if not is_older:
                 self._undo_hold_before(asked, now=now)

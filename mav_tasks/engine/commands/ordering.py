@@ -98,6 +98,12 @@ def require_newer(asked: Asked, *, now: float) -> None:
     raise Rejection(TaskReason.STALE, words)
 
 
+def has_left_before_halt(asked: Asked) -> bool:
+    """Return whether the last halt is the same sender's, and this word had left before it."""
+    halts, line = asked.vehicle.tasks.halts, asked.sender.line
+    return halts.by is asked.sender and line.number_of(asked.packet.seq) < halts.number
+
+
 def note_halt(asked: Asked, *, before: int) -> None:
     """Note whose word the last halt was, if there was one since the epoch ``before``."""
     halts = asked.vehicle.tasks.halts

@@ -1,0 +1,108 @@
+"""A word that goes on to the rover is ordered as one that the server sees to itself.
+
+A return or a "go to" that is sent to a component that nobody has heard of, or to a server that
+claims none of these, is carried out by the autopilot: a copy of it undid a HOLD. So did a "go to"
+towards a PX4 that had left before its own sender's HOLD, or was a copy from before that.
+"""
+
+from math import nan
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, HOLD, TEMPORARILY_REJECTED, command_long
+from tests.kit.px4 import HOLD as PX4_HOLD
+from tests.kit.px4 import PROMPT_PX4, REPOSITION, ask_mode
+from tests.kit.world import World, at
+from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, stays
+from tests.scenarios.conftest import MakeWorld
+
+CHANGE_MODE = 1  # of DO_REPOSITION
+
+
+def go_to(north: float, east: float, target: tuple[int, int] = (1, 1)) -> Any:
+    """Return a "go to" that also asks for the mode in which it is driven."""
+    place = at(north, east)
+    return common.MAVLink_command_int_message(
+        *target, 6, REPOSITION, 0, 0, -1, CHANGE_MODE, 0, nan, place["x"], place["y"], 0
+    )
+
+
+@pytest.mark.parametrize("what", ["return", "go to"])
+@pytest.mark.parametrize("claim", [True, False])
+def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
+    make_world: MakeWorld, what: str, claim: bool
+) -> None:
+    world = make_world(settings=Settings(claim=claim))
+    person = world.add_client("person")
+    world.client.move(5)
+    world.until_state(1, S.COMPLETED, within=40)
+    world.run(3)
+    world.client.arm()
+    world.run(1)
+    target = ELSEWHERE if claim else (1, 1)
+    word = command_long(RETURN, target=target) if what == "return" else go_to(20, 0, target)
+    world.client.send(word)
+    world.run(1)
+    assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was passed on"
+    held = person.mode(HOLD)
+    world.run(2)
+    assert held.result == ACCEPTED
+    if what == "return":
+        word.confirmation = 1
+    world.client.send(word)
+    assert stays(world, 5)
+    number = RETURN if what == "return" else REPOSITION
+    assert world.client.acks_of(number)[-1] == (TEMPORARILY_REJECTED, R.STALE)
+    world.run(4)
+    if what == "return":
+        word.confirmation = 0
+    world.client.send(word)
+    world.run(2)
+    assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was meant"
+
+
+@pytest.fixture
+def px4(make_world: MakeWorld) -> World:
+    world = make_world(persona=PROMPT_PX4)
+    world.client.move(20, speed=0.5)
+    world.until(lambda: world.truth.forward_speed > 0.45, within=20)
+    return world
+
+
+def test_a_go_to_that_its_senders_hold_has_overtaken_does_not_undo_it(px4: World) -> None:
+    late = px4.client.send_repeated(go_to(5, 5))
+    held = ask_mode(px4.client, PX4_HOLD)
+    px4.run(0.05)
+    assert held.result == ACCEPTED
+    px4.client.send_raw(late)
+    px4.run(2)
+    assert stays(px4, 4)
+    assert px4.paused() is R.OPERATOR
+
+
+def test_nor_does_a_copy_of_one_from_before_that(px4: World) -> None:
+    """As QGroundControl sends it, 3 s later."""
+    px4.client.send(go_to(5, 5))
+    px4.run(2.7)
+    held = ask_mode(px4.client, PX4_HOLD)
+    px4.run(0.3)
+    assert held.result == ACCEPTED
+    px4.client.send(go_to(5, 5))
+    px4.run(2)
+    assert stays(px4, 4)
+
+
+def test_a_go_to_after_its_senders_hold_undoes_it(px4: World) -> None:
+    """As MAVSDK sends both."""
+    ask_mode(px4.client, PX4_HOLD)
+    px4.run(0.2)
+    px4.client.send(go_to(5, 5))
+    px4.run(3)
+    assert px4.paused() is R.NONE
+    assert px4.truth.forward_speed > 0.3
