@@ -52,7 +52,6 @@ from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
 
-GIVEN_UP = 3.5  # s, after which a client waits for no answer any more
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
 
 
@@ -117,8 +116,6 @@ class Commands:
         try:
             if kind_of(command, vehicle.persona) is Kind.GO:
                 require_newer(asked, now=now)
-            elif client.is_late and kind is Kind.MOTION:
-                raise Rejection(R.STALE, "it waited while the server stood still")
             self._dispatch(asked, now=now)
         except Rejection as refusal:
             if self._is_tried_again(asked, now=now):
@@ -210,12 +207,12 @@ class Commands:
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif at_server:
             self._refuse_unknown(asked, now=now)
-            lets_go = row.kind is not Kind.GO and not row.passed_on.passes_under_stop
-            if lets_go and not asked.vehicle.tasks.is_stopped:
-                require_newer(asked, now=now)
         elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
             return
         else:  # also to a component never heard of: an autopilot does what that is told
+            lets_go = row.kind is not Kind.GO and not row.passed_on.passes_under_stop
+            if lets_go and not asked.vehicle.tasks.is_stopped:
+                require_newer(asked, now=now)
             _check_relay(asked, row.passed_on, now=now)
             self._check_question(asked, now=now)
             _relay(asked, now=now)
@@ -242,9 +239,6 @@ class Commands:
 
     def _take_in(self, asked: Asked, *, now: float) -> None:
         """A command that asks for a task; or, without a place, for a pause."""
-        if asked.client.waited > GIVEN_UP:
-            words = "it waited while the server stood still: send it again"
-            raise Rejection(R.STALE, words)
         is_reposition = asked.command.command == MavCmd.DO_REPOSITION
         if is_reposition and not has_place(asked.command):
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
@@ -279,9 +273,14 @@ class Commands:
         """COMMAND_CANCEL: nothing acknowledges it; the task's own status tells."""
         vehicle = self._vehicles.get(message.target_system)
         if vehicle is not None:
-            submitter = client.submitter(packet.source)
-            rights = client.rights
-            self._control.cancel_latest(rights, vehicle, submitter, message.command, now=now)
+            self._control.cancel_latest(
+                client.rights,
+                vehicle,
+                client.submitter(packet.source),
+                message.command,
+                is_late=client.is_late,
+                now=now,
+            )
 
     def deliver(self, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
         """Bring a vehicle's answer, or its silence, to the client that asked."""

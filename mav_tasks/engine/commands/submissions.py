@@ -33,6 +33,7 @@ PAUSED = {
     R.FAILSAFE: "failsafe",
     R.RESTARTED: "server restarted",
 }
+GIVEN_UP = 3.5  # s, after which a client waits for no answer any more
 NONCE = 3  # where it is among the parameters
 
 
@@ -79,6 +80,9 @@ class Submissions:
 
     def submit(self, asked: Asked, *, now: float) -> None:
         """Take in the task that a command asks for; Rejection says why not."""
+        if asked.client.waited > GIVEN_UP:
+            words = "it waited while the server stood still: send it again"
+            raise Rejection(R.STALE, words)
         command, vehicle = asked.command, asked.vehicle
         submitter = asked.client.submitter(asked.packet.source)
         wish = wish_of(

@@ -52,11 +52,23 @@ class TaskControl:
                 return self._change_speed(asked, now=now)
 
     def cancel_latest(
-        self, rights: Rights, vehicle: Vehicle, submitter: Submitter, command: int, *, now: float
+        self,
+        rights: Rights,
+        vehicle: Vehicle,
+        submitter: Submitter,
+        command: int,
+        *,
+        is_late: bool,
+        now: float,
     ) -> None:
-        """COMMAND_CANCEL: call off a client's latest task of a command, if it is not over."""
+        """COMMAND_CANCEL: call off a client's latest task of a command, if it is not over.
+
+        ``is_late``: it has waited while the server stood still. What is held since stays so.
+        """
         task = self._book.latest(submitter, command, vehicle=vehicle.system_id)
-        if task is not None and rights.reach(row_of_message(CommandCancel.id).role):
+        if task is None or (is_late and task.state is TaskState.HELD):
+            return
+        if rights.reach(row_of_message(CommandCancel.id).role):
             vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: Asked, *, now: float) -> int:
@@ -74,6 +86,9 @@ class TaskControl:
             raise Rejection(R.NOT_FOUND, "no task is running")
         task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "cancel")
+        if asked.client.is_late and task.state is TaskState.HELD:  # others would go on
+            words = f"it waited while the server stood still, and task {task.id} is held since"
+            raise Rejection(R.STALE, words)
         asked.vehicle.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
 

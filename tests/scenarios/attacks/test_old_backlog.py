@@ -6,6 +6,7 @@ of 20 s ago reached the rover, and a submission was driven that its client had g
 
 import pytest
 
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
@@ -24,9 +25,12 @@ from tests.kit.client import (
     setpoint,
     sticks,
 )
-from tests.kit.world import World
+from tests.kit.mission import Item
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
 
 STOOD = 20.0  # s
+WAYPOINT, CANCEL = 16, 54010
 MOVING = {11, 69, 70, 84}  # SET_MODE, sticks, and set-points
 
 
@@ -133,3 +137,26 @@ def test_a_submission_that_waited_for_a_second_is_taken_in(world: World) -> None
     world.join(world.server)
     world.run(0.5)
     assert submitted.answer == (ACCEPTED, 1)
+
+
+@pytest.mark.parametrize("guided", ["queue", "now"])
+def test_a_place_as_a_plan_item_is_not_driven_to_either(make_world: MakeWorld, guided: str) -> None:
+    world = make_world(settings=Settings(guided=guided))
+    world.client.mode(HOLD)
+    world.client.arm()
+    world.run(2)
+    in_the_standstill(world, Item(WAYPOINT, **at(5.0, 0.0), current=2).message(0, 0, (1, 1)))
+    assert moved(world, 8) < 0.01
+    assert world.tasks() == ()
+
+
+def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> None:
+    """It was driven when its sender called it off; now somebody has to look first."""
+    world.client.move(20)
+    world.client.move(20)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.observer.expects_gaps = True
+    in_the_standstill(world, command_long(CANCEL, 1))
+    assert moved(world, 6) < 0.01
+    assert world.state(1) == (S.HELD, R.LATE)
+    assert world.client.acks_of(CANCEL) == [(TEMPORARILY_REJECTED, R.STALE)]
