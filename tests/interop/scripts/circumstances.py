@@ -4,7 +4,9 @@
 MAVSDK ends the script; with more it is the last one.
 """
 
+import asyncio
 import sys
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from io import TextIOWrapper
@@ -13,6 +15,7 @@ from typing import Any, Self
 from tests.interop.scripts.facts import PERSONAS, Persona
 
 PATIENCE = 40.0  # s for anything that is waited for
+AGAIN = 1.0  # s after a failure: MAVSDK calls itself BUSY for a while after a time-out
 
 # MAVSDK writes to the same output from threads of its own: each line of ours goes there whole
 assert isinstance(sys.stdout, TextIOWrapper)
@@ -48,6 +51,7 @@ class Circumstances:
                 if not left:
                     raise
                 _tell(operation, error)
+                time.sleep(AGAIN)
         raise AssertionError("no tries")
 
     async def attempt_async(self, operation: Callable[..., Awaitable[Any]], *arguments: Any) -> Any:
@@ -59,6 +63,7 @@ class Circumstances:
                 if not left:
                     raise
                 _tell(operation, error)
+                await asyncio.sleep(AGAIN)
         raise AssertionError("no tries")
 
 
