@@ -323,14 +323,17 @@ class Engine:
                     self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
 
     def _halts_first(self, received: list[Received]) -> list[Received]:
-        """Put what lets a rover go behind what makes one stand; all else keeps its order."""
+        """Put what lets a rover go, or drives it, behind what makes one stand.
+
+        All else keeps its order.
+        """
         kinds = [self._kind_of(each.message) for each in received]
-        if Kind.HALT not in kinds or Kind.GO not in kinds:
+        if Kind.HALT not in kinds or (Kind.GO not in kinds and Kind.MOTION not in kinds):
             return received
-        going = [each for each, kind in zip(received, kinds, strict=True) if kind is Kind.GO]
+        goes = [kind in (Kind.GO, Kind.MOTION) for kind in kinds]
         return [
-            *(each for each, kind in zip(received, kinds, strict=True) if kind is not Kind.GO),
-            *going,
+            *(each for each, is_last in zip(received, goes, strict=True) if not is_last),
+            *(each for each, is_last in zip(received, goes, strict=True) if is_last),
         ]
 
     def _kind_of(self, message: m.Message | None) -> Kind:

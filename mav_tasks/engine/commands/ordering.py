@@ -10,7 +10,15 @@ from math import isfinite
 from mav_tasks.engine.clients.sender import COPIED, DOUBLED
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import has_place
-from mav_tasks.engine.policy import DISARM, PAUSE, PAUSE_HERE, Kind, Row, row_of_command
+from mav_tasks.engine.policy import (
+    DISARM,
+    PAUSE,
+    PAUSE_HERE,
+    Kind,
+    Row,
+    row_of_command,
+    row_of_message,
+)
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
@@ -56,7 +64,7 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
         return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
     if isinstance(message, CommandLong | CommandInt):
         return kind_of(command_of(message), persona)
-    return Kind.WISH
+    return Kind.WISH if message is None else row_of_message(message.id).kind
 
 
 def require_newer(asked: Asked, *, now: float) -> None:
