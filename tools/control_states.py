@@ -1,0 +1,54 @@
+"""Tries everything from every state of control that a rover can come into, and judges what it does.
+
+    tools/control_states.py --persona px4 --most 1000      about a state a second
+    tools/control_states.py --start "task, pause"          from there
+
+Exit code 0: nothing was wrong; 1: something was, and what led to it is printed. Linux only.
+"""
+
+import argparse
+import logging
+import sys
+from functools import partial
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
+
+from tests.kit.joint.deeds import BY_NAME  # noqa: E402
+from tests.kit.joint.search import search  # noqa: E402
+from tests.kit.px4 import PROMPT_PX4  # noqa: E402
+from tests.kit.world import PROMPT, World  # noqa: E402
+
+PERSONAS = {"ardupilot": PROMPT, "px4": PROMPT_PX4}
+
+
+def main() -> int:
+    """Do what the command line says; gives the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="tools/control_states.py",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--persona", choices=PERSONAS, default="ardupilot")
+    parser.add_argument("--most", type=int, default=300, metavar="N", help="states to go on from")
+    parser.add_argument("--start", default="", metavar="DEEDS", help="what has happened before")
+    arguments = parser.parse_args()
+    start = [name.strip() for name in arguments.start.split(",") if name.strip()]
+    if unknown := [name for name in start if name not in BY_NAME]:
+        parser.error(f"{unknown[0]}: no deed; there are {', '.join(BY_NAME)}")
+    logging.disable(logging.CRITICAL)  # what servers say of thousands of refusals
+    make = partial(_world, arguments.persona)
+    found = search(make, most=arguments.most, start=start)
+    for path, what in found.wrong:
+        print(f"{', '.join(path)}: {what}")
+    print(found)
+    return 1 if found.wrong else 0
+
+
+def _world(persona: str) -> World:
+    return World(persona=PERSONAS[persona]).ready()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
