@@ -218,6 +218,36 @@ def describe(goal: Goal) -> str:
             return f"wait {duration:g} s"
 
 
+def kind_of(goal: SingleGoal) -> str:
+    """Return its kind, as the rules of roles name it: ``TASK_KINDS`` of the settings."""
+    match goal:
+        case Move() | MoveTurned():
+            return "move"
+        case Rotate() | Face():
+            return "rotate"
+        case Drive() | Head():
+            return "drive"
+        case GoTo(place=None):
+            return "return"
+        case GoTo():
+            return "goto"
+        case Wait():
+            return "wait"
+
+
+def speed_named_by(step: Step) -> float:
+    """Return the speed that a step names, m/s; 0: none."""
+    match step:
+        case Move(speed=speed) | MoveTurned(speed=speed) | GoTo(speed=speed):
+            return speed or 0.0
+        case SetSpeed(speed=speed):
+            return speed or 0.0
+        case Drive(forward=forward) | Head(forward=forward):
+            return abs(forward)
+        case _:
+            return 0.0
+
+
 def ends_at_home(goal: Goal) -> bool:
     """Return whether the last place that a goal drives to is the vehicle's home."""
     steps = goal.steps if isinstance(goal, Plan) else (goal,)

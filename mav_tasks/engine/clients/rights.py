@@ -11,21 +11,13 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import ROLES, Limits, Roles
 from mav_tasks.tasks.goal import (
-    Drive,
-    Face,
     Goal,
-    GoTo,
-    Head,
-    Move,
-    MoveTurned,
     Nothing,
     Perform,
     Plan,
-    Rotate,
-    SetSpeed,
     SingleGoal,
-    Step,
-    Wait,
+    kind_of,
+    speed_named_by,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
@@ -134,8 +126,8 @@ class RightsBook:
 def _kinds_of(goal: Goal) -> list[str]:
     """Give the kinds of tasks that a goal is, a plan of one step being as that step."""
     if not isinstance(goal, Plan):
-        return [_kind_of(goal)]
-    kinds = [_kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
+        return [kind_of(goal)]
+    kinds = [kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
     if len(kinds) == 1 and not _has_home(goal):
         return kinds
     return ["plan", *sorted(set(kinds))]
@@ -145,22 +137,6 @@ def _has_home(plan: Plan) -> bool:
     return plan.steps[:1] == (Nothing(),)
 
 
-def _kind_of(goal: SingleGoal) -> str:
-    match goal:
-        case Move() | MoveTurned():
-            return "move"
-        case Rotate() | Face():
-            return "rotate"
-        case Drive() | Head():
-            return "drive"
-        case GoTo(place=None):
-            return "return"
-        case GoTo():
-            return "goto"
-        case Wait():
-            return "wait"
-
-
 def _performs(goal: Goal) -> bool:
     return isinstance(goal, Plan) and any(isinstance(step, Perform) for step in goal.steps)
 
@@ -168,16 +144,4 @@ def _performs(goal: Goal) -> bool:
 def _fastest(goal: Goal) -> float:
     """Give the highest speed that a goal names, m/s."""
     steps = goal.steps if isinstance(goal, Plan) else (goal,)
-    return max((_speed_of(step) for step in steps), default=0.0)
-
-
-def _speed_of(step: Step) -> float:
-    match step:
-        case Move(speed=speed) | MoveTurned(speed=speed) | GoTo(speed=speed):
-            return speed or 0.0
-        case SetSpeed(speed=speed):
-            return speed or 0.0
-        case Drive(forward=forward) | Head(forward=forward):
-            return abs(forward)
-        case _:
-            return 0.0
+    return max((speed_named_by(step) for step in steps), default=0.0)
