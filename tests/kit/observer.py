@@ -147,6 +147,7 @@ class Observer:
     _zeros_since: float = 1e9
     _in_row: int = 0  # of the server's setpoints
     _hold_at: float = -1e9
+    _stick_hold_at: float = -1e9  # the last request for HOLD that a stick has brought
     _sticks_at: float = -2e9
     _disarm_at: float = -1e9
     _mode_at: float = -1e9  # when it was last heard that the mode is another one
@@ -354,7 +355,7 @@ class Observer:
 
     def _is_held_for_sticks(self, now: float) -> bool:
         """Whether it was asked for HOLD in the step of a stick: with zeros until it shows that."""
-        return self._hold_at == self._sticks_at and now - self._hold_at <= OWN_REQUEST
+        return now - self._stick_hold_at <= OWN_REQUEST
 
     def _take_over(self, now: float, *, zeros: int) -> None:
         """Somebody else has the rover; of interest only while the server is driving."""
@@ -442,6 +443,8 @@ class Observer:
         ways = self.ways
         if wanted == ways.hold:
             self._hold_at = now
+            if now == self._sticks_at or self._is_held_for_sticks(now):
+                self._stick_hold_at = now
             if now == self._pause_at:  # carried out as HOLD it is a wish for HOLD
                 self._see_wish_of_client(now, wanted)
                 self._hold_due = None
