@@ -36,6 +36,7 @@ SENT = 0.4  # s
 GAP = 0.12  # s between setpoints while driving: 20 Hz, one tick missed
 BURST = 4  # moving setpoints in 0.1 s
 ENGAGED = 0.2  # s since the last setpoint: the server is driving
+NO_AUTOPILOT = 8  # MAV_AUTOPILOT of a heartbeat that a rover's own does not have
 OWN_REQUEST = 3.0  # s in which a change to HOLD or disarmed follows from our own request
 KNOWN = 0.5  # s since the server heard of it: no setpoint from before is on its way any more
 GREETING = (
@@ -200,7 +201,7 @@ class Observer:
         if source == SERVER or kind in SETPOINTS:
             self._take_over(now, zeros=1)
         elif source == (self.system_id, 1):
-            if kind == "HEARTBEAT":
+            if kind == "HEARTBEAT" and message.autopilot != NO_AUTOPILOT:
                 self._see_heartbeat(now, message)
             elif kind == "LOCAL_POSITION_NED":
                 self._position_at = now

@@ -338,3 +338,16 @@ def test_an_upload_is_of_who_began_it_and_not_of_its_endpoint(world: World) -> N
     client.send(items(1))
     world.run(0.3)
     assert [task.submitter.key for task in world.tasks()] == ["alice"]
+
+
+def test_a_program_s_heartbeat_at_the_rover_s_address_is_none_of_the_rover(world: World) -> None:
+    """A ground station that is set up with the rover's ids, heard on the rover's link."""
+    world.client.move(3.0)
+    world.until_state(1, S.EXECUTING)
+    rovers_address = common.MAVLink(None, 1, 1)
+    for _ in range(20):
+        station = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)  # disarmed, by what it says
+        world.net.send("rover1", "server:vehicles", station.pack(rovers_address))
+        world.run(0.1)
+    assert world.state(1)[0] is S.EXECUTING
+    world.until_state(1, S.COMPLETED)

@@ -19,7 +19,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
-from mav_tasks.mavlink.enums import MavType
+from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
@@ -301,6 +301,8 @@ class VehicleSide:
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
+                if message.autopilot == MavAutopilot.INVALID:
+                    return None  # of a program that has taken the rover's address
                 if vehicle.is_overtaken(now=now):
                     return vehicle  # an old mode, or an old arming, is not news
                 vehicle.last_heartbeat = packet
