@@ -10,8 +10,7 @@ from tests.kit.mission import Item, Upload
 from tests.kit.px4 import ask_mode
 from tests.kit.world import World, at
 
-WAYPOINT, RETURN, START, CANCEL, CLEAR, RELEASE = 16, 20, 300, 54010, 54011, 54013
-ELSEWHERE = (1, 42)  # a component that nobody has heard of: the autopilot does it
+WAYPOINT, START, CANCEL, CLEAR, RELEASE = 16, 300, 54010, 54011, 54013
 PX4_HOLD, PX4_OFFBOARD = 3 << 24 | 4 << 16, 6 << 16
 SPEED = 0.5  # m/s of the client's stream
 LATER = 6.0  # s until the task begins that is submitted for later
@@ -120,11 +119,6 @@ DEEDS: tuple[Deed, ...] = (
         "start of the mission",
         Kind.GO,
         lambda scene: scene.go(scene.client.command(START, target=(1, 1))),
-    ),
-    Deed(
-        "return, passed on",
-        Kind.GO,
-        lambda scene: scene.go(scene.client.command(RETURN, target=ELSEWHERE)),
     ),
     Deed("release", Kind.GO, lambda scene: scene.go(scene.client.command(RELEASE, 0, 0))),
     Deed("task", Kind.WISH, lambda scene: scene.client.move(30.0)),
