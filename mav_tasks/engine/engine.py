@@ -327,6 +327,8 @@ class Engine:
 
         All else keeps its order.
         """
+        if len(received) < 2:
+            return received
         kinds = [self._kind_of(each.message) for each in received]
         if Kind.HALT not in kinds or (Kind.GO not in kinds and Kind.MOTION not in kinds):
             return received

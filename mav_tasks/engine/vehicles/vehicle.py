@@ -332,6 +332,7 @@ class Vehicle:
             self._take_over("armed to be driven by hand", now=now)
         self._shows_restart = False
         self._note_rest(now=now)
+        self._note_others(now=now)
         if not self._clock.is_running:
             self.step(now=now)
         self._ask_for_rates(now=now)
@@ -343,12 +344,16 @@ class Vehicle:
         """What it measures at rest is learnt while nothing can be telling it to move."""
         driven = self._authority.since_other(now=now) < self._settings.watch.other_controller
         follows = (self.persona.hold_mode, self.persona.control_mode)
-        if self._monitor.custom_mode != follows[0] and self.armed and not self.control.is_engaged:
-            self._others_drive |= not self.where.motion.is_still(now=now)
         if self.armed and (driven or self._monitor.custom_mode not in follows):
             self.where.motion.standstill.may_move()
         else:
             self.where.motion.standstill.told_to_stand(now=now)
+
+    def _note_others(self, *, now: float) -> None:
+        """Note that it moves, and that we do not move it: who then sets HOLD has parked it."""
+        is_held = self._monitor.custom_mode == self.persona.hold_mode
+        if self.armed and not is_held and not self.control.is_engaged:
+            self._others_drive |= not self.where.motion.is_still(now=now)
 
     def _keep_home(self, place: GlobalPlace | None, *, now: float) -> None:
         """Where it is first armed is its home; one met armed has said where that was."""

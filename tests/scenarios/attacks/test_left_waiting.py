@@ -12,12 +12,22 @@ from math import nan
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, GUIDED, HOLD, MOVE, FakeClient, command_long, setpoint
+from tests.kit.client import (
+    ACCEPTED,
+    GUIDED,
+    HOLD,
+    MOVE,
+    FakeClient,
+    Message,
+    command_long,
+    setpoint,
+)
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import MISSION, PROMPT_PX4, REPOSITION, ask_mode
@@ -55,6 +65,15 @@ def stays(world: World, seconds: float) -> bool:
         if world.pose() != pytest.approx(before, abs=0.01):
             return False
     return True
+
+
+def away_from_home(world: World) -> None:
+    """Drive the rover to where a return moves it, and arm it there."""
+    world.client.move(5)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(3)
+    world.client.arm()
+    world.run(2)
 
 
 def unheard(world: World) -> None:
@@ -175,7 +194,7 @@ def test_a_stream_does_not_drive_on_when_the_rover_may_move_again(world: World, 
     assert stays(world, 4)
     world.client.mode(GUIDED)
     world.run(2)
-    assert world.truth.forward_speed > 0.3, "it is asked for anew"
+    assert world.truth.forward_speed > 0.3, "its client has asked for the mode again"
 
 
 def test_nor_after_a_pause_of_another_client(world: World) -> None:
@@ -208,11 +227,9 @@ def test_a_rover_that_somebody_drove_and_parked_stays_there(world: World, mode: 
     assert world.paused() is R.TAKEOVER
 
 
-def packed(message: object) -> bytes:
+def packed(message: Message) -> bytes:
     """Pack a message as another ground station does."""
-    from pymavlink.dialects.v20 import common
-
-    return bytes(message.pack(common.MAVLink(None, 254, 190)))  # type: ignore[attr-defined]
+    return bytes(message.pack(common.MAVLink(None, 254, 190)))
 
 
 def restarted(world: World, path: Path) -> None:
@@ -258,11 +275,7 @@ def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
     """A mode that the rover refused, its answer lost; the next one waited for that."""
     world = make_world(persona=PROMPT_PX4)
     person = world.add_client("person")
-    world.client.move(5)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(3)
-    world.client.arm()
-    world.run(2)
+    away_from_home(world)
     world.lose_acks()
     world.client.send(command_long(STANDARD_MODE, 77, target=(1, 1)))
     world.run(0.55)
@@ -278,11 +291,7 @@ def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
 @pytest.mark.parametrize("halt", ["HOLD", "pause", "STOP"])
 def test_nor_a_return_behind_another(world: World, halt: str) -> None:
     person = world.add_client("person")
-    world.client.move(5)
-    world.until_state(1, S.COMPLETED, within=40)
-    world.run(3)
-    world.client.arm()
-    world.run(1)
+    away_from_home(world)
     person.mode(HOLD)
     world.run(1)
     world.lose_acks()

@@ -13,13 +13,12 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, HOLD, TEMPORARILY_REJECTED, command_long
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.world import World, at
-from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, stays
+from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
 CHANGE_MODE = 1  # of DO_REPOSITION
@@ -40,11 +39,7 @@ def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
 ) -> None:
     world = make_world(settings=Settings(claim=claim))
     person = world.add_client("person")
-    world.client.move(5)
-    world.until_state(1, S.COMPLETED, within=40)
-    world.run(3)
-    world.client.arm()
-    world.run(1)
+    away_from_home(world)
     target = ELSEWHERE if claim else (1, 1)
     word = command_long(RETURN, target=target) if what == "return" else go_to(20, 0, target)
     world.client.send(word)
