@@ -34,6 +34,7 @@ class Halts:
         self.is_undone = False  #: somebody has let the queue go on since
         self._reason, self._actor = TaskReason.NONE, ""
         self._was_asked = False  # to go on, since the last
+        self._counted_at = -inf  # s, when the last came that is no other one again
 
     def __repr__(self) -> str:
         return f"Halts({self.epoch}, {self.words})"
@@ -48,10 +49,11 @@ class Halts:
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it is the last one again, and is not counted."""
         is_same = (reason, actor) == (self._reason, self._actor)
-        if is_same and now - self.at < SAME and not self._was_asked:
+        self.at = now  # the last of them, by which words are overtaken
+        if is_same and now - self._counted_at < SAME and not self._was_asked:
             return False
         self.epoch += 1
-        self.at, self.by, self.number, self.command = now, None, -1, 0
+        self._counted_at, self.by, self.number, self.command = now, None, -1, 0
         self._reason, self._actor, self._was_asked = reason, actor, False
         self.is_undone = False
         return True

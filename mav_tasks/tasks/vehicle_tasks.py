@@ -289,8 +289,10 @@ class VehicleTasks:
     def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Note that the vehicle is to stand: what lets it go on has to be newer than this.
 
-        What was to run at once and has not begun waits as any other.
+        What was to run at once and has not begun waits as any other; what was released and has not
+        begun is held as before.
         """
+        self._release = None
         if self._urgent is not None and (self.begun is None or self.begun.id != self._urgent):
             self._urgent = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):

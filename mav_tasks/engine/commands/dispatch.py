@@ -24,6 +24,7 @@ from mav_tasks.engine.commands.goals import (
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.commands.ordering import (
+    halts_again,
     has_left_before_halt,
     kind_of,
     note_halt,
@@ -106,7 +107,7 @@ class Commands:
         vehicle = addressed[0]
         receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
-        if known is not None:
+        if known is not None and not halts_again(command, vehicle.persona):
             if known.answer is not None:
                 client.answer(known.answer, packet.source)
             return

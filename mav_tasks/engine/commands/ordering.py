@@ -106,6 +106,17 @@ def require_newer(asked: Asked, *, now: float) -> None:
     raise Rejection(TaskReason.STALE, words)
 
 
+def halts_again(command: Command, persona: Persona) -> bool:
+    """Whether each copy of a word makes a rover stand, also the very same packet.
+
+    Some senders do not count their packets: it may be another word, and is acknowledged. Who calls
+    a task off means that one task.
+    """
+    if command.command in (MavCmd.TASK_CANCEL, MavCmd.TASK_CLEAR):
+        return False
+    return kind_of(command, persona) is Kind.HALT
+
+
 def has_left_before_halt(asked: Asked) -> bool:
     """Return whether the last halt is the same sender's, and this word had left before it."""
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
@@ -115,7 +126,10 @@ def has_left_before_halt(asked: Asked) -> bool:
 def note_halt(asked: Asked, *, before: int) -> None:
     """Note whose word the last halt was, if there was one since the epoch ``before``."""
     halts = asked.vehicle.tasks.halts
-    if halts.epoch != before:
+    is_repeated = (
+        halts.by is asked.sender and kind_of(asked.command, asked.vehicle.persona) is Kind.HALT
+    )
+    if halts.epoch != before or is_repeated:
         number = asked.sender.line.number_of(asked.packet.seq)
         halts.was_said_by(asked.sender, number, command=asked.command.command)
 

@@ -902,8 +902,9 @@ class Vehicle:
         return task
 
     def operator_lost(self, *, now: float) -> None:
-        """No ground station is heard any more: nothing runs unseen."""
+        """No ground station is heard any more: nothing runs unseen, nor begins."""
         self.tasks.forget_release()
+        self.forget_start()
         begun = self.tasks.begun
         is_running = begun is not None and begun.state in RUNNING
         goes_on = is_running or self._goes_on_by_itself or self.tasks.urgent is not None

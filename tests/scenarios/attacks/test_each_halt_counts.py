@@ -1,0 +1,129 @@
+"""Each halt counts, also one that looks like the last one again, and takes back what waits.
+
+A continue that left between two quick halts of its sender was obeyed when the net delivered it
+last: the second halt was the first one again. One of a sender that does not count its packets was
+acknowledged as a copy of its last one, and was not carried out. What was released, and a mission
+that waited for arming, outlived a change of the position reference and the last ground station.
+"""
+
+from dataclasses import replace
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from tests.kit.client import (
+    ACCEPTED,
+    ARM,
+    HOLD,
+    PAUSE_CONTINUE,
+    SET_MODE,
+    STOP,
+    FakeClient,
+    Message,
+    command_long,
+)
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
+from tests.kit.world import World, at
+from tests.scenarios.attacks.test_left_waiting import WAYPOINT, stays
+from tests.scenarios.attacks.test_old_backlog import in_the_standstill
+from tests.scenarios.conftest import MakeWorld
+
+RELEASE, AGAIN_OR_REMAINDER = 54013, 1
+HALTS = {
+    "pause": command_long(PAUSE_CONTINUE, 0),
+    "HOLD": command_long(SET_MODE, 1, HOLD, target=(1, 1)),
+    "disarm": command_long(ARM, 0, target=(1, 1)),
+    "STOP": command_long(STOP),
+}
+
+
+@pytest.fixture
+def driving(world: World) -> World:
+    world.client.move(30)
+    world.client.move(5)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    return world
+
+
+@pytest.mark.parametrize("halt", ["pause", "HOLD", "STOP"])
+@pytest.mark.parametrize("apart", [0.02, 0.1, 0.19])
+def test_a_continue_from_between_two_quick_halts_is_older_than_the_second(
+    driving: World, halt: str, apart: float
+) -> None:
+    driving.client.send(HALTS[halt])
+    driving.run(apart / 2)
+    late = driving.client.send_repeated(command_long(PAUSE_CONTINUE, 1))
+    driving.run(apart / 2)
+    driving.client.send(HALTS[halt])
+    driving.run(0.03)
+    driving.client.send_raw(late)
+    driving.run(3)
+    assert stays(driving, 5)
+
+
+def uncounted(client: FakeClient, message: Message) -> None:
+    """Send a message as a script does that gives all its packets the number 0."""
+    client._mav.seq = 0
+    client.send(message)
+
+
+@pytest.mark.parametrize("halt", ["pause", "HOLD", "disarm"])
+def test_a_halt_of_one_that_does_not_count_its_packets_is_carried_out_each_time(
+    driving: World, halt: str
+) -> None:
+    script = driving.add_client("script", system_id=245)
+    script.heartbeats = False
+    uncounted(script, HALTS[halt])
+    driving.run(2)
+    driving.client.proceed()
+    driving.run(3)
+    assert driving.truth.forward_speed > 0.2
+    before = len(script.acks)
+    uncounted(script, HALTS[halt])
+    driving.run(1.8)
+    assert [ack.result for ack in script.acks[before:]] == [ACCEPTED]
+    assert stays(driving, 5)
+
+
+def test_a_release_does_not_outlive_a_change_of_the_position_reference(world: World) -> None:
+    world.client.move(20)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.observer.expects_gaps = True
+    in_the_standstill(world)
+    world.run(3)
+    assert world.state(1) == (S.HELD, R.LATE)
+    world.add_client("person").pause()
+    world.run(1)
+    released = world.client.command(RELEASE, 1, AGAIN_OR_REMAINDER)
+    world.run(1)
+    assert released.answer == (ACCEPTED, 1)
+    world.fault(Faults(position_jump=(5.0, 0.0)))
+    world.run(3)
+    world.client.proceed()
+    world.run(0.5)
+    assert stays(world, 5)
+
+
+def test_a_mission_does_not_begin_at_an_arming_that_no_station_sees(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4, settings=replace(Settings(), operator_lost="pause"))
+    plan = (Item(WAYPOINT, **at(3.0, 0.0)), Item(WAYPOINT, **at(0.0, 0.0)))
+    upload = Upload(world.client, plan, target=(1, 1))
+    world.until(lambda: upload.result == 0, within=5)
+    ask_mode(world.client, MISSION)
+    world.run(0.5)
+    world.operator_arm(True)
+    world.until_state(1, S.COMPLETED, within=90)
+    world.run(5)
+    world.operator_arm(False)
+    world.run(2)
+    marked = ask_mode(world.client, MISSION)
+    world.run(0.2)
+    assert marked.result == ACCEPTED
+    world.client.heartbeats = False
+    world.run(8)
+    world.operator_arm(True)
+    assert stays(world, 6)
