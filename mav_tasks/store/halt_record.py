@@ -6,8 +6,9 @@ vehicle it has the last word in each register, with the number of the event in t
 whose number the database does not know is newer than the database.
 
 Each register has two cells, in different pages. A word goes into the cell that holds the older one,
-so that a write which is cut short leaves the word before it. Under the vehicle 0, which no vehicle
-is, stands the next task id: whoever puts back an older database gives no id twice.
+so that a write which is cut short leaves the word before it. The cells of a register that a later
+version has added stand behind all others; a file without them is made longer. Under the vehicle 0,
+which no vehicle is, stands the next task id: whoever puts back an older database gives no id twice.
 """
 
 import os
@@ -21,7 +22,13 @@ from pathlib import Path
 from zlib import crc32
 
 from mav_tasks.errors import StoreError
-from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleHalted
+from mav_tasks.tasks.events import (
+    Event,
+    QueueContinued,
+    QueuePaused,
+    VehicleArmingSet,
+    VehicleHalted,
+)
 from mav_tasks.tasks.lifecycle import TaskReason
 
 HEADER = b"mav-tasks record of halts, version 1\n".ljust(64, b"\0")
@@ -41,10 +48,13 @@ class Register(IntEnum):
 
     QUEUE = 0  # why it is paused; NONE: it was continued
     HALTS = 1  # how often it was halted, as the value
+    ARMING = 2  # whether it may be armed, as the value
 
 
+FIRST_ONES = 2 * VEHICLES  # registers that the first version had
 REGISTERS = len(Register) * VEHICLES
 SIZE = len(HEADER) + SLOTS * REGISTERS * CELL
+FIRST_SIZE = len(HEADER) + SLOTS * FIRST_ONES * CELL
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +93,9 @@ def word_of(event: Event, number: int, *, offset: float) -> Word | None:
             return Word(vehicle, number, reason, actor, at + offset, register, epoch)
         case QueueContinued(vehicle=vehicle, actor=actor, at=at):
             return Word(vehicle, number, TaskReason.NONE, actor, at + offset)
+        case VehicleArmingSet(vehicle=vehicle, may_arm=may_arm, at=at):
+            register, value = Register.ARMING, int(may_arm)
+            return Word(vehicle, number, utc=at + offset, register=register, value=value)
         case _:
             return None
 
@@ -92,6 +105,8 @@ def event_of(word: Word, *, offset: float) -> Event:
     at = word.utc - offset
     if word.register is Register.HALTS:
         return VehicleHalted(word.vehicle, word.value, word.reason, word.actor, at)
+    if word.register is Register.ARMING:
+        return VehicleArmingSet(word.vehicle, bool(word.value), at)
     if word.is_halt:
         return QueuePaused(word.vehicle, word.reason, word.actor, at)
     return QueueContinued(word.vehicle, word.actor, at)
@@ -111,6 +126,8 @@ class HaltRecord:
             raise StoreError(f"store {store}: {self._path.name}: {error.strerror}") from error
         try:
             content = os.pread(self._fd, SIZE + 1, 0)
+            if len(content) == FIRST_SIZE:
+                content = content.ljust(SIZE, b"\0")
             self._newest = dict(_words_in(content))
             if os.pwrite(self._fd, content, 0) < SIZE:  # a copy of it may have had holes
                 raise OSError(0, "there is no room for it")
@@ -167,7 +184,9 @@ class HaltRecord:
 
 
 def _place(slot: int, key: int) -> int:
-    return len(HEADER) + (slot * REGISTERS + key) * CELL
+    if key < FIRST_ONES:
+        return len(HEADER) + (slot * FIRST_ONES + key) * CELL
+    return FIRST_SIZE + (slot * (REGISTERS - FIRST_ONES) + key - FIRST_ONES) * CELL
 
 
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:

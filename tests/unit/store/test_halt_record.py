@@ -11,9 +11,9 @@ import pytest
 from mav_tasks.errors import StoreError
 from mav_tasks.store import HaltNotKept
 from mav_tasks.store.database import Database
-from mav_tasks.store.halt_record import CELL, HEADER, SIZE, HaltRecord, Word
-from mav_tasks.store.halt_record import REGISTERS as CELLS
-from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused
+from mav_tasks.store.halt_record import CELL, HEADER, SIZE, HaltRecord, Word, event_of, word_of
+from mav_tasks.store.halt_record import FIRST_ONES as CELLS
+from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleArmingSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from tests.unit.store.full_disk import NO_NAMESPACE
 from tests.unit.store.samples import next_outcomes, opened, submitted, wait_for
@@ -211,3 +211,22 @@ def test_the_latest_task_id_counts_though_a_higher_one_came_before(path: Path) -
     again = HaltRecord(path)
     again.close()
     assert [again.next_id_after(number) for number in (9, 19, 20)] == [2, 2, None]
+
+
+def test_that_somebody_has_disarmed_is_a_word_and_an_older_record_is_made_longer(
+    path: Path, record_path: Path
+) -> None:
+    record = HaltRecord(path)
+    record.write(Word(9, 1, R.STOPPED, "somebody", 5.0))
+    record.close()
+    record_path.write_bytes(record_path.read_bytes()[: len(HEADER) + 2 * CELLS * CELL])
+    older = HaltRecord(path)
+    disarming = word_of(VehicleArmingSet(9, False, 7.0), 2, offset=1.0)
+    assert disarming is not None
+    older.write(disarming)
+    older.close()
+    assert record_path.stat().st_size == SIZE
+    assert [event_of(word, offset=1.0) for word in words(path)] == [
+        QueuePaused(9, R.STOPPED, "somebody", 4.0),
+        VehicleArmingSet(9, False, 7.0),
+    ]
