@@ -27,11 +27,11 @@ class StartMark:
     """Whether a vehicle's mission begins when it is armed."""
 
     def __init__(self) -> None:
-        self._marker: Marker | None = None
+        self.marker: Marker | None = None  #: who wants it, if anybody does
         self._until = -inf
 
     def __repr__(self) -> str:
-        return f"StartMark({self._marker}, until={self._until:.2f})"
+        return f"StartMark({self.marker}, until={self._until:.2f})"
 
     def put(
         self,
@@ -43,18 +43,18 @@ class StartMark:
         now: float,
     ) -> None:
         """A client wants it, and has not armed yet."""
-        self._marker = Marker(client, submitter, rights, plan_id)
+        self.marker = Marker(client, submitter, rights, plan_id)
         self._until = now + WAITS
 
     def is_put(self, *, now: float) -> bool:
         """Whether somebody wants it still."""
-        return self._marker is not None and now < self._until
+        return self.marker is not None and now < self._until
 
     def remove(self) -> None:
         """Something else was wished for since."""
-        self._marker = None
+        self.marker = None
 
     def take(self) -> Marker | None:
         """The vehicle is armed: give who wanted the mission to begin then, once."""
-        marker, self._marker = self._marker, None
+        marker, self.marker = self.marker, None
         return marker

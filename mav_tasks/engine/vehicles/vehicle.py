@@ -5,6 +5,7 @@ want; and no setpoint at all to a vehicle that is not ours.
 """
 
 from collections.abc import Hashable
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from math import inf
 
@@ -630,6 +631,12 @@ class Vehicle:
         """The mission that was to begin when it is armed is another one now, or is not wanted."""
         self.start_mark.remove()
         self.shown.forget()
+
+    def forget_start_of(self, keys: AbstractSet[str]) -> None:
+        """What such a key wanted to begin with the arming is not wanted any more."""
+        marker = self.start_mark.marker
+        if marker is not None and marker.submitter.key in keys:
+            self.forget_start()
 
     def check_not_by_hand(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""

@@ -6,7 +6,10 @@ to another: each of them did. So did a task after the server was started again: 
 that somebody had disarmed.
 """
 
+import shutil
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -14,6 +17,8 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.inputs import KeysChanged
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -34,6 +39,7 @@ from tests.kit.px4 import MISSION, PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_signing import ALICE, BOB, put, signing
 
 UTC = 1.8e9
 WAYPOINT, OPTIONS, START, RETURN, STANDARD_MODE = 16, 54014, 300, 20, 262
@@ -305,3 +311,62 @@ def test_nor_a_return_behind_another(world: World, halt: str) -> None:
     for _ in range(40):
         world.run(0.1)
         assert world.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_mission_of_a_key_that_counts_no_more_does_not_begin_at_the_arming(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    put(world, ALICE)
+    client = signing(world, ALICE)
+    world.run(1.5)
+    upload = Upload(
+        client,
+        (Item(WAYPOINT, **at(3.0, 0.0)), Item(WAYPOINT, **at(0.0, 0.0))),
+        target=(1, 1),
+    )
+    world.until(lambda: upload.result == 0, within=5)
+    ask_mode(client, MISSION)
+    world.run(0.5)
+    world.operator_arm(True)
+    world.until_state(1, S.COMPLETED, within=90)
+    world.run(5)
+    world.operator_arm(False)
+    world.run(2)
+    marked = ask_mode(client, MISSION)
+    world.run(0.5)
+    assert marked.result == ACCEPTED
+    revoked = Key("alice", b"", "operator", ALICE.fingerprint)
+    world.server.pump.handle(KeysChanged((revoked, BOB)), now=world.now)
+    world.run(1)
+    world.operator_arm(True)
+    assert stays(world, 6)
+
+
+def test_a_disarming_that_only_the_record_of_halts_took_is_not_undone(
+    make_world: MakeWorld, tmp_path: Path
+) -> None:
+    """The disk is full while somebody disarms; the server is started again, to go on by itself."""
+    path, copy = tmp_path / "tasks.sqlite3", tmp_path / "copy"
+    settings = replace(Settings(), on_restart="continue")
+    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC), settings=settings)
+    world.client.arm()
+    world.run(1)
+    world.client.command(MOVE, 3, 0, 0, 0, 0, 15, 5)
+    world.run(1)
+    with closing(sqlite3.connect(path)) as source, closing(sqlite3.connect(copy)) as target:
+        source.backup(target)
+    disarmed = world.add_client("person").arm(False)
+    world.run(2)
+    assert disarmed.result == ACCEPTED
+    store = world.server.store
+    world.end_server()
+    store.close()
+    for each in tmp_path.glob("tasks.sqlite3*"):
+        if each.suffix != ".halts":
+            each.unlink()
+    shutil.copy(copy, path)
+    later = PromptSqliteStore(path, wall_offset=UTC)
+    world.start_server(later, later.load())
+    assert stays(world, 40)
+    assert not world.rover.autopilot.armed
