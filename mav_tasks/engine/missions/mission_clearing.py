@@ -42,8 +42,14 @@ class MissionClearing:
         self._answers = answers
         self._write_through = write_through
 
-    def clear(self, vehicle: Vehicle, sender: Sender, kind: int, *, now: float) -> None:
-        """Forget plans of a kind, or of all; the answer comes once that is durable."""
+    def clear(
+        self, vehicle: Vehicle, sender: Sender, kind: int, *, is_late: bool, now: float
+    ) -> None:
+        """Forget plans of a kind, or of all; the answer comes once that is durable.
+
+        ``is_late``: it has waited while the server stood still. What is held since stays so, as
+        others would go on.
+        """
         kinds: list[int] = list(STORED) if kind == MavMissionType.ALL else [kind]
         if kinds[0] not in STORED:
             self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
@@ -53,6 +59,11 @@ class MissionClearing:
             self._answers.ack(sender, kind, MavMissionResult.DENIED)
             words = f"clear: task {task.id} is being driven: pause or cancel it first"
             self._refused(sender, vehicle, Rejection(R.WRONG_STATE, words), now=now)
+            return
+        if MISSION in kinds and task is not None and is_late and task.state is TaskState.HELD:
+            self._answers.ack(sender, kind, MavMissionResult.DENIED)
+            words = f"clear: it waited while the server stood still; task {task.id} is held since"
+            self._refused(sender, vehicle, Rejection(R.STALE, words), now=now)
             return
         stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
         self._forget(vehicle, sender, kind, stored, {}, now=now)

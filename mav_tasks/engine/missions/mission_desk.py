@@ -148,7 +148,9 @@ class MissionDesks:
                 )
             case m.MissionClearAll():
                 self._vehicles.touch(vehicle)
-                self._clearing.clear(vehicle, sender, message.mission_type, now=now)
+                is_late = client.is_late
+                kind = message.mission_type
+                self._clearing.clear(vehicle, sender, kind, is_late=is_late, now=now)
             case m.MissionSetCurrent():
                 self._vehicles.touch(vehicle)
                 self._set_current(vehicle, client, sender, message.seq, now=now)

@@ -5,6 +5,7 @@ of 20 s ago reached the rover, and a submission was driven that its client had g
 """
 
 import pytest
+from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -25,12 +26,12 @@ from tests.kit.client import (
     setpoint,
     sticks,
 )
-from tests.kit.mission import Item
+from tests.kit.mission import Item, Upload
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 STOOD = 20.0  # s
-WAYPOINT, CANCEL = 16, 54010
+WAYPOINT, CANCEL, START = 16, 54010, 300
 MOVING = {11, 69, 70, 84}  # SET_MODE, sticks, and set-points
 
 
@@ -160,3 +161,22 @@ def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> No
     assert moved(world, 6) < 0.01
     assert world.state(1) == (S.HELD, R.LATE)
     assert world.client.acks_of(CANCEL) == [(TEMPORARILY_REJECTED, R.STALE)]
+
+
+def test_a_clearing_of_a_mission_held_since_lets_nothing_else_go(world: World) -> None:
+    drive = (Item(WAYPOINT, frame=0, current=1), Item(WAYPOINT, **at(20.0, 0.0)))
+    upload = Upload(world.client, drive, target=(1, 1))
+    world.until(lambda: upload.result == 0, within=5)
+    started = world.client.command(START, target=(1, 1))
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    assert started.result == ACCEPTED
+    world.client.move(20)
+    world.run(1)
+    world.observer.expects_gaps = True
+    in_the_standstill(world, common.MAVLink_mission_clear_all_message(1, 1, 0))
+    world.run(0.5)
+    assert moved(world, 8) < 0.001
+    assert world.state(1) == (S.HELD, R.LATE)
+    assert "clear: it waited while the server stood still; task 1 is held since" in "".join(
+        world.client.texts()
+    )
