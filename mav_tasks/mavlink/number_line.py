@@ -36,7 +36,7 @@ class NumberLine:
         ahead = self.number_of(seq) - self.last
         if ahead > 0:
             return self._move_on(self.last + ahead, ahead, now)
-        is_second = was_at_0 and seq <= FIRST
+        is_second = was_at_0 and 0 < seq <= FIRST
         if ahead < 0 and (is_second or self._begins_anew(self.last + ahead, now)):
             self.lives += 1
             forward = ahead & 0xFF

@@ -7,9 +7,10 @@ from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.lifecycle import TaskReason, words_of
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, words_of
 
 SAME = 0.2  # s, in which the same halt by the same one is one: five a second of a flood
+SHOWN = 2.0  # s after a disarming in which the vehicle shows that it is disarmed, at 1 Hz
 
 _WORDS = {
     TaskReason.OPERATOR: "a pause",
@@ -49,11 +50,16 @@ class Halts:
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it is the last one again, and is not counted."""
         is_same = (reason, actor) == (self._reason, self._actor)
+        shows_last = (
+            self._reason is TaskReason.DISARMED and reason in TAKEN and now - self.at <= SHOWN
+        )
         self.at = now  # the last of them, by which words are overtaken
         if is_same and now - self._counted_at < SAME and not self._was_asked:
             return False
         self.epoch += 1
-        self._counted_at, self.by, self.number, self.command = now, None, -1, 0
+        self._counted_at = now
+        if not shows_last:  # as it was told
+            self.by, self.number, self.command = None, -1, 0
         self._reason, self._actor, self._was_asked = reason, actor, False
         self.is_undone = False
         return True

@@ -34,14 +34,24 @@ class Sender:
         return f"Sender({self.line!r}, {len(self._said)} words)"
 
     def first_epoch(
-        self, content: Hashable, packet: Packet, *, is_counted: bool, now: float
+        self,
+        content: Hashable,
+        packet: Packet,
+        *,
+        is_counted: bool,
+        is_anothers: bool = False,
+        now: float,
     ) -> int | None:
         """Return the epoch at which the first copy of this word came; None: it is none.
 
-        ``is_counted``: it says itself that it is a copy.
+        ``is_counted``: it says itself that it is a copy. ``is_anothers``: somebody else has halted
+        the vehicle. Then the very same packet is a copy, though its sender seems to run anew: it
+        may as well be the net that brings all its packets once more.
         """
         said = self._said.get(content)
-        if said is None or said.life != self.line.lives:
+        if said is None:
+            return None
+        if said.life != self.line.lives and not (is_anothers and packet.raw in said.packets):
             return None
         within = DOUBLED if is_counted or packet.raw in said.packets else COPIED
         return said.epoch if now - said.at <= within else None

@@ -69,6 +69,17 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
 
 def require_newer(asked: Asked, *, now: float) -> None:
     """Raise Rejection (STALE) for a word that lets go and is older than what holds the rover."""
+    words = why_older(asked, now=now)
+    if words:
+        raise Rejection(TaskReason.STALE, words)
+
+
+def why_older(asked: Asked, *, now: float) -> str:
+    """Return in words why a word that lets go does not count, "" if it does; remember it.
+
+    It is older than what holds the rover. Each copy has to be asked about, also one that is known
+    for what it is otherwise: by that the next one is known for a copy.
+    """
     halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
     is_old = asked.client.is_late
     halts.was_asked_to_go_on()
@@ -77,7 +88,13 @@ def require_newer(asked: Asked, *, now: float) -> None:
     named = _epoch_in(asked.command)
     content = (asked.command.target, asked.command.command, repr(asked.command.params))
     copies = asked.command.confirmation
-    first = sender.first_epoch(content, packet, is_counted=copies > 0, now=now)
+    first = sender.first_epoch(
+        content,
+        packet,
+        is_counted=copies > 0,
+        is_anothers=halts.by is not sender,
+        now=now,
+    )
     if first is None and copies:  # the first one was lost, and had left before this one
         sent_by = min(sent_by, now - min(copies * COPIED, DOUBLED))
     # its sender has said the last halt itself, and before this, which it does not repeat by itself:
@@ -96,14 +113,12 @@ def require_newer(asked: Asked, *, now: float) -> None:
         epoch = min(epoch, halts.epoch - 1)
     sender.says(content, packet, epoch=epoch, now=now)
     if epoch == halts.epoch:
-        return
+        return ""
     if is_old:
-        words = f"it waited while the server stood still: {AGAIN}"
-    elif named:
-        words = f"{halts.words} came since what you were shown: look again"
-    else:
-        words = f"{halts.words} came since: {AGAIN}"
-    raise Rejection(TaskReason.STALE, words)
+        return f"it waited while the server stood still: {AGAIN}"
+    if named:
+        return f"{halts.words} came since what you were shown: look again"
+    return f"{halts.words} came since: {AGAIN}"
 
 
 def halts_again(command: Command, persona: Persona) -> bool:

@@ -9,7 +9,7 @@ from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwise
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import wish_of
-from mav_tasks.engine.commands.ordering import require_newer
+from mav_tasks.engine.commands.ordering import why_older
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -103,6 +103,8 @@ class Submissions:
         is_at_autopilot = command.target.component_id in (0, AUTOPILOT)
         terms = replace(wish.terms, is_cruising=is_at_autopilot and not is_ours)
         draft = Draft(vehicle.system_id, command.command, goal, submitter, terms, wish.marks)
+        runs_now = self._settings.guided == "now" and asked.is_go_to
+        why_not = why_older(asked, now=now) if runs_now else ""
         known = self._recollection.known(
             draft, confirmation=command.confirmation, origin=vehicle.where.origin, now=now
         )
@@ -113,9 +115,10 @@ class Submissions:
         draft = _allowed(asked.client, vehicle, draft)
         if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven
             vehicle.end_driving_of(asked.client.key, now=now)
-        if self._settings.guided == "now" and asked.is_go_to:
+        if runs_now:
             asked.rights.require(OPERATOR, "interrupt what a rover does")
-            require_newer(asked, now=now)
+            if why_not:
+                raise Rejection(R.STALE, why_not)
             task = vehicle.run_now(draft, actor=asked.actor, now=now)
         else:
             task = vehicle.tasks.submit(draft, now=now)
