@@ -381,7 +381,7 @@ class Engine:
         is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)
         if is_lost and self._settings.operator_lost == "pause":
             for vehicle in self._vehicles.addressed_by(0):
-                vehicle.operator_lost(now=now)
+                vehicle.joint.operator_lost(now=now)
 
     def _settle(self, *, now: float) -> None:
         """Bring vehicles' answers to clients, and what happened to clients and the journal."""
@@ -391,7 +391,7 @@ class Engine:
         for system_id in self._fleet.room.take_woken():
             woken = self._vehicles.get(system_id)
             if woken is not None:
-                woken.wake(now=now)
+                woken.joint.wake(now=now)
         for vehicle in self._vehicles.settle():
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
@@ -428,7 +428,7 @@ class Engine:
         self._submissions.close()
         self._stop_by = now + self._settings.watch.shutdown
         for vehicle in self._vehicles.addressed_by(0):
-            vehicle.shut_down(now=now)
+            vehicle.joint.shut_down(now=now)
 
     def _note_stopped(self, *, now: float) -> None:
         assert self._stop_by is not None
@@ -436,5 +436,5 @@ class Engine:
         if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True
             for vehicle in self._vehicles:
-                vehicle.note_rest(now=now)
+                vehicle.joint.note_rest(now=now)
             self._book.record(ServerStopped(rolling, now))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, QueuePaused
-from mav_tasks.tasks.lifecycle import ACTIVE, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import ACTIVE, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -16,7 +16,6 @@ from mav_tasks.tasks.waiting_room import WaitingRoom
 R, S = TaskReason, TaskState
 
 LONG_IDLE = 600.0  # s without a write before the start: nobody remembers what was queued
-RUNNING = frozenset({S.STARTING, S.EXECUTING, S.CANCELLING})
 
 
 class Fleet:

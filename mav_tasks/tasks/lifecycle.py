@@ -197,6 +197,7 @@ TERMINAL = frozenset({_S.COMPLETED, _S.FAILED, _S.CANCELLED, _S.KILLED, _S.EXPIR
 #: not begun
 WAITING = INITIAL
 #: begun and not over: at most one such task a vehicle, except for those pre-empted
+RUNNING = frozenset({_S.STARTING, _S.EXECUTING, _S.CANCELLING})
 ACTIVE = frozenset({_S.STARTING, _S.EXECUTING, _S.PAUSED, _S.CANCELLING, _S.HELD})
 
 

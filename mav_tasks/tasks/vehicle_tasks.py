@@ -504,6 +504,11 @@ class VehicleTasks:
         blocker = start_blocker(seen, watch=self._settings.watch, now=now, goal=goal)
         return blocker if blocker in OF_RESTART else R.NONE
 
+    @property
+    def has_release(self) -> bool:
+        """Whether a task was released that goes on as soon as it can."""
+        return self._release is not None
+
     def forget_release(self) -> None:
         """A released task that has not begun is held as before: something has halted it."""
         self._release = None

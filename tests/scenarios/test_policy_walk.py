@@ -156,7 +156,7 @@ def granted(walk: "Walk") -> None:
     driver = walk.client if walk.role in ("operator", "safety") else walk.world.client
     driver.mode(GUIDED)
     walk.world.run(1.0)
-    assert walk.vehicle.has_granted((driver.server, driver.name)), "it was granted"
+    assert walk.vehicle.motion_rights.has_granted((driver.server, driver.name)), "it was granted"
 
 
 STATES = (idle, armed_in_hold, task_drives, paused, stopped, granted)
@@ -221,9 +221,9 @@ class Walk:
             self.world.control(),
             None if begun is None else (begun.id, begun.state),
             len(tuple(tasks.waiting)),
-            self.vehicle.has_granted((self.client.server, self.client.name)),
-            self.vehicle.has_granted((self.client.server, self.world.client.name)),
-            self.vehicle.why_no_motion(),
+            self.vehicle.motion_rights.has_granted((self.client.server, self.client.name)),
+            self.vehicle.motion_rights.has_granted((self.client.server, self.world.client.name)),
+            self.vehicle.motion_rights.why_no_motion(),
         )
 
     def say(self, word: Word) -> None:

@@ -171,7 +171,7 @@ class Commands:
                     asked.answer(MavResult.ACCEPTED)
                     return
                 case MavCmd.NAV_LAND as number if at_server or self._claims(number):
-                    asked.vehicle.stand_down(asked.client.key, now=now)
+                    asked.vehicle.joint.stand_down(asked.client.key, now=now)
                     asked.answer(MavResult.ACCEPTED)
                     return
                 case MavCmd.MISSION_START as number if at_server or self._claims(number):
@@ -261,7 +261,7 @@ class Commands:
             return
 
         def undo(*, now: float) -> None:
-            vehicle.go_to_follows(number, actor=asked.actor, now=now)
+            vehicle.joint.go_to_follows(number, actor=asked.actor, now=now)
 
         def leave(*, now: float) -> None:
             """It was not stored in time."""
@@ -331,7 +331,7 @@ class Commands:
         unheard = self._vehicles.stop_unheard(target.system_id, clear=clear, actor=actor, now=now)
         if not targets and not unheard:
             return
-        killed = [vehicle.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
+        killed = [vehicle.joint.stop(clear=clear, actor=actor, now=now) for vehicle in targets]
         sender = client.sender(packet.source)
         for vehicle in targets:
             vehicle.tasks.halts.was_said_by(sender, sender.line.number_of(packet.seq))
@@ -359,14 +359,14 @@ class Commands:
             case 0.0:
                 return self._pause(asked, now=now)
             case 1.0:
-                return vehicle.proceed(actor=asked.actor, now=now)
+                return vehicle.joint.proceed(actor=asked.actor, now=now)
             case value:
                 raise Rejection(R.BAD_PARAMETER, f"param1 {value:g}: 0 pauses, 1 continues")
 
     def _pause(self, asked: Asked, *, now: float) -> TaskId | None:
         vehicle = asked.vehicle
         self._submissions.held(vehicle, asked.submitter)
-        paused = vehicle.pause(actor=asked.actor, now=now)
+        paused = vehicle.joint.pause(actor=asked.actor, now=now)
         if not vehicle.is_heard(now=now):  # paused all the same
             words = f"paused, but vehicle {vehicle.system_id} is silent"
             raise Rejection(R.VEHICLE_SILENT, words)
@@ -387,14 +387,14 @@ def _check_relay(asked: Asked, row: Row, *, now: float) -> None:
     if vehicle.tasks.is_stopped and not row.passes_under_stop:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
     if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
-        vehicle.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
+        vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
     why_not = why_not_sent(row, vehicle, asked.client.key)
     if why_not:
         raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
     if row.needs_grant:
-        vehicle.is_moved_by(asked.client.key, now=now)
+        vehicle.motion_rights.passed(asked.client.key, now=now)
 
 
 def _relay(asked: Asked, *, now: float) -> None:

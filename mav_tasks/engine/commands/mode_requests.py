@@ -62,7 +62,7 @@ class ModeRequests:
             raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
         if mode == vehicle.persona.hold_mode:
             self._submissions.held(vehicle, asked.submitter)
-            paused = vehicle.hold(sender=asked.sender, actor=asked.actor, now=now)
+            paused = vehicle.joint.hold(sender=asked.sender, actor=asked.actor, now=now)
             if not vehicle.is_heard(now=now):
                 raise Rejection(R.VEHICLE_SILENT, f"vehicle {vehicle.system_id} is silent")
             asked.answer(MavResult.ACCEPTED, paused or 0)
@@ -75,7 +75,7 @@ class ModeRequests:
             return True
         if not self._is_mission(vehicle, mode):
             asked.rights.require(row_of_command(MavCmd.DO_SET_MODE).role, "change the mode")
-            vehicle.client_asks_mode(mode, client.key, now=now)
+            vehicle.joint.client_asks_mode(mode, client.key, now=now)
             return False
         self._plans.check_start(asked.rights, vehicle, asked.submitter)
         if self._is_to_be_armed_first(vehicle):
@@ -109,7 +109,7 @@ class ModeRequests:
         vehicle, submitter = asked.vehicle, asked.submitter
         self._plans.check_start(asked.rights, vehicle, submitter)
         self._submissions.check_open()
-        vehicle.end_driving_of(asked.client.key, now=now)
+        vehicle.joint.end_driving_of(asked.client.key, now=now)
         started = self._plans.start(vehicle, submitter, first=first, now=now)
         if isinstance(started, Draft):
             task = self._submissions.submit_draft(asked, started, now=now)
@@ -138,7 +138,7 @@ class ModeRequests:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
-        if vehicle.is_by_hand and not vehicle.is_armed_by_client(now=now):
+        if vehicle.is_by_hand and not vehicle.motion_rights.is_armed_by_client(now=now):
             return  # by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)

@@ -22,9 +22,9 @@ RC_IGNORED = (0, 65535)
 def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable) -> str:
     """Return in words what keeps a word of a client from a rover now, "" if nothing does."""
     if row.needs_grant:
-        return vehicle.why_not_moved(client)
+        return vehicle.motion_rights.why_not_moved(client)
     if not row.passes_beside_task:
-        return vehicle.why_no_motion()
+        return vehicle.motion_rights.why_no_motion()
     if not row.passes_under_stop and vehicle.tasks.is_stopped:
         return "STOP is latched"
     return ""
@@ -48,7 +48,7 @@ def may_pass(
 def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> None:
     """Note that a client's packet does not go to the vehicle."""
     if row.needs_grant:
-        vehicle.is_not_moved_by(client, now=now)
+        vehicle.motion_rights.withheld(client, now=now)
 
 
 def passed(
@@ -56,9 +56,9 @@ def passed(
 ) -> None:
     """Note what a packet that goes to the vehicle means for its tasks."""
     if row.needs_grant:
-        vehicle.is_moved_by(client, now=now)
+        vehicle.motion_rights.passed(client, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
-        vehicle.sticks_moved(now=now)
+        vehicle.joint.sticks_moved(now=now)
 
 
 def _asks_to_stand(message: m.Message | None) -> bool:

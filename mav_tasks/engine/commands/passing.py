@@ -103,9 +103,9 @@ class Passing:
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """A client is gone: whatever it was driving is driven by nobody."""
         for vehicle in self._vehicles:
-            if vehicle.has_granted((link, peer)):
+            if vehicle.motion_rights.has_granted((link, peer)):
                 self._vehicles.touch(vehicle)
-                vehicle.client_is_gone((link, peer), now=now)
+                vehicle.joint.client_is_gone((link, peer), now=now)
 
 
 def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:

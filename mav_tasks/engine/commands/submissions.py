@@ -114,12 +114,12 @@ class Submissions:
         self.check_open()
         draft = _allowed(asked.client, vehicle, draft)
         if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven
-            vehicle.end_driving_of(asked.client.key, now=now)
+            vehicle.joint.end_driving_of(asked.client.key, now=now)
         if runs_now:
             asked.rights.require(OPERATOR, "interrupt what a rover does")
             if why_not:
                 raise Rejection(R.STALE, why_not)
-            task = vehicle.run_now(draft, actor=asked.actor, now=now)
+            task = vehicle.joint.run_now(draft, actor=asked.actor, now=now)
         else:
             task = vehicle.tasks.submit(draft, now=now)
         self._await_commit(asked, task, now=now)
@@ -129,7 +129,7 @@ class Submissions:
 
     def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
         """Take in a task that runs at once; Rejection says why not."""
-        asked.vehicle.end_driving_of(asked.client.key, now=now)
+        asked.vehicle.joint.end_driving_of(asked.client.key, now=now)
         known = self._recollection.known(
             draft, confirmation=0, origin=asked.vehicle.where.origin, now=now
         )
@@ -139,7 +139,7 @@ class Submissions:
         self.check_open()
         asked.rights.require(OPERATOR, "interrupt what a rover does")
         draft = _allowed(asked.client, asked.vehicle, draft)
-        task = asked.vehicle.run_now(draft, actor=asked.actor, now=now)
+        task = asked.vehicle.joint.run_now(draft, actor=asked.actor, now=now)
         self._await_commit(asked, task, now=now)
 
     def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:

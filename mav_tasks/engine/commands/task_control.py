@@ -69,7 +69,7 @@ class TaskControl:
         if task is None or (is_late and task.state is TaskState.HELD):
             return
         if rights.reach(row_of_message(CommandCancel.id).role):
-            vehicle.cancel(task, kill=False, actor=str(submitter), now=now)
+            vehicle.joint.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: Asked, *, now: float) -> int:
         """Call one task off; a copy gets the first one's answer, and calls off no other."""
@@ -89,12 +89,12 @@ class TaskControl:
         if asked.client.is_late and task.state is TaskState.HELD:  # others would go on
             words = f"it waited while the server stood still, and task {task.id} is held since"
             raise Rejection(R.STALE, words)
-        asked.vehicle.cancel(task, kill=kill, actor=asked.actor, now=now)
+        asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
 
     def _clear(self, asked: Asked, *, now: float) -> int:
         begun_too = flag(asked.command, 1, "scope")
-        asked.vehicle.clear(begun_too=begun_too, actor=asked.actor, now=now)
+        asked.vehicle.joint.clear(begun_too=begun_too, actor=asked.actor, now=now)
         return 0
 
     def _release(self, asked: Asked, *, now: float) -> int:
@@ -114,10 +114,10 @@ class TaskControl:
         if task.state is not TaskState.HELD:
             raise Rejection(R.WRONG_STATE, f"task {task.id} is not held, it is {_words(task)}")
         if how == SKIP:
-            asked.vehicle.skip(task, actor=asked.actor, now=now)
+            asked.vehicle.joint.skip(task, actor=asked.actor, now=now)
         else:
             may_continue = asked.rights.reach(OPERATOR)
-            asked.vehicle.release(
+            asked.vehicle.joint.release(
                 task, again=how == AGAIN, may_continue=may_continue, actor=asked.actor, now=now
             )
         return task.id
@@ -130,7 +130,7 @@ class TaskControl:
             asked.rights.check_priority(terms.priority)
         if terms.is_preemptive and not task.terms.is_preemptive:
             asked.rights.check_preemptive()
-        asked.vehicle.modify(task, terms, actor=asked.actor, now=now)
+        asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
         return task.id
 
     def _change_speed(self, asked: Asked, *, now: float) -> int:

@@ -116,7 +116,7 @@ class MissionClearing:
         """End a mission that was interrupted: without its plan nobody could have it go on."""
         current = None if task is None else self._book.get(task.id)
         if current is not None and current.state in AT_REST:
-            vehicle.cancel(current, kill=False, actor=actor, now=now)
+            vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
 
     def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
         message_id = m.MissionClearAll.id

@@ -94,7 +94,7 @@ class Plans:
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
         """Let a plan take the place of the one before; NOTHING: there is none any more."""
         if kind == MISSION and stored.items != self.stored(vehicle.system_id, MISSION).items:
-            vehicle.forget_start()
+            vehicle.parts.forget_start()
         self._stored[vehicle.system_id, kind] = stored
         self._apply_bounds(vehicle.system_id, kind, stored.items)
         source = packed(stored.items)
@@ -152,7 +152,7 @@ class Plans:
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
         self._check_queue(vehicle)
-        vehicle.check_not_by_hand(now=now)
+        vehicle.joint.check_not_by_hand(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
         begun, task = vehicle.tasks.begun, self.task(vehicle)
         is_fresh = task is not None and waits_for_start(task)
@@ -190,17 +190,17 @@ class Plans:
 
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
         """Of a paused queue the mission alone goes on; what others have paused stays so."""
-        vehicle.leave_manual(now=now)
+        vehicle.joint.leave_manual(now=now)
         if task.state in ACTIVE:
             if vehicle.tasks.paused:
-                vehicle.go_on(actor=actor, now=now)
+                vehicle.joint.go_on(actor=actor, now=now)
             return
         if task.terms.is_staged:
             terms = replace(task.terms, is_staged=False)
-            vehicle.modify(task, terms, actor=actor, now=now)
+            vehicle.tasks.modify(task, terms, actor=actor, now=now)
         if vehicle.tasks.paused:
             vehicle.tasks.give_way_to(task, actor=actor, now=now)
-        vehicle.wake(now=now)
+        vehicle.joint.wake(now=now)
 
     def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """A start was not stored in time: it is none."""
@@ -208,7 +208,7 @@ class Plans:
         self._started.pop(vehicle.system_id, None)
         if current is not None and current.state in WAITING:
             terms = replace(current.terms, is_staged=True)
-            vehicle.modify(current, terms, actor=SERVER, now=now)
+            vehicle.tasks.modify(current, terms, actor=SERVER, now=now)
 
     def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """The mission was submitted anew: clients know it by that task's id from now on."""

@@ -126,6 +126,11 @@ class Authority:
             return ModeKind.OURS
         return ModeKind.MANUAL if mode in self._persona.manual_modes else ModeKind.OTHER
 
+    @property
+    def has_any_grant(self) -> bool:
+        """Whether any client may drive, as far as that is the client's doing."""
+        return bool(self._granted)
+
     def has_granted(self, client: Hashable) -> bool:
         """Whether this client has asked for our mode since the last task or STOP."""
         return client in self._granted

@@ -182,7 +182,7 @@ class VehicleSide:
         Whether what that key had asked for is still wanted only an operator can say.
         """
         for each in self if keys else ():
-            each.forget_start_of(keys)
+            each.joint.forget_start_of(keys)
         for tasks in self._fleet if keys else ():
             theirs = [task for task in tasks.unfinished if task.submitter.key in keys]
             if not theirs:
@@ -198,7 +198,7 @@ class VehicleSide:
             if vehicle is None:
                 tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
             else:
-                vehicle.pause_tasks(now=now)
+                vehicle.joint.pause_tasks(now=now)
 
     def settle(self) -> list[Vehicle]:
         """Look at what became of those to which something was done; gives them."""
@@ -215,7 +215,7 @@ class VehicleSide:
         self._book.durable = durable
         for vehicle in waiting:
             self._agenda.touch(vehicle)
-            vehicle.step(now=now)
+            vehicle.joint.step(now)
 
     @property
     def counts(self) -> DecodeCounts:
@@ -323,7 +323,7 @@ class VehicleSide:
         self._old_until, self._stood_for = now + OLD_NEWS, now - due
         for vehicle in self:
             self._agenda.touch(vehicle)
-            vehicle.check_late(now=now)
+            vehicle.joint.check_late(now=now)
 
     def may_have_waited(self, *, now: float) -> float:
         """Return for how many seconds what is read now may have waited."""
@@ -408,7 +408,7 @@ class VehicleSide:
         self._agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
-        vehicle.step(now=now)
+        vehicle.joint.step(now)
         return vehicle
 
     def _may_arm(self, link: _Link) -> bool:
@@ -463,7 +463,7 @@ class VehicleSide:
             place = self._router.place_of(vehicle.system_id)
             if target in (0, vehicle.system_id) and place is not None and place[0] == link:
                 self._agenda.touch(vehicle)
-                vehicle.second_controller(packet.source, now=now)
+                vehicle.joint.second_controller(packet.source, now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
         key = f"{system_id} {text}"

@@ -97,13 +97,13 @@ class Judge:
         tasks, autopilot = vehicle.tasks, world.rover.autopilot
         begun = tasks.begun
         client = self.scene.client.name
-        granted = [key for key in vehicle._authority._granted if client in str(key)]
+        granted = [key for key in vehicle.parts.authority._granted if client in str(key)]
         return State(
             queue=tasks.paused.name,
             phase=vehicle.control.phase.name,
             mode=autopilot.mode.name,
             armed=autopilot.armed,
-            may_arm=vehicle._authority.may_arm,
+            may_arm=vehicle.parts.authority.may_arm,
             begun="" if begun is None else f"{begun.state.name} {begun.reason.name}",
             waiting=min(len(tasks.waiting), 1),
             urgent=tasks.urgent is not None,

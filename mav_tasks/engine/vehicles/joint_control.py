@@ -1,0 +1,394 @@
+"""Joint control of one vehicle: each word and each event goes through the table, once.
+
+Its rule of order: STOP before everything; what somebody else did to the vehicle before what we
+want; and no set-point at all to a vehicle that is not ours.
+"""
+
+from collections.abc import Callable, Hashable
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+from mav_tasks.engine.vehicles.control import (
+    Driver,
+    Event,
+    Grip,
+    Queue,
+    State,
+    Work,
+    effects_of,
+)
+from mav_tasks.engine.vehicles.hands import Hands, Word
+from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.engine.vehicles.pilot import Pilot
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import Address
+from mav_tasks.services.offboard import Phase
+from mav_tasks.tasks.lifecycle import LOSSES, RUNNING, TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.task import Draft, Task, TaskId
+from mav_tasks.tasks.view import VehicleView
+
+R = TaskReason
+
+LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
+GRIPS = {
+    Phase.IDLE: Grip.FREE,
+    Phase.ASKING_HOLD: Grip.TAKING,
+    Phase.ASKING_ARM: Grip.TAKING,
+    Phase.LEADING_IN: Grip.TAKING,
+    Phase.ASKING_MODE: Grip.TAKING,
+    Phase.CONTROL: Grip.DRIVING,
+    Phase.RELEASING: Grip.RELEASING,
+    Phase.DISARMING: Grip.RELEASING,
+    Phase.STOPPING: Grip.STOPPING,
+}
+
+
+class JointControl:
+    """Everything that is asked of one vehicle, or happens to it, in the order of the table."""
+
+    def __init__(self, parts: Parts, pilot: Pilot, view: Callable[[float], VehicleView]) -> None:
+        """``view`` gives one look at the vehicle at a time."""
+        self._parts = parts
+        self._pilot = pilot
+        self._view = view
+        self._hands = Hands(parts, pilot, self.step)
+        self._stops_task = False  # which the end of the server has interrupted
+        self.stopped_at = -inf  #: s, the last STOP
+
+    def __repr__(self) -> str:
+        return f"JointControl({self._parts.control!r}, {self._parts.tasks!r})"
+
+    def on(self, event: Event, word: Word, *, now: float) -> Any:
+        """Do what the table says of an event; gives what that comes to, if anything.
+
+        Rejection: the word was refused; what the table has before that was done.
+        """
+        result = None
+        for effect in effects_of(event, self.state(now=now)):
+            if isinstance(effect, Event):
+                found = self.on(effect, word, now=now)
+            else:
+                found = self._hands.carry_out(effect, word, now=now)
+            result = result if found is None else found
+        return result
+
+    def step(self, now: float) -> None:
+        """Let the tasks say what they demand, do it, and see to what is found by that."""
+        for event, reason, text in self._pilot.follow(now=now):
+            self.on(event, Word(reason, text=text), now=now)
+        self._pilot.send(now=now)
+
+    def wake(self, *, now: float) -> None:
+        """Look at the tasks unless that is about to be done: another may be ready now."""
+        if not self._pilot.clock.is_running:
+            self.step(now)
+
+    # what the table goes by
+
+    def state(self, *, now: float) -> State:
+        """Return what decides about the next event."""
+        parts = self._parts
+        persona, tasks, authority = parts.persona, parts.tasks, parts.authority
+        return State(
+            queue=_queue(tasks.paused),
+            grip=GRIPS[parts.control.phase],
+            work=self._work(),
+            driver=self._driver(now=now),
+            armed=parts.monitor.armed,
+            may_arm=authority.may_arm,
+            waits=(
+                authority.has_any_grant
+                or tasks.has_release
+                or parts.start_mark.is_put(now=now)
+                or parts.hold_before.is_open(now=now)
+            ),
+            is_urgent=tasks.urgent is not None,
+            is_idle=tasks.is_idle,
+            is_stopping=self._pilot.guard.ladder.is_on,
+            is_late=now - self.stopped_at <= LATE_REQUESTS,
+            lingers=persona.is_held_before_places,
+            has_failsafe=persona.has_loss_failsafe,
+            heeds_stick=persona.heeds_throttle_stick,
+            brakes=self._pilot.brakes_against_stick(now=now),
+        )
+
+    def _work(self) -> Work:
+        tasks = self._parts.tasks
+        begun = tasks.begun
+        if begun is None:
+            return Work.NONE if tasks.is_empty else Work.WAITS
+        if begun.state in RUNNING:
+            return Work.RUNS
+        if begun.reason in TAKEN:
+            return Work.TAKEN
+        is_lost = begun.state is TaskState.PAUSED and begun.reason in LOSSES
+        return Work.LOST if is_lost else Work.STANDS
+
+    def _driver(self, *, now: float) -> Driver:
+        if self._client(now=now) is not None:
+            return Driver.CLIENT
+        return Driver.OTHERS if self._parts.is_driven_by_others(now=now) else Driver.NOBODY
+
+    def _client(self, *, now: float) -> Hashable:
+        """The client whose set-points the vehicle may still follow, or None."""
+        within = self._parts.settings.watch.other_controller
+        return self._parts.authority.driver(within=within, now=now)
+
+    # words that let it stand
+
+    def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
+        """STOP: zero and HOLD leave in this very step; gives the task that was killed."""
+        self.stopped_at = now
+        killed: TaskId | None = self.on(Event.STOP, Word(R.STOPPED, actor, clear=clear), now=now)
+        return killed
+
+    def hold(self, *, sender: Hashable, actor: str, now: float) -> TaskId | None:
+        """A client wants HOLD; gives the task that stands by it."""
+        paused: TaskId | None = self.on(Event.HOLD, Word(actor=actor, sender=sender), now=now)
+        return paused
+
+    def pause(self, *, actor: str, now: float) -> TaskId | None:
+        """Let task and queue stand, also when there is no task; gives the task that stands."""
+        paused: TaskId | None = self.on(Event.PAUSE, Word(actor=actor), now=now)
+        return paused
+
+    def pause_tasks(self, *, now: float) -> None:
+        """Let task and queue stand, and not what else may move the vehicle."""
+        self.on(Event.PAUSE_TASKS, Word(), now=now)
+
+    def disarm(self, *, actor: str, now: float) -> None:
+        """A client disarms it: nothing arms it again but a word that is newer."""
+        word = Word(R.DISARMED, actor, "disarmed by a client")
+        self.on(Event.DISARM, word, now=now)
+
+    def operator_lost(self, *, now: float) -> None:
+        """No ground station is heard any more: nothing runs unseen, nor begins."""
+        word = Word(text="no ground station is heard: paused")
+        self.on(Event.OPERATOR_LOST, word, now=now)
+
+    def second_controller(self, who: Address, *, now: float) -> None:
+        """Setpoints or an address like ours, not from us: HOLD once, then let go."""
+        word = Word(R.OTHER_CONTROLLER, str(who), f"second controller {who}")
+        self.on(Event.SECOND, word, now=now)
+
+    def sticks_moved(self, *, now: float) -> None:
+        """A person drives by the sticks of a client."""
+        self._stick(Event.DRIVEN_BY_HAND, "driven by hand", now=now)
+
+    def stick_held(self, *, now: float) -> None:
+        """A person holds a stick of the vehicle's transmitter."""
+        self._stick(Event.STICK, "", now=now)
+
+    def _stick(self, event: Event, what: str, *, now: float) -> None:
+        self.on(event, Word(R.TAKEOVER, self._parts.actor, what), now=now)
+
+    def check_late(self, *, now: float) -> None:
+        """What drove on without us for too long stops, and somebody looks at it first.
+
+        What came in meanwhile looks fresh and is not, so nothing is steered by it.
+        """
+        if self._pilot.is_late(now=now):
+            self.on(Event.LATE, Word(R.LATE), now=now)
+
+    def shut_down(self, *, now: float) -> None:
+        """The server ends: pause what is begun and stop what we drive; nothing begins any more."""
+        self._pilot.close()
+        begun = self._parts.tasks.begun
+        self._stops_task = begun is not None and begun.state in RUNNING
+        self.on(Event.CLOSE, Word(), now=now)
+
+    def note_rest(self, *, now: float) -> None:
+        """The server ends now: keep where what it has stopped has come to."""
+        if self._stops_task:
+            self._parts.tasks.rest(self._view(now), now=now)
+
+    # calling off
+
+    def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
+        """Call a task off; if it is the begun one, zeros leave in this very step."""
+        tasks = self._parts.tasks
+        begun = tasks.begun
+        event = Event.CANCEL if begun is not None and begun.id == task.id else Event.UNQUEUE
+
+        def call_off() -> None:
+            tasks.cancel(task, kill=kill, reason=R.CANCELLED, actor=actor, now=now)
+
+        self.on(event, Word(R.CANCELLED, actor, do=call_off), now=now)
+
+    def skip(self, task: Task, *, actor: str, now: float) -> None:
+        """End a held task."""
+
+        def call_off() -> None:
+            self._parts.tasks.cancel(task, kill=False, reason=R.SKIPPED, actor=actor, now=now)
+
+        self.on(Event.SKIP, Word(R.SKIPPED, actor, do=call_off), now=now)
+
+    def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
+        """Call off what waits, or everything."""
+
+        def call_off() -> None:
+            self._parts.tasks.clear(begun_too=begun_too, actor=actor, now=now)
+
+        event = Event.CLEAR if begun_too else Event.CLEAR_WAITING
+        self.on(event, Word(R.CLEARED, actor, do=call_off), now=now)
+
+    # words that let it go
+
+    def proceed(self, *, actor: str, now: float) -> TaskId | None:
+        """Release STOP, takeover and pause; arming is allowed again. A held task stays held.
+
+        Raise Rejection while the begun task could not take the vehicle. Return the task that goes
+        on.
+        """
+        authority = self._parts.authority
+        may_arm = authority.may_arm_again
+
+        def go_on() -> TaskId | None:
+            seen = replace(self._view(now), may_arm=may_arm)
+            allows = may_arm and not authority.may_arm
+            return self._parts.tasks.proceed(seen, allows=allows, actor=actor, now=now)
+
+        going: TaskId | None = self.on(Event.CONTINUE, Word(R.NONE, actor, do=go_on), now=now)
+        return going
+
+    def go_on(self, *, actor: str, now: float) -> None:
+        """End a pause, as ``proceed``, but nobody has said that the vehicle may be armed again."""
+
+        def go_on() -> None:
+            self._parts.tasks.proceed(self._view(now), actor=actor, now=now)
+
+        self.on(Event.GO_TO_FOLLOWS, Word(R.NONE, actor, do=go_on), now=now)
+
+    def go_to_follows(self, number: int, *, actor: str, now: float) -> None:
+        """A client's "go to" is stored: a HOLD of it just before was none."""
+        is_still = self._parts.hold_before.is_still(number)
+        if not is_still or self._parts.tasks.paused is not R.OPERATOR:
+            return
+        try:
+            self.go_on(actor=actor, now=now)
+        except Rejection as refusal:
+            self._parts.note(f"stays paused: {refusal.text}", now=now)
+
+    def release(
+        self, task: Task, *, again: bool, may_continue: bool, actor: str, now: float
+    ) -> None:
+        """Let a held task go on; raise Rejection while it could not take the vehicle.
+
+        After a restart of the vehicle this is a person's word that all is well, and restores
+        the permission to arm if the person may give it (``may_continue``). What somebody has
+        disarmed stays so until a continue.
+        """
+        authority = self._parts.authority
+        restores = may_continue and authority.is_withdrawn_by_restart
+        seen = self._view(now)
+        if restores:
+            seen = replace(seen, may_arm=authority.may_arm_again)
+
+        def let_go_on() -> None:
+            self._parts.tasks.release(
+                task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
+            )
+
+        event = Event.RESTORE if restores else Event.RELEASE
+        self.on(event, Word(R.NONE, actor, do=let_go_on), now=now)
+
+    def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
+        """Take a task in that runs at once, before what runs and what waits. Rejection."""
+
+        def take_in() -> Task:
+            return self._parts.tasks.run_now(draft, self._view(now), actor=actor, now=now)
+
+        task: Task = self.on(Event.RUN_NOW, Word(R.NONE, actor, do=take_in), now=now)
+        return task
+
+    def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
+        """Note that a client's mode request goes to the vehicle through us.
+
+        Our own mode then counts as set by us. Any other one is a takeover, believed when a
+        heartbeat shows it; but nothing that we still ask for may work against it.
+        """
+        parts = self._parts
+        authority, persona = parts.authority, parts.persona
+        present_mode = parts.monitor.custom_mode
+        # the vehicle enters that mode only in a stream, of which it has not heard yet; that it is
+        # armed may not have been heard yet either: the stream passes when it is
+        streams = persona.arms_in_hold and authority.streams(client, now=now)
+        if mode != persona.control_mode:
+            event = Event.ASK_OTHER_MODE
+        else:
+            event = Event.ASK_OUR_MODE_STREAMING if streams else Event.ASK_OUR_MODE
+
+        def ask() -> None:
+            authority.client_asks(mode, client, present_mode=present_mode, now=now)
+
+        text = f"client asks for {persona.mode_name(mode)}"
+        self.on(event, Word(R.TAKEOVER, parts.actor, text, do=ask), now=now)
+
+    def arm(self, *, now: float) -> None:
+        """A client's wish to arm goes to the vehicle through us."""
+
+        def ask() -> None:
+            self._parts.authority.client_arms(now=now)
+
+        self.on(Event.ARM, Word(do=ask), now=now)
+
+    # what ends a client's own driving
+
+    def end_driving_of(self, client: Hashable, *, now: float) -> None:
+        """A client asks for a return, a place or a mission: its own setpoints end with that.
+
+        What it drove stands, so that neither its last velocity nor a failsafe for lost setpoints
+        comes before what it asks for now.
+        """
+        if client is not None and self._client(now=now) == client:
+            self.on(Event.DRIVING_ENDS, Word(), now=now)
+
+    def client_is_gone(self, client: Hashable, *, now: float) -> None:
+        """Its connection has ended: what it drove stands, and does not wait for its own watch."""
+        if self._parts.authority.forget(client):
+            self.on(Event.GONE, Word(), now=now)
+
+    def stand_down(self, client: Hashable, *, now: float) -> None:
+        """A client has landed it: disarm it once no task is left to drive.
+
+        Raise Rejection under STOP, and while a person drives.
+        """
+        if self._parts.tasks.is_stopped:
+            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        self.check_not_by_hand(now=now)
+        self.end_driving_of(client, now=now)
+        self.on(Event.LANDED, Word(), now=now)
+
+    def check_not_by_hand(self, *, now: float) -> None:
+        """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
+        parts = self._parts
+        if not (parts.monitor.armed and parts.is_by_hand):
+            return
+        if parts.is_driven_by_others(now=now):
+            raise Rejection(R.OTHER_CONTROLLER, "somebody is at the sticks")
+        if not parts.where.motion.is_still(now=now):
+            raise Rejection(R.WRONG_MODE, "driven by hand: it must stand first")
+
+    def leave_manual(self, *, now: float) -> None:
+        """A client starts a mission: as on an autopilot, that ends driving by hand.
+
+        By way of HOLD, from which tasks take the vehicle.
+        """
+        if self._parts.is_by_hand:
+            self.on(Event.LEAVE_MANUAL, Word(), now=now)
+
+    def forget_start_of(self, keys: AbstractSet[str]) -> None:
+        """What such a key wanted to begin with the arming is not wanted any more."""
+        marker = self._parts.start_mark.marker
+        if marker is not None and marker.submitter.key in keys:
+            self._parts.forget_start()
+
+
+def _queue(paused: TaskReason) -> Queue:
+    if not paused:
+        return Queue.RUNS
+    if paused is R.STOPPED:
+        return Queue.STOPPED
+    return Queue.TAKEN if paused in TAKEN else Queue.PAUSED

@@ -1,0 +1,56 @@
+"""Whether a client's motion messages may go to a vehicle, and what they mean for its tasks."""
+
+from collections.abc import Hashable
+
+from mav_tasks.engine.vehicles.parts import Parts
+
+
+class MotionRights:
+    """Whom a vehicle would follow, of the clients that want to drive it."""
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+
+    def __repr__(self) -> str:
+        return f"MotionRights({self._parts.authority!r})"
+
+    def why_not_moved(self, client: Hashable) -> str:
+        """Give in words what keeps a client's motion message from passing, "" if nothing does."""
+        parts = self._parts
+        why_not = self.why_no_motion()
+        if why_not:
+            return why_not
+        if parts.tasks.is_driving:  # also one that is paused
+            return "not while tasks drive"
+        if not parts.monitor.armed:
+            return "the rover is not armed"
+        if not parts.authority.has_granted(client):
+            return f"ask for {parts.persona.mode_name(parts.persona.control_mode)} first"
+        return ""
+
+    def why_no_motion(self) -> str:
+        """Return in words why nobody else may have it move now, "" if somebody may."""
+        parts = self._parts
+        if parts.tasks.is_stopped:
+            return "STOP is latched"
+        if parts.control.is_engaged:
+            return "not while tasks drive"
+        if parts.control.awaits_mode:
+            return "HOLD is being asked for"
+        return ""
+
+    def withheld(self, client: Hashable, *, now: float) -> None:
+        """A client's motion message does not go to it."""
+        self._parts.authority.note_withheld(client, now=now)
+
+    def passed(self, client: Hashable, *, now: float) -> None:
+        """A client's motion message goes to it: tasks wait."""
+        self._parts.authority.note_client(client, now=now)
+
+    def has_granted(self, client: Hashable) -> bool:
+        """Whether a client may move it, as far as that is the client's doing."""
+        return self._parts.authority.has_granted(client)
+
+    def is_armed_by_client(self, *, now: float) -> bool:
+        """Whether a client has asked for arming, through us, just now."""
+        return self._parts.authority.armed_by_client(now=now)

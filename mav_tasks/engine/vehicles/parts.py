@@ -1,0 +1,115 @@
+"""What the parts of one vehicle share: what is known of it, its tasks, and the way to it."""
+
+from dataclasses import dataclass, field
+
+from mav_tasks.engine.vehicles.authority import Authority
+from mav_tasks.engine.vehicles.hold_before import HoldBefore
+from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
+from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
+from mav_tasks.engine.vehicles.start_mark import StartMark
+from mav_tasks.engine.vehicles.stick_watch import StickWatch
+from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
+from mav_tasks.engine.vehicles.whereabouts import Whereabouts
+from mav_tasks.services.heartbeat import HeartbeatMonitor
+from mav_tasks.services.offboard import OffboardControl, Refused
+from mav_tasks.services.persona import Persona
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+from mav_tasks.tasks.view import VehicleView
+
+REFUSALS = {
+    None: TaskReason.NONE,
+    Refused.MODE: TaskReason.MODE_REFUSED,
+    Refused.ARM: TaskReason.ARM_REFUSED,
+}
+
+
+@dataclass(slots=True)
+class Parts:
+    """One vehicle, as those see it who decide about it."""
+
+    system_id: int
+    persona: Persona
+    book: TaskBook
+    tasks: VehicleTasks
+    requests: VehicleRequests
+    where: Whereabouts
+    monitor: HeartbeatMonitor
+    authority: Authority
+    settings: Settings
+    failsafes: OwnFailsafes = field(default_factory=OwnFailsafes)
+    sticks: StickWatch = field(default_factory=StickWatch)
+    #: a HOLD that a "go to" may undo
+    hold_before: HoldBefore = field(default_factory=HoldBefore)
+    #: whether its mission begins when it is armed
+    start_mark: StartMark = field(default_factory=StartMark)
+    #: what its heartbeats say towards clients
+    shown: ShownHeartbeat = field(default_factory=ShownHeartbeat)
+
+    @property
+    def control(self) -> OffboardControl:
+        """Our hold on it."""
+        return self.requests.control
+
+    @property
+    def actor(self) -> str:
+        """Who it is in the journal, where it was the vehicle itself, or somebody at it."""
+        return f"vehicle {self.system_id}"
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether it is in a mode in which a person drives."""
+        return self.monitor.custom_mode in self.persona.manual_modes
+
+    def is_driven_by_others(self, *, now: float) -> bool:
+        """Whether a client, or somebody else, was driving it just now."""
+        return self.authority.since_other(now=now) < self.settings.watch.other_controller
+
+    def note(self, text: str, *, now: float) -> None:
+        """Tell everybody."""
+        self.book.record(VehicleNoted(self.system_id, text, now))
+
+    def withdraw_arming(self, *, now: float) -> None:
+        """Somebody else has a hand on it: it is armed no more, also after a restart of ours."""
+        self.authority.withdraw_arming()
+        self.tasks.let_arm(may_be_armed=False, now=now)
+
+    def forget_start(self) -> None:
+        """The mission that was to begin when it is armed is another one now, or is not wanted."""
+        self.start_mark.remove()
+        self.shown.forget()
+
+    def view(self, *, drives_on: bool, now: float) -> VehicleView:
+        """Give one look at the vehicle for the task domain.
+
+        ``drives_on``: it is not known to stand when nothing is asked of it, and must.
+        """
+        watch, monitor, persona, where = self.settings.watch, self.monitor, self.persona, self.where
+        control, mode = self.control, monitor.custom_mode
+        return VehicleView(
+            heard=monitor.is_heard(now=now),
+            mode=self.authority.kind_of(mode, armed=monitor.armed),
+            is_booting=mode == persona.booting_mode,
+            armed=monitor.armed,
+            may_arm=self.authority.may_arm,
+            in_control=control.in_control,
+            refusal=REFUSALS[control.refused],
+            is_not_ready=control.is_not_ready,
+            why_not_ready=self.failsafes.why_not_ready(now=now),
+            motion=where.motion.latest(),
+            still=where.motion.is_still(now=now),
+            other_controller=self.authority.since_other(now=now) < watch.other_controller,
+            frame=where.frame.frame(),
+            home=where.home,
+            is_fence_unknown=where.is_fence_unknown,
+            is_outside_own_fence=self.failsafes.is_outside_fence,
+            honours_yaw_rate=persona.honours_yaw_rate,
+            turning=persona.turning,
+            turns_by_course=persona.turns_by_course,
+            turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
+            is_unknown=self.tasks.has_uid and not self.requests.is_identified,
+            drives_on=drives_on,
+        )

@@ -1,0 +1,223 @@
+"""What is sent to a vehicle to drive it, or to have it stand: what its tasks demand, tick by tick.
+
+It sees to it that the vehicle does so: what it finds is an event for the table of joint control.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
+from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
+from mav_tasks.services.offboard import Phase
+from mav_tasks.services.orders import Posture, Speeds
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.driving.guidance import ZERO
+from mav_tasks.tasks.goal import ends_at_home
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
+
+#: s in which a vehicle that was told to move and says that it stands may be stopping all the same
+UNSEEN_STOP = 3.0
+BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
+GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
+
+
+class Seen(NamedTuple):
+    """What was found that the table decides about."""
+
+    event: Event
+    reason: TaskReason
+    words: str
+
+
+class Pilot:
+    """Drives one vehicle as its tasks demand."""
+
+    def __init__(self, parts: Parts, view: Callable[[float], VehicleView]) -> None:
+        """``view`` gives one look at the vehicle at a time."""
+        self._parts = parts
+        self._view = view
+        #: when the next set-point is due
+        self.clock = SetpointClock(parts.system_id, period=parts.settings.watch.setpoint_period)
+        #: whether it moves as it was told to
+        self.guard = MotionGuard(parts.where.motion, parts.settings.watch)
+        self._is_closing = False
+        self._is_back_home = False  # by its last task; it is disarmed also where others wait
+
+    def __repr__(self) -> str:
+        return f"Pilot({self.clock!r}, {self.guard.ladder!r})"
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self.guard.apply(settings.watch)
+
+    def close(self) -> None:
+        """The server ends: from here on the tasks demand nothing but that it stands."""
+        self._is_closing = True
+
+    def follow(self, *, now: float) -> list[Seen]:
+        """Let the tasks say what they demand, and do it; gives what was found. ``send`` follows."""
+        parts = self._parts
+        tasks = parts.tasks
+        self._face(now=now)
+        seen = self._view(now)
+        begun_before = tasks.begun
+        demand = STOP if self._is_closing else tasks.step(seen, now=now)
+        self._is_back_home = self._is_back_home and tasks.begun is None
+        if begun_before is not None and tasks.begun is None:
+            ended = parts.book[begun_before.id]
+            parts.authority.revoke()
+            self._note_end(ended)
+            if ended.reason is TaskReason.STUCK:
+                parts.where.motion.doubt(until=now + UNSEEN_STOP)
+                seen = self._view(now)
+        self._obey(demand, seen, now=now)
+        found = []
+        for each in self.guard.look(self._told(demand, seen), now=now):
+            event = self._take_measure(each, demand, now=now)
+            if event is not None:
+                found.append(event)
+        return found
+
+    def send(self, *, now: float) -> None:
+        """Send what is to be sent in this tick, and plan the next."""
+        if self._parts.requests.flush(now=now):
+            self._parts.tasks.setpoint_left(now=now)
+        self.plan_tick(now=now)
+
+    def plan_tick(self, *, now: float) -> None:
+        """Tick as long as there is anything to drive, or to watch."""
+        is_engaged = self._parts.control.is_engaged
+        if is_engaged or self._parts.tasks.begun is not None or self.guard.ladder.is_on:
+            self.clock.plan(now=now)
+        else:
+            self.clock.stop()
+
+    def begin_stop(self, *, brakes: bool, now: float) -> None:
+        """Begin the stop ladder; zero and HOLD leave in this very step.
+
+        ``brakes``: by set-points first, on a vehicle that they stop sooner than HOLD does.
+        """
+        parts = self._parts
+        self._face(now=now)
+        brakes = brakes and parts.persona.brakes_by_setpoints and self.guard.is_fresh(now=now)
+        longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
+        parts.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
+        self.guard.ladder.begin(now=now)
+        parts.requests.end_performing()
+        self._send_at_once(now=now)
+
+    def let_go(self, *, now: float) -> None:
+        """Zero and HOLD at once, HOLD until it shows."""
+        self._parts.control.begin_release(now=now)
+        self._send_at_once(now=now)
+
+    def watch(self, *, now: float) -> None:
+        """See from here on that it stands."""
+        self.guard.ladder.begin(now=now)
+        self._send_at_once(now=now)
+
+    def brakes_against_stick(self, *, now: float) -> bool:
+        """Whether set-points stop it, of which a stick is held, before HOLD is asked for.
+
+        HOLD stops it in any case; but some roll on in it.
+        """
+        throttle = self._parts.sticks.throttle(now=now)
+        is_known = bool(throttle) and self.guard.is_fresh(now=now)
+        return self._parts.persona.brakes_by_setpoints and is_known
+
+    def _send_at_once(self, *, now: float) -> None:
+        self.clock.restart(now=now)
+        self._parts.requests.flush(now=now)
+
+    def is_late(self, *, now: float) -> bool:
+        """Whether what is driven went on without us for too long."""
+        begun = self._parts.tasks.begun
+        late = self.clock.lateness(now=now) > self._parts.settings.watch.late_tick
+        return late and begun is not None and begun.state is TaskState.EXECUTING
+
+    def _face(self, *, now: float) -> None:
+        """Tell its control what decides how it is asked to stand."""
+        parts = self._parts
+        motion = parts.where.motion.latest()
+        is_known = motion is not None and now - motion.at <= parts.settings.watch.position_lost
+        yaw = motion.pose.yaw if motion is not None and is_known else None
+        persona = parts.persona
+        rolls = persona.brakes_by_speed_loop and self.guard.brakes(
+            rolls_out=persona.rolls_out, now=now
+        )
+        stick = parts.sticks.throttle(now=now)
+        parts.control.posture = Posture(yaw, rolls=rolls, stick=stick)
+
+    def _obey(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
+        parts = self._parts
+        control = parts.control
+        match demand.kind:
+            case DemandKind.TAKE:
+                control.take(may_arm=seen.may_arm, now=now)
+            case DemandKind.DRIVE:
+                wanted = demand.velocity
+                if not wanted.is_zero:
+                    parts.where.motion.standstill.may_move()
+                control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
+            case DemandKind.HOLD:
+                still = seen.still and not parts.hold_before.is_open(now=now)
+                slows, disarm = self.guard.ladder.is_slowing(now=now), self._is_back_home
+                control.release(still=still, disarm=disarm, now=now, is_slowing=slows)
+            case DemandKind.HAND_BACK:
+                slows = self.guard.ladder.is_slowing(now=now)
+                control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)
+            case DemandKind.HALT if control.phase is not Phase.STOPPING:
+                self.begin_stop(brakes=True, now=now)
+            case DemandKind.STOP | DemandKind.HALT:
+                control.stop(still=seen.still, heard=seen.heard, now=now)
+
+    def _told(self, demand: Demand, seen: VehicleView) -> Told:
+        """What it is told, for who sees to it that it does so."""
+        parts, wanted = self._parts, ZERO
+        control, persona = parts.control, parts.persona
+        if demand.kind is DemandKind.DRIVE:
+            wanted = demand.velocity
+        return Told(
+            forward=wanted.forward,
+            moves=control.in_control and not wanted.is_zero,
+            is_ours=control.in_control or control.phase in (Phase.RELEASING, Phase.STOPPING),
+            is_stopping=control.phase is Phase.STOPPING,
+            rolls_out=persona.rolls_out,
+            may_drive=control.in_control and not parts.tasks.is_stopped,
+            goes_on=demand.kind in GOES_ON,
+            is_released=not control.is_engaged,
+            is_held=parts.monitor.custom_mode == persona.hold_mode,
+            armed=parts.monitor.armed,
+            still=seen.still,
+            heard=seen.heard,
+        )
+
+    def _take_measure(self, found: Found, demand: Demand, *, now: float) -> Seen | None:
+        """Climb the stop ladder; what concerns a task is for the table to decide."""
+        control, begun = self._parts.control, self._parts.tasks.begun
+        match found.measure:
+            case Measure.STOP_TASK if begun is not None and begun.state is TaskState.EXECUTING:
+                return Seen(Event.TOO_FAST, TaskReason.OVERSPEED, found.words)
+            case Measure.HOLD if demand.kind in GOES_ON:
+                words = "moves though it is told to stand: HOLD"
+                return Seen(Event.NOT_STANDING, TaskReason.STOP_UNCONFIRMED, words)
+            case Measure.HOLD_NOW | Measure.HOLD if control.in_control:
+                control.begin_release(now=now)
+            case Measure.HOLD_NOW:
+                control.hold_now(now=now)
+            case Measure.HOLD if control.phase is Phase.STOPPING:
+                control.hold_now(now=now)
+            case Measure.DISARM:
+                self._parts.note(found.words, now=now)
+                control.disarm_now(now=now)
+        return None
+
+    def _note_end(self, ended: Task) -> None:
+        """A return has ended: as on an autopilot that has landed, whoever armed it is done."""
+        self._is_back_home = ended.state is TaskState.COMPLETED and ends_at_home(ended.goal)
+        if self._is_back_home:
+            self._parts.control.disarm_at_end()

@@ -1,0 +1,180 @@
+"""What a vehicle shows of what others have done to it: a mode, arming, a stick, a restart.
+
+A heartbeat may show our own doing, a client's through us, a person's at the vehicle, or a
+failsafe's. Which it was is found here; what follows is the table's to say.
+"""
+
+from mav_tasks.engine.vehicles.authority import Before
+from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.hands import BUTTONS, Word
+from mav_tasks.engine.vehicles.joint_control import JointControl
+from mav_tasks.engine.vehicles.own_failsafes import News, OwnFailsafes
+from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.services.offboard import Phase
+from mav_tasks.tasks.events import VehicleSeen
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason
+
+R = TaskReason
+
+
+class Takeovers:
+    """Finds out who has done what to one vehicle."""
+
+    def __init__(self, parts: Parts, joint: JointControl) -> None:
+        self._parts = parts
+        self._joint = joint
+        self._shows_restart = False  # until the heartbeat comes that does, too
+        self._others_drive = False  # it moved in a mode in which nothing of ours drove it
+
+    def __repr__(self) -> str:
+        return f"Takeovers({self._joint!r})"
+
+    def come_back(self, *, was_driven: bool, now: float) -> None:
+        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
+
+        If somebody else had taken it over or disarmed it, we do not arm it before a person lets us
+        go on.
+        """
+        parts = self._parts
+        mode, persona = parts.monitor.custom_mode, parts.persona
+        if parts.tasks.paused in TAKEN or not parts.tasks.may_be_armed:
+            parts.withdraw_arming(now=now)
+        # it holds because set-points were lost, and would follow them again if one came
+        is_lost = persona.has_loss_failsafe and mode == persona.hold_mode
+        words = (
+            f"is in {persona.mode_name(mode)}, by its failsafe or by somebody, and is left to it:"
+            " HOLD stops it, then release its task"
+        )
+        if not was_driven:
+            event = Event.COME_BACK
+        elif is_lost or mode == persona.control_mode:
+            event = Event.COME_BACK_DRIVEN
+        else:
+            event = Event.COME_BACK_LED_AWAY
+        self._joint.on(event, Word(text=words), now=now)
+
+    def look(self, *, was_mode: int, was_armed: bool, before: Before, now: float) -> None:
+        """Look at a heartbeat: what it shows anew is somebody's doing; ``before`` it."""
+        parts = self._parts
+        armed, mode = parts.monitor.armed, parts.monitor.custom_mode
+        if mode != was_mode:
+            self._mode_changed(was_mode, mode, now=now)
+        if was_armed and not armed:
+            self._disarmed(before, now=now)
+        by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
+        by_client = parts.authority.armed_by_client(now=now)
+        if armed and by_hand and not by_client and parts.control.is_asking_mode:
+            self._taken(Event.TAKEN, "armed to be driven by hand", now=now)
+        self._shows_restart = False
+        self._note_rest(now=now)
+        self._note_others(now=now)
+
+    def heard_again(self, *, now: float) -> None:
+        """It was silent, and is not any more."""
+        self._joint.on(Event.HEARD_AGAIN, Word(), now=now)
+
+    def rebooted(self, *, booted_at: float, now: float) -> None:
+        """Its frame may be another one now, and nothing of ours is in force there.
+
+        A restart disarms: what was seen since ``booted_at`` was no person's doing.
+        """
+        parts = self._parts
+        self._shows_restart = True
+        parts.failsafes = OwnFailsafes()
+        parts.where.forget()
+        parts.requests.forget_answers()
+        parts.sticks.forget()
+        before = parts.authority.take_disarmed(since=booted_at)
+        was_engaged = parts.control.is_engaged
+
+        def restart() -> None:
+            was_paused = parts.tasks.paused if before is None else before.paused
+            begins_again = parts.tasks.restarted(was_paused=was_paused, now=now)
+            if before is not None:
+                parts.authority.restarted(was_allowed=before.may_arm)
+            elif was_engaged and not begins_again:
+                parts.authority.restarted(was_allowed=parts.authority.may_arm)
+            held, words = parts.tasks.held, "restarted"
+            if held is not None:
+                words += f": task {held.id} is on hold. Release it ({BUTTONS}), then continue"
+            parts.note(words, now=now)
+
+        self._joint.on(Event.REBOOTED, Word(R.FRAME_RESET, text="restarted", do=restart), now=now)
+
+    def learn(self, news: News, *, now: float) -> None:
+        """Tell where it is, and, if that was a takeover so far, what has taken it."""
+        parts = self._parts
+        if news.is_outside:
+            parts.note("is outside its own fence: tasks wait", now=now)
+        elif news.is_outside is not None:
+            words = "is inside its own fence again"
+            parts.book.record(VehicleSeen(parts.system_id, words, now))
+        if news.cause and parts.tasks.paused is R.TAKEOVER:
+            words = f"was taken by its failsafe: {news.cause}"
+            self._joint.on(Event.EXPLAINED, Word(R.FAILSAFE, parts.actor, words), now=now)
+
+    def _taken(
+        self, event: Event, what: str, *, reason: TaskReason = R.TAKEOVER, now: float
+    ) -> None:
+        self._joint.on(event, Word(reason, self._parts.actor, what), now=now)
+
+    def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
+        parts = self._parts
+        persona, control = parts.persona, parts.control
+        by_us = control.may_have_set(mode, now=now)
+        ours = parts.authority.mode_changed(mode, by_us=by_us, now=now)
+        if parts.tasks.is_stopped:
+            if mode != persona.hold_mode:
+                self._taken(Event.MODE_IN_STOP, "", now=now)
+        elif mode == persona.booting_mode:
+            self.rebooted(booted_at=now, now=now)
+        elif self._shows_restart:
+            pass  # a restart, which its clock has told of before, and nobody's doing
+        elif not ours and was_mode != persona.booting_mode:
+            what = f"mode is {persona.mode_name(mode)}"
+            cause = parts.failsafes.mode_changed(now=now)
+            lapses = control.is_streaming and mode == persona.hold_mode
+            event = Event.LAPSED if lapses else Event.MODE
+            if cause:
+                what = f"{what}, by its failsafe: {cause}"
+                self._taken(event, what, reason=R.FAILSAFE, now=now)
+            else:
+                self._taken(event, what, now=now)
+            self._look_for_parking(was_mode, mode, now=now)
+
+    def _look_for_parking(self, was_mode: int, mode: int, *, now: float) -> None:
+        """Somebody who was driving sets HOLD: what waits does not drive it off from there."""
+        parts = self._parts
+        others_drove, self._others_drive = self._others_drive, False
+        follows = (parts.persona.hold_mode, parts.persona.control_mode)
+        is_parked = mode == parts.persona.hold_mode and parts.monitor.armed
+        if is_parked and (others_drove or was_mode not in follows):
+            self._taken(Event.PARKED, "", now=now)
+
+    def _disarmed(self, before: Before, *, now: float) -> None:
+        parts = self._parts
+        if parts.control.phase is Phase.STOPPING or parts.control.may_have_disarmed(now=now):
+            return
+        if self._shows_restart:  # this heartbeat, or the clock before it, has told of that as well
+            was_allowed = before.may_arm or parts.authority.is_withdrawn_by_restart
+            parts.authority.restarted(was_allowed=was_allowed)
+            return
+        self._taken(Event.DISARMED, "disarmed", now=now)
+        parts.authority.note_disarmed(before)  # a restart may turn out to have done it
+
+    def _note_rest(self, *, now: float) -> None:
+        """What it measures at rest is learnt while nothing can be telling it to move."""
+        parts = self._parts
+        follows = (parts.persona.hold_mode, parts.persona.control_mode)
+        is_driven = parts.is_driven_by_others(now=now)
+        if parts.monitor.armed and (is_driven or parts.monitor.custom_mode not in follows):
+            parts.where.motion.standstill.may_move()
+        else:
+            parts.where.motion.standstill.told_to_stand(now=now)
+
+    def _note_others(self, *, now: float) -> None:
+        """Note that it moves, and that we do not move it: who then sets HOLD has parked it."""
+        parts = self._parts
+        is_held = parts.monitor.custom_mode == parts.persona.hold_mode
+        if parts.monitor.armed and not is_held and not parts.control.is_engaged:
+            self._others_drive |= not parts.where.motion.is_still(now=now)
