@@ -207,6 +207,12 @@ class Executor:
             self._finish(S.KILLED, reason, actor=actor, now=now)
         return killed
 
+    @property
+    def resumes_by_itself(self) -> bool:
+        """Whether it stands only as long as the vehicle, or its position, is not heard of."""
+        task = self.task
+        return task is not None and task.state is S.PAUSED and self._resumes_by_itself
+
     # what it wants of the vehicle
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
@@ -254,7 +260,7 @@ class Executor:
         task = self.task
         if task is None or has_moved(task):
             return False
-        is_lost = task.state is S.PAUSED and self._resumes_by_itself  # it was silent for a while
+        is_lost = self.resumes_by_itself  # it was silent for a while
         if is_lost:
             self._change(S.STARTING, R.NONE, actor=SERVER, now=now)
         elif task.state is not S.STARTING:

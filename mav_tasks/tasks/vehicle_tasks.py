@@ -505,6 +505,11 @@ class VehicleTasks:
         return blocker if blocker in OF_RESTART else R.NONE
 
     @property
+    def resumes_by_itself(self) -> bool:
+        """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
+        return self._executor.resumes_by_itself
+
+    @property
     def has_release(self) -> bool:
         """Whether a task was released that goes on as soon as it can."""
         return self._release is not None

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import pytest
 
+from tests.kit.joint.agreement import Agreement
 from tests.kit.world import World
 
 
@@ -15,9 +16,11 @@ class MakeWorld(Protocol):
 
 
 @pytest.fixture
-def make_world() -> Iterator[MakeWorld]:
+def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
     """Give a factory of worlds that are ready to be used."""
     worlds: list[World] = []
+    agreement = Agreement()
+    agreement.look_on(monkeypatch)
 
     def make(**kw: Any) -> World:
         world = World(**kw)
@@ -28,6 +31,9 @@ def make_world() -> Iterator[MakeWorld]:
     yield make
     for world in worlds:
         world.check()
+    if agreement.surprises:
+        told = "\n".join(agreement.surprises)
+        pytest.fail(f"the model of joint control does not know of this:\n{told}")
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ The drawing of it is made by ``tools/control_diagram.py``; ``tests/unit/engine/v
 test_control.py`` walks through every state that can be reached.
 """
 
-from enum import Enum, auto
+from enum import Enum, Flag, auto
 from typing import NamedTuple
 
 
@@ -48,8 +48,10 @@ class Work(Enum):
     NONE = auto()
     #: some wait, none has the vehicle
     WAITS = auto()
-    #: one starts, is driven, or is being cancelled
+    #: one starts, or is driven
     RUNS = auto()
+    #: one is being cancelled: it comes to stand
+    ENDS = auto()
     #: one stands as long as the vehicle, or its position, is not heard of
     LOST = auto()
     #: one is paused or held
@@ -68,6 +70,22 @@ class Driver(Enum):
     OTHERS = auto()
 
 
+class Waits(Flag):
+    """What was asked for, and moves the vehicle later by itself."""
+
+    #: a "go to", by which a HOLD just before is undone
+    GO_TO = auto()
+    #: the mission, with the arming
+    START = auto()
+    #: a held task that was released
+    RELEASE = auto()
+    #: a client that was granted the mode in which it drives
+    GRANT = auto()
+
+
+NOTHING = Waits(0)
+
+
 class State(NamedTuple):
     """Everything that decides what follows from an event."""
 
@@ -77,7 +95,8 @@ class State(NamedTuple):
     driver: Driver = Driver.NOBODY
     armed: bool = False
     may_arm: bool = True  # we may, of our own accord
-    waits: bool = False  # something was asked for that begins later by itself, or a client may move
+    waits: Waits = NOTHING
+    is_led: bool = False  # in a mode of somebody else's, in which no task begins
     is_urgent: bool = False  # a task is to run though the queue is paused
     is_idle: bool = True  # no task has begun, and none could begin now
     is_stopping: bool = False  # it is not known yet that it stands, as it was told to
@@ -209,7 +228,9 @@ def _row(event: Event, *effects: Step, **where: object) -> Row:
 
 _E, _F = Event, Effect
 ENGAGED = (Grip.TAKING, Grip.DRIVING, Grip.RELEASING)
-HAS_IT = (Work.RUNS, Work.LOST, Work.STANDS, Work.TAKEN)  # a task has the vehicle
+HAS_IT = (Work.RUNS, Work.ENDS, Work.LOST, Work.STANDS, Work.TAKEN)  # a task has the vehicle
+MOVES = (Work.RUNS, Work.ENDS)
+STANDS = (Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN)  # and goes on standing
 NO_TASK_HAS_IT = (Work.NONE, Work.WAITS)
 IS_LET_RUN = (Queue.RUNS, Queue.PAUSED)
 
@@ -281,7 +302,7 @@ TABLE = (
     _row(_E.CLOSE, _F.BRAKE),
     # what was seen, and lets it stand
     _row(_E.TAKEN, _F.COUNT, queue=Queue.STOPPED),
-    _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN, work=Work.RUNS),
+    _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN, work=MOVES),
     _row(
         _E.TAKEN,
         *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
@@ -301,9 +322,11 @@ TABLE = (
     _row(_E.PARKED, _F.PAUSE_TAKEN, work=(Work.WAITS, *HAS_IT), queue=IS_LET_RUN),
     _row(_E.PARKED),
     # zeros do not stop it, nor can anybody steer it by the stick
-    _row(_E.STICK, grip=(Grip.FREE, Grip.STOPPING, Grip.RELEASING)),
-    _row(_E.STICK, queue=Queue.STOPPED),
-    _row(_E.STICK, queue=Queue.TAKEN, is_stopping=True),
+    _row(_E.STICK, grip=Grip.FREE),
+    _row(_E.STICK, _F.FORGET_RELEASE, grip=(Grip.RELEASING, Grip.STOPPING), work=STANDS),
+    _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, grip=Grip.STOPPING),
+    # it is being stopped for that
+    _row(_E.STICK, _F.FORGET_RELEASE, queue=Queue.TAKEN, is_stopping=True, work=STANDS),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, _F.STEP, _F.WATCH, brakes=True),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, _F.LET_GO, _F.WATCH),
     _row(
@@ -319,8 +342,8 @@ TABLE = (
     _row(_E.SECOND, _F.NOTE_OTHERS, grip=Grip.FREE, work=NO_TASK_HAS_IT),
     _row(_E.SECOND, _F.NOTE_OTHERS, _E.TAKEN, grip=Grip.FREE),
     _row(_E.SECOND, _F.NOTE_OTHERS, _F.ZERO_AND_HOLD, _E.TAKEN),
-    _row(_E.REBOOTED, _F.FORGET_START, _F.TELL, queue=Queue.STOPPED),
-    _row(_E.REBOOTED, _F.FORGET_START, _F.LOSE, _F.FORGET_GO_TO, _F.DO),
+    _row(_E.REBOOTED, *TAKE_BACK, _F.TELL, queue=Queue.STOPPED),
+    _row(_E.REBOOTED, *TAKE_BACK, _F.LOSE, _F.DO),
     _row(_E.LATE, _F.LET_GO, _F.LEFT, _F.HOLD_TASK, has_failsafe=True),  # which a zero would end
     _row(_E.LATE, _F.ZERO, _F.LEFT, _F.HOLD_TASK),
     _row(_E.TOO_FAST, _F.TELL, _F.HOLD_TASK, _F.HOLD_AT_ONCE),  # a held stick defeats set-points

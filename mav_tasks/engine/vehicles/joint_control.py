@@ -11,11 +11,13 @@ from math import inf
 from typing import Any
 
 from mav_tasks.engine.vehicles.control import (
+    NOTHING,
     Driver,
     Event,
     Grip,
     Queue,
     State,
+    Waits,
     Work,
     effects_of,
 )
@@ -25,9 +27,9 @@ from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
 from mav_tasks.services.offboard import Phase
-from mav_tasks.tasks.lifecycle import LOSSES, RUNNING, TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import RUNNING, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.task import Draft, Task, TaskId
-from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.view import ModeKind, VehicleView
 
 R = TaskReason
 
@@ -98,12 +100,8 @@ class JointControl:
             driver=self._driver(now=now),
             armed=parts.monitor.armed,
             may_arm=authority.may_arm,
-            waits=(
-                authority.has_any_grant
-                or tasks.has_release
-                or parts.start_mark.is_put(now=now)
-                or parts.hold_before.is_open(now=now)
-            ),
+            waits=self._waits(now=now),
+            is_led=self._is_led,
             is_urgent=tasks.urgent is not None,
             is_idle=tasks.is_idle,
             is_stopping=self._pilot.guard.ladder.is_on,
@@ -114,17 +112,31 @@ class JointControl:
             brakes=self._pilot.brakes_against_stick(now=now),
         )
 
+    @property
+    def _is_led(self) -> bool:
+        parts = self._parts
+        kind = parts.authority.kind_of(parts.monitor.custom_mode, armed=parts.monitor.armed)
+        return kind in (ModeKind.MANUAL, ModeKind.OTHER)
+
+    def _waits(self, *, now: float) -> Waits:
+        parts = self._parts
+        waits = Waits.GO_TO if parts.hold_before.is_open(now=now) else NOTHING
+        if parts.start_mark.is_put(now=now):
+            waits |= Waits.START
+        if parts.tasks.has_release:
+            waits |= Waits.RELEASE
+        return waits | Waits.GRANT if parts.authority.has_any_grant else waits
+
     def _work(self) -> Work:
         tasks = self._parts.tasks
         begun = tasks.begun
         if begun is None:
             return Work.NONE if tasks.is_empty else Work.WAITS
         if begun.state in RUNNING:
-            return Work.RUNS
+            return Work.ENDS if begun.state is TaskState.CANCELLING else Work.RUNS
         if begun.reason in TAKEN:
             return Work.TAKEN
-        is_lost = begun.state is TaskState.PAUSED and begun.reason in LOSSES
-        return Work.LOST if is_lost else Work.STANDS
+        return Work.LOST if tasks.resumes_by_itself else Work.STANDS
 
     def _driver(self, *, now: float) -> Driver:
         if self._client(now=now) is not None:

@@ -1,0 +1,56 @@
+"""Whether the server does what the model of joint control says: looked at with each event.
+
+What the table leads to is walked through in the model (``graph``); that is worth as much as the
+model agrees with the server. So each event in each scenario is held against it.
+"""
+
+from functools import cache
+from typing import Any
+
+import pytest
+
+from mav_tasks.engine.vehicles.control import Event, State
+from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.joint_control import JointControl
+from tests.kit.joint.model import FREE, happens
+
+LEFT_OPEN = dict.fromkeys(FREE, False)
+
+
+class Agreement:
+    """Looks at every event of every vehicle, and keeps what the model does not know."""
+
+    def __init__(self) -> None:
+        self.surprises: list[str] = []
+        self._is_within = False
+
+    def look_on(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Look from here on."""
+        done = JointControl.on
+
+        def on(joint: JointControl, event: Event, word: Word, *, now: float) -> Any:
+            if self._is_within:
+                return done(joint, event, word, now=now)
+            self._is_within = True
+            try:
+                before = joint.state(now=now)
+                result = done(joint, event, word, now=now)
+                self._compare(event, before, joint.state(now=now))
+            finally:
+                self._is_within = False
+            return result
+
+        monkeypatch.setattr(JointControl, "on", on)
+
+    def _compare(self, event: Event, before: State, there: State) -> None:
+        if _open(there) not in _expected(event, before):
+            self.surprises.append(f"{event.name} in {before}: {there}")
+
+
+@cache
+def _expected(event: Event, before: State) -> frozenset[State]:
+    return frozenset(map(_open, happens(event, before)))
+
+
+def _open(state: State) -> State:
+    return state._replace(**LEFT_OPEN)

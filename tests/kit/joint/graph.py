@@ -1,0 +1,137 @@
+"""The graph of joint control: every state that the table leads to, from the first of each make."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from itertools import product
+
+from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event, Grip, Queue, State, Work
+from tests.kit.joint.model import FREE, MAKES, START, happens, others_do, passes
+
+#: of each event, what its rows ask for that the graph leaves open
+ASKED = {
+    event: tuple(
+        name for name in FREE if any(name in row.where for row in TABLE if row.event is event)
+    )
+    for event in Event
+}
+
+
+TIME, PEOPLE = "time", "people"  # what else leads from one state to another
+
+
+def always(_state: State) -> bool:
+    """Return True."""
+    return True
+
+
+def can_happen(event: Event, state: State) -> bool:
+    """Whether an event can come about in a state; words can, in any."""
+    has_task = state.work not in (Work.NONE, Work.WAITS)
+    match event:
+        case Event.CANCEL:
+            return has_task
+        case Event.SKIP | Event.RELEASE | Event.RESTORE:
+            return state.work in (Work.STANDS, Work.WAITS)
+        case Event.LATE | Event.TOO_FAST | Event.NOT_STANDING:
+            return state.work is Work.RUNS
+        case Event.MODE_IN_STOP:
+            return state.queue is Queue.STOPPED
+        case Event.PARKED:  # the change of the mode has been seen to before
+            rests = state.work in STANDS and not state.waits and not state.is_urgent
+            return state.queue is not Queue.STOPPED and rests
+        case Event.MODE | Event.EXPLAINED | Event.GO_TO_FOLLOWS:
+            return state.queue is not Queue.STOPPED
+        case Event.LAPSED:
+            return state.queue is not Queue.STOPPED and state.grip in (Grip.TAKING, Grip.DRIVING)
+        case Event.DISARMED:  # it has come, the heartbeat shows it
+            return state.armed and state.grip is not Grip.STOPPING
+        case Event.RUN_NOW:
+            return state.queue is not Queue.STOPPED
+        case Event.COME_BACK | Event.COME_BACK_DRIVEN | Event.COME_BACK_LED_AWAY:
+            return state.grip is Grip.FREE and not has_task
+        case Event.CLOSE:
+            return False  # nothing is after it
+        case _:
+            return True
+
+
+def variants(event: Event, state: State) -> Iterator[State]:
+    """Give a state with all that an event's rows ask for beside it."""
+    names = ASKED[event]
+    for values in product((False, True), repeat=len(names)):
+        yield state._replace(**dict(zip(names, values, strict=True)))
+
+
+def after(event: Event, state: State) -> set[State]:
+    """Return the states to which an event can lead."""
+    found: set[State] = set()
+    for each in variants(event, state):
+        for there in happens(event, each):
+            found.update(plain(there))
+    return found
+
+
+def plain(state: State) -> Iterator[State]:
+    """Give a state without what the graph leaves open, and with one thing at a time that waits.
+
+    Of several each is taken off, and comes true, whatever becomes of the others.
+    """
+    state = state._replace(is_idle=True, is_stopping=False, is_late=False, brakes=False)
+    if len(state.waits) < 2:
+        yield state
+    else:
+        for each in state.waits:
+            yield state._replace(waits=each)
+
+
+class Graph:
+    """Every state of one make of vehicle, and what leads from each to others."""
+
+    def __init__(self, make: str) -> None:
+        first = START._replace(**MAKES[make])
+        #: each state, and what leads there from the first
+        self.paths: dict[State, tuple[str, ...]] = {first: ()}
+        #: what can happen in a state, and the states to which that leads
+        self.leads: dict[State, dict[str, set[State]]] = {}
+        waiting = deque([first])
+        while waiting:
+            state = waiting.popleft()
+            self.leads[state] = dict(_leads(state))
+            for name, states in self.leads[state].items():
+                for there in states:
+                    if there not in self.paths:
+                        self.paths[there] = (*self.paths[state], name)
+                        waiting.append(there)
+
+    def __repr__(self) -> str:
+        return f"Graph({len(self.paths)} states)"
+
+    def leading_to(
+        self, wanted: Callable[[State], bool], *names: str, within: Callable[[State], bool] = always
+    ) -> set[State]:
+        """Return the states from which ways of these names lead to a wanted one at last.
+
+        ``within``: on the way it is so.
+        """
+        into: dict[State, list[State]] = {}
+        for state, ways in self.leads.items():
+            if within(state):
+                for name in names:
+                    for there in ways.get(name, ()):
+                        into.setdefault(there, []).append(state)
+        found = {state for state in self.paths if wanted(state)}
+        waiting = list(found)
+        while waiting:
+            for state in into.get(waiting.pop(), ()):
+                if state not in found:
+                    found.add(state)
+                    waiting.append(state)
+        return found
+
+
+def _leads(state: State) -> Iterator[tuple[str, set[State]]]:
+    for event in Event:
+        if can_happen(event, state):
+            yield event.name, after(event, state)
+    yield TIME, {each for there in passes(state) for each in plain(there)}
+    yield PEOPLE, {each for there in others_do(state) for each in plain(there)}

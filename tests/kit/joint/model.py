@@ -1,0 +1,383 @@
+"""What each effect of the table comes to, and what time alone does: joint control as a graph.
+
+It knows nothing of vehicles, only of states. ``tests/kit/joint/agreement.py`` holds it against what
+the server really does, in each scenario.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+from mav_tasks.engine.vehicles.control import (
+    NOTHING,
+    Driver,
+    Effect,
+    Event,
+    Grip,
+    Queue,
+    State,
+    Step,
+    Waits,
+    Work,
+    effects_of,
+)
+
+E, F = Event, Effect
+#: by its make: what a PX4 is, and what an ArduPilot is
+MAKES: dict[str, dict[str, bool]] = {
+    "PX4": {"lingers": True, "has_failsafe": True, "heeds_stick": False},
+    "ArduPilot": {"lingers": False, "has_failsafe": False, "heeds_stick": True},
+}
+#: what rows ask for, and the graph leaves open
+FREE = ("is_idle", "is_stopping", "is_late", "brakes")
+NO_TASK = (Work.NONE, Work.WAITS)
+
+#: words and events after which nothing moves or arms until a newer word lets it go
+HALTS = (
+    *(E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.CLEAR, E.CLOSE),
+    *(E.TAKEN, E.MODE, E.LAPSED, E.DISARMED, E.STICK, E.DRIVEN_BY_HAND),
+    *(E.LATE, E.TOO_FAST, E.NOT_STANDING),
+)
+#: words that let it go; OPERATOR_LOST and the like let nothing go
+GOES = (
+    *(E.CONTINUE, E.GO_TO_FOLLOWS, E.RELEASE, E.RESTORE, E.RUN_NOW),
+    *(E.ASK_OUR_MODE, E.ASK_OUR_MODE_STREAMING, E.ARM),
+)
+
+
+class Deed(NamedTuple):
+    """What leads from one state to another."""
+
+    name: str
+    states: frozenset[State]
+
+
+def happens(event: Event, state: State) -> frozenset[State]:
+    """Return the states to which an event can lead, by the table and by what the event shows."""
+    states = {state}
+    if event in (E.MODE, E.MODE_IN_STOP):  # HOLD, or another one
+        states = {state._replace(is_led=False), state._replace(is_led=True)}
+    elif event in (E.LAPSED, E.PARKED):
+        states = {state._replace(is_led=False)}
+    elif event is E.DISARMED:
+        states = {state._replace(armed=False)}
+    found: set[State] = set()
+    for each in states:
+        found |= _follow(event, effects_of(event, each), each)
+    return frozenset(found)
+
+
+def _follow(event: Event, steps: Iterable[Step], state: State) -> set[State]:
+    states = {state}
+    for step in steps:
+        following: set[State] = set()
+        for each in states:
+            if isinstance(step, Event):
+                following |= _follow(step, effects_of(step, each), each)
+            elif step is F.DO:
+                following |= set(DO[event](each))
+            else:
+                following |= set(RESULTS.get(step, _same)(each))
+        states = _emptied(following) if event is E.CLEAR else following
+    return states
+
+
+def _emptied(states: set[State]) -> set[State]:
+    """Nothing waits after CLEAR, and nothing begins."""
+    return {
+        state._replace(work=Work.NONE) if state.work is Work.WAITS else state
+        for state in states
+        if state.work is not Work.RUNS
+    }
+
+
+def _same(state: State) -> Iterator[State]:
+    yield state
+
+
+def _without(waits: Waits) -> Callable[[State], Iterator[State]]:
+    return lambda state: iter((state._replace(waits=state.waits & ~waits),))
+
+
+def _brake(state: State) -> Iterator[State]:
+    yield state._replace(grip=Grip.STOPPING)
+
+
+def _let_go(state: State) -> Iterator[State]:
+    yield state._replace(grip=Grip.RELEASING)
+
+
+def _revoke(state: State) -> Iterator[State]:
+    driver = Driver.NOBODY if state.driver is Driver.CLIENT else state.driver
+    yield state._replace(waits=state.waits & ~Waits.GRANT, driver=driver)
+    if driver is not state.driver:  # somebody else was, too
+        yield state._replace(waits=state.waits & ~Waits.GRANT, driver=Driver.OTHERS)
+
+
+def _count(state: State) -> Iterator[State]:
+    """What was released or to run at once, and has not begun, is held, or waits, as before."""
+    is_urgent = state.is_urgent and state.work not in NO_TASK
+    counted = state._replace(waits=state.waits & ~Waits.RELEASE, is_urgent=is_urgent)
+    yield counted
+    if is_urgent:
+        yield counted._replace(is_urgent=False)
+
+
+def _pause(state: State) -> Iterator[State]:
+    queue = Queue.PAUSED if state.queue is Queue.RUNS else state.queue
+    for each in _count(state._replace(queue=queue)):
+        stands = each.work in (Work.RUNS, Work.LOST)  # one that is being cancelled ends
+        yield each._replace(work=Work.STANDS) if stands else each
+
+
+def _pause_taken(state: State) -> Iterator[State]:
+    queue = state.queue if state.queue is Queue.STOPPED else Queue.TAKEN
+    for each in _count(state._replace(queue=queue)):
+        if each.work in NO_TASK:
+            yield each
+            continue
+        if each.work is Work.ENDS:  # nobody waits for it to stand
+            yield from _over(each)
+        elif each.work is Work.RUNS:
+            yield each._replace(work=Work.TAKEN)
+        else:
+            yield each._replace(work=Work.STANDS) if each.work is Work.LOST else each
+
+
+def _latch(state: State) -> Iterator[State]:
+    stopped = state._replace(
+        queue=Queue.STOPPED, waits=state.waits & ~Waits.RELEASE, is_urgent=False
+    )
+    yield stopped._replace(work=Work.NONE)
+    if state.work is not Work.NONE:
+        yield stopped._replace(work=Work.WAITS)
+
+
+def _hold_task(state: State) -> Iterator[State]:
+    for each in _count(state):
+        stands = each.work in (Work.RUNS, Work.LOST, Work.TAKEN)
+        yield each._replace(work=Work.STANDS) if stands else each
+
+
+def _restore(state: State) -> Iterator[State]:
+    yield state._replace(may_arm=True)
+
+
+def _hand_over(state: State) -> Iterator[State]:
+    yield state._replace(grip=Grip.FREE) if state.grip is Grip.RELEASING else state
+
+
+def _keep_armed(state: State) -> Iterator[State]:
+    yield state
+    yield from _hand_over(state)
+
+
+def _note_others(state: State) -> Iterator[State]:
+    yield state if state.driver is Driver.CLIENT else state._replace(driver=Driver.OTHERS)
+
+
+def _over(state: State) -> Iterator[State]:
+    """The task that has the vehicle ends; others may wait."""
+    ended = state._replace(is_urgent=False)
+    yield ended._replace(work=Work.NONE)
+    yield ended._replace(work=Work.WAITS)
+
+
+def _stepped(state: State) -> Iterator[State]:
+    """A step of the tasks, in which nothing needs to change, and two things may."""
+    yield state
+    for each in passes(state):
+        yield each
+        yield from passes(each)
+
+
+def passes(state: State) -> Iterator[State]:
+    """Give what may come of time alone: no word, nobody at the vehicle, nothing that fails us."""
+    work, grip = state.work, state.grip
+    can_take = state.armed or state.may_arm
+    if state.queue is Queue.STOPPED:
+        if grip is not Grip.FREE:
+            yield state._replace(grip=Grip.FREE)
+            yield state._replace(grip=Grip.STOPPING)
+        return
+    begins = state.queue is Queue.RUNS or state.is_urgent
+    if work is Work.WAITS and begins and can_take and is_free(state):
+        yield state._replace(work=Work.RUNS)
+        yield state._replace(work=Work.STANDS)  # its frame is lost, or it was led off its line
+    if Waits.RELEASE in state.waits:
+        released = state._replace(waits=state.waits & ~Waits.RELEASE)
+        yield released
+        if begins and can_take and is_free(state):
+            yield released._replace(work=Work.RUNS)
+    if work is Work.ENDS:
+        yield from _over(state)
+    if work is Work.RUNS:
+        if grip is not Grip.DRIVING and can_take:
+            yield state._replace(grip=Grip.TAKING)
+        if grip is Grip.TAKING and can_take:
+            yield state._replace(grip=Grip.DRIVING, armed=True)
+        yield from _over(state)
+        yield state._replace(work=Work.STANDS)
+        yield state._replace(work=Work.LOST)
+    elif grip in (Grip.TAKING, Grip.DRIVING, Grip.STOPPING):
+        yield state._replace(grip=Grip.RELEASING)
+    if grip is Grip.RELEASING:
+        yield state._replace(grip=Grip.FREE)
+        yield state._replace(grip=Grip.FREE, armed=False)
+    if work is Work.LOST:
+        yield state._replace(work=Work.STANDS)
+        yield from _over(state)
+        if state.queue is Queue.RUNS and is_free(state):
+            yield state._replace(work=Work.RUNS)
+    if state.waits & (Waits.GO_TO | Waits.START):
+        yield state._replace(waits=state.waits & ~(Waits.GO_TO | Waits.START))
+    if state.driver is not Driver.NOBODY:
+        yield state._replace(driver=Driver.NOBODY)
+    if client_moves(state):
+        yield state._replace(driver=Driver.CLIENT)
+
+
+def client_moves(state: State) -> bool:
+    """Whether a client's set-points pass: a stream that goes on is nothing new."""
+    is_free = state.grip is Grip.FREE and state.work in NO_TASK
+    runs = state.queue is not Queue.STOPPED
+    return Waits.GRANT in state.waits and state.armed and is_free and runs
+
+
+def others_do(state: State) -> Iterator[State]:
+    """Give what people do that no event tells of: a task is submitted, the vehicle armed."""
+    if state.work is Work.NONE:
+        yield state._replace(work=Work.WAITS)
+    if state.is_led:  # HOLD is set by somebody, who did not drive
+        yield state._replace(is_led=False)
+    if not state.armed:
+        yield state._replace(armed=True)
+        if Waits.START in state.waits:
+            started = state._replace(armed=True, waits=state.waits & ~Waits.START)
+            yield started._replace(work=Work.WAITS if state.work is Work.NONE else state.work)
+    else:  # by us, or by a client; by others an event tells
+        yield state._replace(armed=False)
+    if not state.armed and state.lingers and not state.waits & Waits.START:
+        yield state._replace(waits=state.waits | Waits.START)
+
+
+def _goes_on(state: State) -> Iterator[State]:
+    going = state._replace(queue=Queue.RUNS)
+    if state.work not in (Work.STANDS, Work.TAKEN):
+        yield going
+        return
+    yield going._replace(work=Work.STANDS)  # one that is held, or its frame is lost
+    if is_free(state):
+        yield going._replace(work=Work.RUNS)
+
+
+def is_free(state: State) -> bool:
+    """Whether a task can take the vehicle."""
+    return state.driver is Driver.NOBODY and not state.is_led
+
+
+def _released(state: State) -> Iterator[State]:
+    if state.driver is Driver.NOBODY:  # one that boots may be in any mode
+        yield state._replace(work=Work.RUNS)
+    yield state._replace(work=Work.STANDS, waits=state.waits | Waits.RELEASE)
+
+
+def _run_now(state: State) -> Iterator[State]:
+    if not is_free(state):
+        yield state  # refused
+        return
+    urgent = state._replace(is_urgent=True)
+    paused = urgent if urgent.queue is not Queue.RUNS else urgent._replace(queue=Queue.PAUSED)
+    for work in (Work.WAITS, Work.RUNS, *([Work.ENDS] if state.work is Work.RUNS else [])):
+        yield urgent._replace(work=work)
+        yield paused._replace(work=work)
+    yield paused
+
+
+def _called_off(state: State) -> Iterator[State]:
+    for each in _count(state):
+        if each.work in NO_TASK:
+            yield each
+        else:
+            yield from _over(each)
+            yield from _over(each._replace(grip=Grip.STOPPING))  # killed
+            yield each._replace(work=Work.ENDS)
+
+
+def _unqueued(state: State) -> Iterator[State]:
+    yield state
+    if state.work is Work.WAITS:
+        yield state._replace(work=Work.NONE)
+
+
+def _cleared(state: State) -> Iterator[State]:
+    for each in _called_off(state):
+        yield each._replace(work=Work.NONE) if each.work is Work.WAITS else each
+
+
+def _skipped(state: State) -> Iterator[State]:
+    yield state
+    if state.work not in NO_TASK:
+        yield from _over(state)
+
+
+def _restarted(state: State) -> Iterator[State]:
+    begun = () if state.work in NO_TASK else (Work.STANDS, Work.RUNS)
+    for may_arm in {False, state.may_arm}:
+        for work in {state.work, *begun}:  # it begins again if nothing of it was driven
+            each = state._replace(
+                may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE, is_urgent=False
+            )
+            yield each
+            if work not in NO_TASK and each.queue in (Queue.RUNS, Queue.TAKEN):
+                yield each._replace(queue=Queue.PAUSED)
+            if work not in NO_TASK:
+                yield from _over(each)
+
+
+def _granted(state: State) -> Iterator[State]:
+    granted = state._replace(waits=state.waits | Waits.GRANT)
+    yield granted
+    yield granted._replace(is_led=False)  # it is in that mode already
+
+
+RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {
+    F.BRAKE: _brake,
+    F.HOLD_AT_ONCE: _brake,
+    F.LET_GO: _let_go,
+    F.STEP: _stepped,
+    F.WAKE: _stepped,
+    F.LOSE: lambda state: iter((state._replace(grip=Grip.FREE),)),
+    F.FORGET_GO_TO: _without(Waits.GO_TO),
+    F.FORGET_START: _without(Waits.START),
+    F.FORGET_RELEASE: _without(Waits.RELEASE),
+    F.REVOKE: _revoke,
+    F.COUNT: _count,
+    F.PAUSE: _pause,
+    F.PAUSE_TAKEN: _pause_taken,
+    F.LATCH: _latch,
+    F.HOLD_TASK: _hold_task,
+    F.WITHDRAW_ARMING: lambda state: iter((state._replace(may_arm=False),)),
+    F.RESTORE_ARMING: _restore,
+    F.LINGER: lambda state: iter((state._replace(waits=state.waits | Waits.GO_TO),)),
+    F.HAND_OVER: _hand_over,
+    F.KEEP_ARMED: _keep_armed,
+    F.NOTE_OTHERS: _note_others,
+}
+DO: dict[Event, Callable[[State], Iterator[State]]] = {
+    E.CANCEL: _called_off,
+    E.CLEAR: _cleared,
+    E.SKIP: _skipped,
+    E.UNQUEUE: _unqueued,
+    E.CLEAR_WAITING: _unqueued,
+    E.CONTINUE: _goes_on,
+    E.GO_TO_FOLLOWS: _goes_on,
+    E.RELEASE: _released,
+    E.RESTORE: _released,
+    E.RUN_NOW: _run_now,
+    E.ASK_OUR_MODE: _granted,
+    E.ASK_OUR_MODE_STREAMING: _granted,
+    E.ASK_OTHER_MODE: _same,
+    E.ARM: _same,
+    E.REBOOTED: _restarted,
+}
+START = State(waits=NOTHING)
