@@ -152,7 +152,7 @@ class Plans:
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
         self._check_queue(vehicle)
-        vehicle.joint.check_not_by_hand(now=now)
+        vehicle.parts.check_not_by_hand(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
         begun, task = vehicle.tasks.begun, self.task(vehicle)
         is_fresh = task is not None and waits_for_start(task)

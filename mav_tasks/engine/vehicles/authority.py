@@ -31,6 +31,8 @@ class Authority:
         self._arming_allowed = may_arm  # by setting
         self._asked_mode = -1  # by a client, through us
         self._asked_at = -inf
+        #: a mode that a client has asked for, and is not shown yet; None: whichever one drives
+        self._passed_on: tuple[int | None, float] = (-1, -inf)
         self._mode_is_ours = False
         self._granted: set[Hashable] = set()
         self._other_at = -inf  # sticks, or a second controller
@@ -90,6 +92,7 @@ class Authority:
         Whoever has asked last may drive: of two at once the vehicle would obey neither.
         """
         self._asked_mode, self._asked_at = mode, now
+        self._passed_on = mode, now
         if mode == self._persona.control_mode:
             self._granted = {client}
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
@@ -111,6 +114,22 @@ class Authority:
         self._asked_mode = -1
         self._mode_is_ours = by_us or by_client
         return self._mode_is_ours
+
+    def note_passed_on(self, *, now: float) -> None:
+        """A client's command goes to the vehicle that may make it drive, in a mode of its own."""
+        self._passed_on = None, now
+
+    def was_asked_before(self, mode: int, *, halt: float) -> bool:
+        """Whether a mode that is shown now was asked for by a client before the halt at this time.
+
+        It is told once: who sets it again means it.
+        """
+        passed_on, at = self._passed_on
+        is_any = passed_on is None and mode not in self._persona.manual_modes
+        if mode != passed_on and not is_any:
+            return False
+        self._passed_on = (-1, -inf)
+        return at < halt
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
         """Return what the present mode means for taking control.

@@ -124,6 +124,7 @@ class Event(Enum):
     TAKEN = auto()  # somebody else has it, in whatever way
     MODE = auto()  # it shows a mode that we have not asked for
     LAPSED = auto()  # it shows HOLD while set-points stream: its failsafe's, or somebody's
+    LATE_MODE = auto()  # it shows a mode that a client has asked for before a halt
     EXPLAINED = auto()  # it was its failsafe that has taken it
     MODE_IN_STOP = auto()  # the same, while STOP is latched
     DISARMED = auto()  # it shows that it is, and not by us
@@ -138,7 +139,7 @@ class Event(Enum):
     HEARD_AGAIN = auto()
     # words that let it go
     CONTINUE = auto()
-    GO_TO_FOLLOWS = auto()  # a "go to" shows that a HOLD just before was none
+    GO_ON = auto()  # a "go to" shows that a HOLD just before was none, or a mission is started
     RELEASE = auto()  # of a held task
     RESTORE = auto()  # of a held task, by who may also say that all is well
     RUN_NOW = auto()
@@ -160,7 +161,7 @@ class Event(Enum):
 
 
 class Effect(Enum):
-    """What is done; ``hands`` has a method of the same name for each."""
+    """What is done; ``hands`` has a function of the same name for each."""
 
     # how it stands
     BRAKE = auto()  # the stop ladder: set-points as long as they brake, HOLD, disarming
@@ -314,6 +315,8 @@ TABLE = (
     # a failsafe's HOLD ends with the next set-point that is under way
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
+    _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
+    _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
     _row(_E.EXPLAINED, _F.TELL, _F.PAUSE_TAKEN),
     # a request from before the STOP was late; later, it is a person at the vehicle
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING, _F.BRAKE, is_late=True, grip=Grip.FREE),
@@ -352,7 +355,9 @@ TABLE = (
     _row(_E.HEARD_AGAIN),
     # words that let it go
     _row(_E.CONTINUE, _F.FORGET_GO_TO, _F.DO, _F.RESTORE_ARMING, _F.TELL_HELD, _F.WAKE),
-    _row(_E.GO_TO_FOLLOWS, _F.DO, _F.WAKE),  # nobody has said that it may be armed again
+    # what a pause ends, and nobody has said that it may be armed again
+    _row(_E.GO_ON, _F.DO, _F.WAKE, queue=Queue.PAUSED),
+    _row(_E.GO_ON),
     _row(_E.RELEASE, _F.DO, _F.WAKE),
     _row(_E.RESTORE, _F.DO, _F.RESTORE_ARMING, _F.WAKE),
     _row(_E.RUN_NOW, _F.FORGET_GO_TO, _F.DO, _F.STEP),

@@ -1,11 +1,11 @@
 """What the table of joint control orders, carried out on one vehicle: each effect by its name.
 
-Nothing is decided here: a method for each ``Effect`` does the one thing that it is called after.
+Nothing is decided here: a function for each ``Effect`` does the one thing that it is called after.
 """
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from mav_tasks.engine.vehicles.control import Effect
 from mav_tasks.engine.vehicles.parts import Parts
@@ -29,178 +29,245 @@ class Word:
     clear: bool = False  # of a STOP
 
 
-class Hands:
-    """Carries out effects on one vehicle."""
+class Reach(NamedTuple):
+    """What effects work on."""
 
-    def __init__(self, parts: Parts, pilot: Pilot, step: Callable[[float], None]) -> None:
-        """``step`` has the tasks say at a time what they demand, and does it."""
-        self._parts = parts
-        self._pilot = pilot
-        self._step = step
-        self._methods = {effect: getattr(self, effect.name.lower()) for effect in Effect}
+    parts: Parts
+    pilot: Pilot
+    step: Callable[[float], None]  # has the tasks say at a time what they demand, and does it
 
-    def __repr__(self) -> str:
-        return f"Hands({self._pilot!r})"
 
-    def carry_out(self, effect: Effect, word: Word, *, now: float) -> Any:
-        """Carry out one effect; gives what it comes to, if anything. Rejection: DO was refused."""
-        return self._methods[effect](word, now)
+Method = Callable[[Reach, Word, float], Any]
+_METHODS: dict[Effect, Method] = {}
 
-    # how it stands
 
-    def brake(self, _word: Word, now: float) -> None:
-        """Begin the stop ladder."""
-        self._pilot.begin_stop(brakes=True, now=now)
+def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
+    """Carry out one effect; gives what it comes to, if anything. Rejection: DO was refused."""
+    return _METHODS[effect](on, word, now)
 
-    def hold_at_once(self, _word: Word, now: float) -> None:
-        """Begin the stop ladder without set-points."""
-        self._pilot.begin_stop(brakes=False, now=now)
 
-    def let_go(self, _word: Word, now: float) -> None:
-        """Zero and HOLD at once, HOLD until it shows."""
-        self._pilot.let_go(now=now)
+def _does(effect: Effect) -> Callable[[Method], Method]:
+    def note(method: Method) -> Method:
+        _METHODS[effect] = method
+        return method
 
-    def step(self, _word: Word, now: float) -> None:
-        """Do what the tasks demand in this very step."""
-        self._step(now)
+    return note
 
-    def watch(self, _word: Word, now: float) -> None:
-        """See that it stands from here on."""
-        self._pilot.watch(now=now)
 
-    def zero(self, _word: Word, _now: float) -> None:
-        """Send one zero."""
-        self._parts.requests.send_zero()
+@_does(Effect.BRAKE)
+def _brake(on: Reach, _word: Word, now: float) -> None:
+    """Begin the stop ladder."""
+    on.pilot.begin_stop(brakes=True, now=now)
 
-    def zero_kept(self, _word: Word, _now: float) -> None:
-        """Leave no velocity behind: a vehicle keeps the last one and drives off when armed."""
-        if self._parts.control.is_streaming:
-            self._parts.requests.send_zero()
 
-    def zero_and_hold(self, _word: Word, _now: float) -> None:
-        """Send both once; a failsafe's HOLD would be ended by a zero before it."""
-        requests = self._parts.requests
-        if self._parts.persona.has_loss_failsafe:
-            requests.send_hold()
-            requests.send_zero()
-        else:
-            requests.send_zero()
-            requests.send_hold()
+@_does(Effect.HOLD_AT_ONCE)
+def _hold_at_once(on: Reach, _word: Word, now: float) -> None:
+    """Begin the stop ladder without set-points."""
+    on.pilot.begin_stop(brakes=False, now=now)
 
-    def stay(self, _word: Word, now: float) -> None:
-        """Ask for HOLD, which is shown already."""
-        self._parts.control.ask_to_stay(now=now)
-        self._parts.requests.flush(now=now)
 
-    def lose(self, _word: Word, _now: float) -> None:
-        """Send not one thing more."""
-        self._parts.control.lose()
-        self._parts.requests.end_performing()
+@_does(Effect.LET_GO)
+def _let_go(on: Reach, _word: Word, now: float) -> None:
+    """Zero and HOLD at once, HOLD until it shows."""
+    on.pilot.let_go(now=now)
 
-    # what was asked for before
 
-    def forget_go_to(self, _word: Word, _now: float) -> None:
-        """A "go to" undoes no HOLD any more."""
-        self._parts.hold_before.forget()
+@_does(Effect.STEP)
+def _step(on: Reach, _word: Word, now: float) -> None:
+    """Do what the tasks demand in this very step."""
+    on.step(now)
 
-    def forget_start(self, _word: Word, _now: float) -> None:
-        """No mission begins with the arming."""
-        self._parts.forget_start()
 
-    def forget_release(self, _word: Word, _now: float) -> None:
-        """What was released and has not begun is held as before."""
-        self._parts.tasks.forget_release()
+@_does(Effect.WATCH)
+def _watch(on: Reach, _word: Word, now: float) -> None:
+    """See that it stands from here on."""
+    on.pilot.watch(now=now)
 
-    def revoke(self, _word: Word, _now: float) -> None:
-        """A client that wants to drive has to ask again."""
-        self._parts.authority.revoke()
 
-    def drop_waiting(self, _word: Word, _now: float) -> None:
-        """Send nothing of clients that waits for an answer to another, and might move it."""
-        self._parts.requests.drop_what_waits()
+@_does(Effect.ZERO)
+def _zero(on: Reach, _word: Word, _now: float) -> None:
+    """Send one zero."""
+    on.parts.requests.send_zero()
 
-    # the tasks
 
-    def count(self, word: Word, now: float) -> None:
-        """Count a halt."""
-        self._parts.tasks.halt(word.reason, actor=word.actor, now=now)
+@_does(Effect.ZERO_KEPT)
+def _zero_kept(on: Reach, _word: Word, _now: float) -> None:
+    """Leave no velocity behind: a vehicle keeps the last one and drives off when armed."""
+    if on.parts.control.is_streaming:
+        on.parts.requests.send_zero()
 
-    def pause(self, word: Word, now: float) -> Any:
-        """Let task and queue stand; gives the task's id."""
-        return self._parts.tasks.pause(TaskReason.OPERATOR, actor=word.actor, now=now)
 
-    def pause_taken(self, word: Word, now: float) -> Any:
-        """Let task and queue stand, because somebody else has the vehicle."""
-        reason = word.reason if word.reason in TAKEN else TaskReason.TAKEOVER
-        return self._parts.tasks.pause(reason, actor=self._parts.actor, now=now)
+@_does(Effect.ZERO_AND_HOLD)
+def _zero_and_hold(on: Reach, _word: Word, _now: float) -> None:
+    """Send both once; a failsafe's HOLD would be ended by a zero before it."""
+    requests = on.parts.requests
+    if on.parts.persona.has_loss_failsafe:
+        requests.send_hold()
+        requests.send_zero()
+    else:
+        requests.send_zero()
+        requests.send_hold()
 
-    def latch(self, word: Word, now: float) -> Any:
-        """Kill what has the vehicle, and let nothing begin before a continue; gives its id."""
-        return self._parts.tasks.stop(clear=word.clear, actor=word.actor, now=now)
 
-    def hold_task(self, word: Word, now: float) -> None:
-        """Set the task that has the vehicle aside until somebody decides."""
-        self._parts.tasks.hold(word.reason, now=now)
+@_does(Effect.STAY)
+def _stay(on: Reach, _word: Word, now: float) -> None:
+    """Ask for HOLD, which is shown already."""
+    on.parts.control.ask_to_stay(now=now)
+    on.parts.requests.flush(now=now)
 
-    def do(self, word: Word, _now: float) -> Any:
-        """Carry out what the word asks for."""
-        return word.do()
 
-    def wake(self, _word: Word, now: float) -> None:
-        """Look at the tasks unless that is about to be done."""
-        if not self._pilot.clock.is_running:
-            self._step(now)
+@_does(Effect.LOSE)
+def _lose(on: Reach, _word: Word, _now: float) -> None:
+    """Send not one thing more."""
+    on.parts.control.lose()
+    on.parts.requests.end_performing()
 
-    # permissions, and what is told
 
-    def withdraw_arming(self, _word: Word, now: float) -> None:
-        """Arm it no more, also after a restart of ours."""
-        self._parts.withdraw_arming(now=now)
+@_does(Effect.FORGET_GO_TO)
+def _forget_go_to(on: Reach, _word: Word, _now: float) -> None:
+    """A "go to" undoes no HOLD any more."""
+    on.parts.hold_before.forget()
 
-    def restore_arming(self, _word: Word, now: float) -> None:
-        """A person said that all is well."""
-        self._parts.authority.restore_arming()
-        self._parts.tasks.let_arm(may_be_armed=True, now=now)
 
-    def linger(self, word: Word, now: float) -> None:
-        """A "go to" may follow, and undo this HOLD."""
-        has_paused = not self._parts.tasks.paused
-        self._parts.hold_before.note(word.sender, has_paused=has_paused, now=now)
+@_does(Effect.FORGET_START)
+def _forget_start(on: Reach, _word: Word, _now: float) -> None:
+    """No mission begins with the arming."""
+    on.parts.forget_start()
 
-    def hand_over(self, _word: Word, _now: float) -> None:
-        """A client goes on from our hand-back."""
-        self._parts.control.hand_over()
 
-    def keep_armed(self, _word: Word, _now: float) -> None:
-        """It stays armed when we hand it back."""
-        self._parts.control.keep_armed()
+@_does(Effect.FORGET_RELEASE)
+def _forget_release(on: Reach, _word: Word, _now: float) -> None:
+    """What was released and has not begun is held as before."""
+    on.parts.tasks.forget_release()
 
-    def disarm_at_end(self, _word: Word, _now: float) -> None:
-        """It is disarmed when we hand it back, whoever armed it."""
-        self._parts.control.disarm_at_end()
 
-    def note_others(self, _word: Word, now: float) -> None:
-        """Somebody who is no client of ours drives just now."""
-        self._parts.authority.note_other(now=now)
+@_does(Effect.REVOKE)
+def _revoke(on: Reach, _word: Word, _now: float) -> None:
+    """A client that wants to drive has to ask again."""
+    on.parts.authority.revoke()
 
-    def left(self, _word: Word, now: float) -> None:
-        """A set-point leaves; that it comes late shows in the task."""
-        self._parts.tasks.setpoint_left(now=now)
 
-    def tell(self, word: Word, now: float) -> None:
-        """Tell everybody."""
-        self._parts.note(word.text, now=now)
+@_does(Effect.DROP_WAITING)
+def _drop_waiting(on: Reach, _word: Word, _now: float) -> None:
+    """Send nothing of clients that waits for an answer to another, and might move it."""
+    on.parts.requests.drop_what_waits()
 
-    def tell_taken(self, word: Word, now: float) -> None:
-        """Tell everybody what has taken it."""
-        self._parts.note(f"taken over: {word.text}", now=now)
 
-    def tell_stick(self, _word: Word, now: float) -> None:
-        """Tell everybody what keeps the vehicle from driving."""
-        self._parts.note("has a stick off centre: HOLD. Centre it", now=now)
+@_does(Effect.COUNT)
+def _count(on: Reach, word: Word, now: float) -> None:
+    """Count a halt."""
+    on.parts.tasks.halt(word.reason, actor=word.actor, now=now)
 
-    def tell_held(self, _word: Word, now: float) -> None:
-        """Remind of a task that is held."""
-        held = self._parts.tasks.held
-        if held is not None:
-            self._parts.note(f"has task {held.id} on hold: release it ({BUTTONS})", now=now)
+
+@_does(Effect.PAUSE)
+def _pause(on: Reach, word: Word, now: float) -> Any:
+    """Let task and queue stand; gives the task's id."""
+    return on.parts.tasks.pause(TaskReason.OPERATOR, actor=word.actor, now=now)
+
+
+@_does(Effect.PAUSE_TAKEN)
+def _pause_taken(on: Reach, word: Word, now: float) -> Any:
+    """Let task and queue stand, because somebody else has the vehicle."""
+    reason = word.reason if word.reason in TAKEN else TaskReason.TAKEOVER
+    return on.parts.tasks.pause(reason, actor=on.parts.actor, now=now)
+
+
+@_does(Effect.LATCH)
+def _latch(on: Reach, word: Word, now: float) -> Any:
+    """Kill what has the vehicle, and let nothing begin before a continue; gives its id."""
+    return on.parts.tasks.stop(clear=word.clear, actor=word.actor, now=now)
+
+
+@_does(Effect.HOLD_TASK)
+def _hold_task(on: Reach, word: Word, now: float) -> None:
+    """Set the task that has the vehicle aside until somebody decides."""
+    on.parts.tasks.hold(word.reason, now=now)
+
+
+@_does(Effect.DO)
+def _do(_on: Reach, word: Word, _now: float) -> Any:
+    """Carry out what the word asks for."""
+    return word.do()
+
+
+@_does(Effect.WAKE)
+def _wake(on: Reach, _word: Word, now: float) -> None:
+    """Look at the tasks unless that is about to be done."""
+    if not on.pilot.clock.is_running:
+        on.step(now)
+
+
+@_does(Effect.WITHDRAW_ARMING)
+def _withdraw_arming(on: Reach, _word: Word, now: float) -> None:
+    """Arm it no more, also after a restart of ours."""
+    on.parts.withdraw_arming(now=now)
+
+
+@_does(Effect.RESTORE_ARMING)
+def _restore_arming(on: Reach, _word: Word, now: float) -> None:
+    """A person said that all is well."""
+    on.parts.authority.restore_arming()
+    on.parts.tasks.let_arm(may_be_armed=True, now=now)
+
+
+@_does(Effect.LINGER)
+def _linger(on: Reach, word: Word, now: float) -> None:
+    """A "go to" may follow, and undo this HOLD."""
+    has_paused = not on.parts.tasks.paused
+    on.parts.hold_before.note(word.sender, has_paused=has_paused, now=now)
+
+
+@_does(Effect.HAND_OVER)
+def _hand_over(on: Reach, _word: Word, _now: float) -> None:
+    """A client goes on from our hand-back."""
+    on.parts.control.hand_over()
+
+
+@_does(Effect.KEEP_ARMED)
+def _keep_armed(on: Reach, _word: Word, _now: float) -> None:
+    """It stays armed when we hand it back."""
+    on.parts.control.keep_armed()
+
+
+@_does(Effect.DISARM_AT_END)
+def _disarm_at_end(on: Reach, _word: Word, _now: float) -> None:
+    """It is disarmed when we hand it back, whoever armed it."""
+    on.parts.control.disarm_at_end()
+
+
+@_does(Effect.NOTE_OTHERS)
+def _note_others(on: Reach, _word: Word, now: float) -> None:
+    """Somebody who is no client of ours drives just now."""
+    on.parts.authority.note_other(now=now)
+
+
+@_does(Effect.LEFT)
+def _left(on: Reach, _word: Word, now: float) -> None:
+    """A set-point leaves; that it comes late shows in the task."""
+    on.parts.tasks.setpoint_left(now=now)
+
+
+@_does(Effect.TELL)
+def _tell(on: Reach, word: Word, now: float) -> None:
+    """Tell everybody."""
+    on.parts.note(word.text, now=now)
+
+
+@_does(Effect.TELL_TAKEN)
+def _tell_taken(on: Reach, word: Word, now: float) -> None:
+    """Tell everybody what has taken it."""
+    on.parts.note(f"taken over: {word.text}", now=now)
+
+
+@_does(Effect.TELL_STICK)
+def _tell_stick(on: Reach, _word: Word, now: float) -> None:
+    """Tell everybody what keeps the vehicle from driving."""
+    on.parts.note("has a stick off centre: HOLD. Centre it", now=now)
+
+
+@_does(Effect.TELL_HELD)
+def _tell_held(on: Reach, _word: Word, now: float) -> None:
+    """Remind of a task that is held."""
+    held = on.parts.tasks.held
+    if held is not None:
+        on.parts.note(f"has task {held.id} on hold: release it ({BUTTONS})", now=now)

@@ -5,46 +5,28 @@ want; and no set-point at all to a vehicle that is not ours.
 """
 
 from collections.abc import Callable, Hashable
-from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from math import inf
 from typing import Any
 
 from mav_tasks.engine.vehicles.control import (
-    NOTHING,
-    Driver,
     Event,
-    Grip,
-    Queue,
     State,
-    Waits,
-    Work,
     effects_of,
 )
-from mav_tasks.engine.vehicles.hands import Hands, Word
+from mav_tasks.engine.vehicles.facts import client_driving, state_of
+from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
-from mav_tasks.services.offboard import Phase
-from mav_tasks.tasks.lifecycle import RUNNING, TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.task import Draft, Task, TaskId
-from mav_tasks.tasks.view import ModeKind, VehicleView
+from mav_tasks.tasks.view import VehicleView
 
 R = TaskReason
 
-LATE_REQUESTS = 3.5  # s after a STOP, in which requests that left before it may still arrive
-GRIPS = {
-    Phase.IDLE: Grip.FREE,
-    Phase.ASKING_HOLD: Grip.TAKING,
-    Phase.ASKING_ARM: Grip.TAKING,
-    Phase.LEADING_IN: Grip.TAKING,
-    Phase.ASKING_MODE: Grip.TAKING,
-    Phase.CONTROL: Grip.DRIVING,
-    Phase.RELEASING: Grip.RELEASING,
-    Phase.DISARMING: Grip.RELEASING,
-    Phase.STOPPING: Grip.STOPPING,
-}
+LATE_REQUESTS = 3.5  # s after a halt, in which requests that left before it may still arrive
 
 
 class JointControl:
@@ -55,7 +37,7 @@ class JointControl:
         self._parts = parts
         self._pilot = pilot
         self._view = view
-        self._hands = Hands(parts, pilot, self.step)
+        self._reach = Reach(parts, pilot, self.step)
         self._stops_task = False  # which the end of the server has interrupted
         self.stopped_at = -inf  #: s, the last STOP
 
@@ -72,7 +54,7 @@ class JointControl:
             if isinstance(effect, Event):
                 found = self.on(effect, word, now=now)
             else:
-                found = self._hands.carry_out(effect, word, now=now)
+                found = carry_out(effect, self._reach, word, now=now)
             result = result if found is None else found
         return result
 
@@ -87,66 +69,10 @@ class JointControl:
         if not self._pilot.clock.is_running:
             self.step(now)
 
-    # what the table goes by
-
     def state(self, *, now: float) -> State:
         """Return what decides about the next event."""
-        parts = self._parts
-        persona, tasks, authority = parts.persona, parts.tasks, parts.authority
-        return State(
-            queue=_queue(tasks.paused),
-            grip=GRIPS[parts.control.phase],
-            work=self._work(),
-            driver=self._driver(now=now),
-            armed=parts.monitor.armed,
-            may_arm=authority.may_arm,
-            waits=self._waits(now=now),
-            is_led=self._is_led,
-            is_urgent=tasks.urgent is not None,
-            is_idle=tasks.is_idle,
-            is_stopping=self._pilot.guard.ladder.is_on,
-            is_late=now - self.stopped_at <= LATE_REQUESTS,
-            lingers=persona.is_held_before_places,
-            has_failsafe=persona.has_loss_failsafe,
-            heeds_stick=persona.heeds_throttle_stick,
-            brakes=self._pilot.brakes_against_stick(now=now),
-        )
-
-    @property
-    def _is_led(self) -> bool:
-        parts = self._parts
-        kind = parts.authority.kind_of(parts.monitor.custom_mode, armed=parts.monitor.armed)
-        return kind in (ModeKind.MANUAL, ModeKind.OTHER)
-
-    def _waits(self, *, now: float) -> Waits:
-        parts = self._parts
-        waits = Waits.GO_TO if parts.hold_before.is_open(now=now) else NOTHING
-        if parts.start_mark.is_put(now=now):
-            waits |= Waits.START
-        if parts.tasks.has_release:
-            waits |= Waits.RELEASE
-        return waits | Waits.GRANT if parts.authority.has_any_grant else waits
-
-    def _work(self) -> Work:
-        tasks = self._parts.tasks
-        begun = tasks.begun
-        if begun is None:
-            return Work.NONE if tasks.is_empty else Work.WAITS
-        if begun.state in RUNNING:
-            return Work.ENDS if begun.state is TaskState.CANCELLING else Work.RUNS
-        if begun.reason in TAKEN:
-            return Work.TAKEN
-        return Work.LOST if tasks.resumes_by_itself else Work.STANDS
-
-    def _driver(self, *, now: float) -> Driver:
-        if self._client(now=now) is not None:
-            return Driver.CLIENT
-        return Driver.OTHERS if self._parts.is_driven_by_others(now=now) else Driver.NOBODY
-
-    def _client(self, *, now: float) -> Hashable:
-        """The client whose set-points the vehicle may still follow, or None."""
-        within = self._parts.settings.watch.other_controller
-        return self._parts.authority.driver(within=within, now=now)
+        is_late = now - self.stopped_at <= LATE_REQUESTS
+        return state_of(self._parts, self._pilot, is_late=is_late, now=now)
 
     # words that let it stand
 
@@ -271,7 +197,7 @@ class JointControl:
         def go_on() -> None:
             self._parts.tasks.proceed(self._view(now), actor=actor, now=now)
 
-        self.on(Event.GO_TO_FOLLOWS, Word(R.NONE, actor, do=go_on), now=now)
+        self.on(Event.GO_ON, Word(R.NONE, actor, do=go_on), now=now)
 
     def go_to_follows(self, number: int, *, actor: str, now: float) -> None:
         """A client's "go to" is stored: a HOLD of it just before was none."""
@@ -354,7 +280,7 @@ class JointControl:
         What it drove stands, so that neither its last velocity nor a failsafe for lost setpoints
         comes before what it asks for now.
         """
-        if client is not None and self._client(now=now) == client:
+        if client is not None and client_driving(self._parts, now=now) == client:
             self.on(Event.DRIVING_ENDS, Word(), now=now)
 
     def client_is_gone(self, client: Hashable, *, now: float) -> None:
@@ -369,19 +295,9 @@ class JointControl:
         """
         if self._parts.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
-        self.check_not_by_hand(now=now)
+        self._parts.check_not_by_hand(now=now)
         self.end_driving_of(client, now=now)
         self.on(Event.LANDED, Word(), now=now)
-
-    def check_not_by_hand(self, *, now: float) -> None:
-        """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
-        parts = self._parts
-        if not (parts.monitor.armed and parts.is_by_hand):
-            return
-        if parts.is_driven_by_others(now=now):
-            raise Rejection(R.OTHER_CONTROLLER, "somebody is at the sticks")
-        if not parts.where.motion.is_still(now=now):
-            raise Rejection(R.WRONG_MODE, "driven by hand: it must stand first")
 
     def leave_manual(self, *, now: float) -> None:
         """A client starts a mission: as on an autopilot, that ends driving by hand.
@@ -390,17 +306,3 @@ class JointControl:
         """
         if self._parts.is_by_hand:
             self.on(Event.LEAVE_MANUAL, Word(), now=now)
-
-    def forget_start_of(self, keys: AbstractSet[str]) -> None:
-        """What such a key wanted to begin with the arming is not wanted any more."""
-        marker = self._parts.start_mark.marker
-        if marker is not None and marker.submitter.key in keys:
-            self._parts.forget_start()
-
-
-def _queue(paused: TaskReason) -> Queue:
-    if not paused:
-        return Queue.RUNS
-    if paused is R.STOPPED:
-        return Queue.STOPPED
-    return Queue.TAKEN if paused in TAKEN else Queue.PAUSED

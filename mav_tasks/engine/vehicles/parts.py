@@ -1,5 +1,6 @@
 """What the parts of one vehicle share: what is known of it, its tasks, and the way to it."""
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
 from mav_tasks.engine.vehicles.authority import Authority
@@ -10,6 +11,7 @@ from mav_tasks.engine.vehicles.start_mark import StartMark
 from mav_tasks.engine.vehicles.stick_watch import StickWatch
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
 from mav_tasks.engine.vehicles.whereabouts import Whereabouts
+from mav_tasks.errors import Rejection
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.persona import Persona
@@ -81,6 +83,21 @@ class Parts:
         """The mission that was to begin when it is armed is another one now, or is not wanted."""
         self.start_mark.remove()
         self.shown.forget()
+
+    def forget_start_of(self, keys: AbstractSet[str]) -> None:
+        """What such a key wanted to begin with the arming is not wanted any more."""
+        marker = self.start_mark.marker
+        if marker is not None and marker.submitter.key in keys:
+            self.forget_start()
+
+    def check_not_by_hand(self, *, now: float) -> None:
+        """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
+        if not (self.monitor.armed and self.is_by_hand):
+            return
+        if self.is_driven_by_others(now=now):
+            raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
+        if not self.where.motion.is_still(now=now):
+            raise Rejection(TaskReason.WRONG_MODE, "driven by hand: it must stand first")
 
     def view(self, *, drives_on: bool, now: float) -> VehicleView:
         """Give one look at the vehicle for the task domain.

@@ -7,7 +7,7 @@ failsafe's. Which it was is found here; what follows is the table's to say.
 from mav_tasks.engine.vehicles.authority import Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import BUTTONS, Word
-from mav_tasks.engine.vehicles.joint_control import JointControl
+from mav_tasks.engine.vehicles.joint_control import LATE_REQUESTS, JointControl
 from mav_tasks.engine.vehicles.own_failsafes import News, OwnFailsafes
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.services.offboard import Phase
@@ -130,6 +130,9 @@ class Takeovers:
             self.rebooted(booted_at=now, now=now)
         elif self._shows_restart:
             pass  # a restart, which its clock has told of before, and nobody's doing
+        elif self._comes_late(mode, now=now):
+            words = f"shows {persona.mode_name(mode)}, asked for before it was to stand: HOLD again"
+            self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif not ours and was_mode != persona.booting_mode:
             what = f"mode is {persona.mode_name(mode)}"
             cause = parts.failsafes.mode_changed(now=now)
@@ -141,6 +144,15 @@ class Takeovers:
             else:
                 self._taken(event, what, now=now)
             self._look_for_parking(was_mode, mode, now=now)
+
+    def _comes_late(self, mode: int, *, now: float) -> bool:
+        """Whether a client's wish for a mode was overtaken by HOLD on its way to the vehicle."""
+        halts = self._parts.tasks.halts
+        if mode == self._parts.persona.hold_mode:
+            return False
+        was_before = self._parts.authority.was_asked_before(mode, halt=halts.at)
+        is_halted = now - halts.at <= LATE_REQUESTS and not halts.is_undone
+        return was_before and is_halted
 
     def _look_for_parking(self, was_mode: int, mode: int, *, now: float) -> None:
         """Somebody who was driving sets HOLD: what waits does not drive it off from there."""

@@ -8,14 +8,15 @@ from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.policy import row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.joint_control import JointControl
-from mav_tasks.engine.vehicles.known_profile import KnownProfile
 from mav_tasks.engine.vehicles.motion_rights import MotionRights
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
+from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.takeovers import Takeovers
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
@@ -28,7 +29,7 @@ from mav_tasks.services.command_sender import Standing
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.identity import identity_of
 from mav_tasks.services.persona import Persona
-from mav_tasks.settings import SET_FAILSAFE, Settings, Turning
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace
@@ -36,7 +37,6 @@ from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
-NO_MISSION = (0, 0xFFFF)  # MISSION_CURRENT.total: it does not say; there is none
 REORDERED = 64  # packets that a net can put one behind others
 REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
 
@@ -92,10 +92,7 @@ class Vehicle:
         self._number = 0  # the same, counted on beyond 255
         self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
         self._was_heard = True
-        self._own_items = 0  # of a mission on board
-        #: what was measured of it beforehand
-        self.known = KnownProfile(persona)
-        self.known.apply(settings.profiles, system_id)
+        self._says = SelfDescription(parts)
         self.components = Components(system_id, first=settings.identity.component_id)
         self.control.heard(armed=monitor.armed, mode=monitor.custom_mode, now=now)
 
@@ -140,14 +137,6 @@ class Vehicle:
     def heartbeat(self) -> m.Heartbeat:
         """What it said last."""
         return self._monitor.latest
-
-    @property
-    def may_drive_on(self) -> bool:
-        """Whether it might not stand without setpoints, though it must; unsaid, it is believed."""
-        if self._settings.loss_failsafe != "must_stand":
-            return False
-        failsafe = self.requests.loss_failsafe
-        return bool(failsafe.awaits_answer or failsafe.why_off or self.known.why_drives_on)
 
     @property
     def heard_at(self) -> float:
@@ -212,7 +201,7 @@ class Vehicle:
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
         elif isinstance(message, m.MissionCurrent):
-            self._receive_own_mission(message.total, now=now)
+            self._says.receive_own_mission(message.total, now=now)
         elif isinstance(message, m.Statustext):
             sender = Address(self.system_id, component_id)
             news = self.parts.failsafes.receive_text(sender, message, now=now)
@@ -221,51 +210,14 @@ class Vehicle:
             news = self.parts.failsafes.receive_status(message, now=now)
             self._takeovers.learn(news, now=now)
         elif isinstance(message, m.ParamValue):
-            self._receive_parameter(message, now=now)
+            self._says.receive_parameter(message, now=now)
+            self.joint.wake(now=now)
         elif isinstance(message, m.RcChannels):
             sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
             if self.parts.sticks.look(message, armed=self.armed, sent_at=sent_at):
                 self.joint.stick_held(now=now)
         elif isinstance(message, m.AutopilotVersion):
-            identity = identity_of(message)
-            self.tasks.identified(identity.uid, now=now)
-            self.requests.is_identified = True
-            self.known.identify(identity)
-            self._use_profile(now=now)
-
-    def _receive_own_mission(self, total: int, *, now: float) -> None:
-        """What is on board is none of ours: its mission mode would drive it, and nobody sees it."""
-        items = total if total not in NO_MISSION else 0
-        if items and items != self._own_items and self._settings.claim:
-            self.parts.note(
-                f"carries {items} mission items of its own: see its mission mode", now=now
-            )
-        self._own_items = items
-
-    def _receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
-        self.requests.loss_failsafe.receive(message)
-        self.requests.cruise.receive(message)
-        self.tasks.cruises(self.requests.cruise.speed)
-        self._note_failsafe(now=now)
-        turning = self.requests.turning
-        before = turning.turning
-        turning.receive(message)
-        self.known.turns(turning.turning, turning.radius)
-        if turning.turning is not before:
-            self._use_profile(now=now)
-        if turning.turning is Turning.STEERED is not before:
-            self._book.record(VehicleSeen(self.system_id, "steers as a car", now))
-        self.joint.wake(now=now)
-
-    def _note_failsafe(self, *, now: float) -> None:
-        failsafe = self.requests.loss_failsafe
-        news = failsafe.take_news()
-        if news and failsafe.why_off:
-            news = f"{news}. To make it stand: {SET_FAILSAFE}"
-        if news and (failsafe.is_unknown or failsafe.why_off):
-            self.parts.note(news, now=now)
-        elif news:
-            self._book.record(VehicleSeen(self.system_id, news, now))
+            self._says.receive_identity(identity_of(message), now=now)
 
     def _look_at_frame(self, *, now: float) -> None:
         if self.where.frame.changed:
@@ -287,8 +239,7 @@ class Vehicle:
         self.joint.wake(now=now)
         self._ask_for_rates(now=now)
         self.requests.ask_for_parameters()
-        self._note_failsafe(now=now)
-        self._use_profile(now=now)
+        self._says.look(now=now)
 
     def _keep_home(self, place: GlobalPlace | None, *, now: float) -> None:
         """Where it is first armed is its home; one met armed has said where that was."""
@@ -301,23 +252,6 @@ class Vehicle:
         place, frame = home_meant(command) or self.where.here, self.where.frame.frame()
         if place and frame:
             self.tasks.set_home(place, frame, actor=actor, now=now)
-
-    def _use_profile(self, *, now: float) -> None:
-        """Go by what was measured of it; setpoints do not change their kind while it is driven."""
-        news = self.known.take_news()
-        if news and self.known.chosen is None:
-            self.parts.note(news, now=now)
-        elif news:
-            self._book.record(VehicleSeen(self.system_id, news, now))
-        self.tasks.brakes(self.known.stop)
-        persona = self.known.persona
-        speaks_alike = (persona.setpoint_mask, persona.setpoint_frame) == (
-            self.persona.setpoint_mask,
-            self.persona.setpoint_frame,
-        )
-        if persona != self.persona and (speaks_alike or not self.control.is_engaged):
-            self.parts.persona = persona
-            self.requests.adopt(persona)
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
@@ -351,6 +285,8 @@ class Vehicle:
             self.joint.disarm(actor=actor, now=now)
         elif command == MavCmd.COMPONENT_ARM_DISARM:
             self.joint.arm(now=now)
+        elif not row_of_command(command).passed_on.passes_under_stop:
+            self.parts.authority.note_passed_on(now=now)
         self.requests.relay(
             packet,
             message,
@@ -390,7 +326,7 @@ class Vehicle:
         self._ask_for_rates(now=now)
 
     def _view(self, now: float) -> VehicleView:
-        return self.parts.view(drives_on=self.may_drive_on, now=now)
+        return self.parts.view(drives_on=self._says.may_drive_on, now=now)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings, but for those that need a restart: see the table of keys."""
@@ -399,7 +335,7 @@ class Vehicle:
         self.where.motion.apply(settings.watch)
         self.pilot.apply(settings)
         self.requests.apply(settings.watch)
-        self.known.apply(settings.profiles, self.system_id)  # used from the next heartbeat on
+        self._says.apply(settings)
 
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # nothing is asked of one that cannot answer

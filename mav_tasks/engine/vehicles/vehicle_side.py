@@ -182,7 +182,7 @@ class VehicleSide:
         Whether what that key had asked for is still wanted only an operator can say.
         """
         for each in self if keys else ():
-            each.joint.forget_start_of(keys)
+            each.parts.forget_start_of(keys)
         for tasks in self._fleet if keys else ():
             theirs = [task for task in tasks.unfinished if task.submitter.key in keys]
             if not theirs:

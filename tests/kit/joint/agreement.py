@@ -14,7 +14,7 @@ from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
 from tests.kit.joint.model import FREE, happens
 
-LEFT_OPEN = dict.fromkeys(FREE, False)
+LEFT_OPEN: dict[str, Any] = dict.fromkeys(FREE, False)
 
 
 class Agreement:

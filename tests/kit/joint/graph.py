@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from itertools import product
+from typing import Any
 
 from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event, Grip, Queue, State, Work
 from tests.kit.joint.model import FREE, MAKES, START, happens, others_do, passes
@@ -39,7 +40,7 @@ def can_happen(event: Event, state: State) -> bool:
         case Event.PARKED:  # the change of the mode has been seen to before
             rests = state.work in STANDS and not state.waits and not state.is_urgent
             return state.queue is not Queue.STOPPED and rests
-        case Event.MODE | Event.EXPLAINED | Event.GO_TO_FOLLOWS:
+        case Event.MODE | Event.LATE_MODE | Event.EXPLAINED | Event.GO_ON:
             return state.queue is not Queue.STOPPED
         case Event.LAPSED:
             return state.queue is not Queue.STOPPED and state.grip in (Grip.TAKING, Grip.DRIVING)
@@ -59,7 +60,8 @@ def variants(event: Event, state: State) -> Iterator[State]:
     """Give a state with all that an event's rows ask for beside it."""
     names = ASKED[event]
     for values in product((False, True), repeat=len(names)):
-        yield state._replace(**dict(zip(names, values, strict=True)))
+        asked: dict[str, Any] = dict(zip(names, values, strict=True))
+        yield state._replace(**asked)
 
 
 def after(event: Event, state: State) -> set[State]:
@@ -88,7 +90,8 @@ class Graph:
     """Every state of one make of vehicle, and what leads from each to others."""
 
     def __init__(self, make: str) -> None:
-        first = START._replace(**MAKES[make])
+        make_of: dict[str, Any] = {**MAKES[make]}
+        first = START._replace(**make_of)
         #: each state, and what leads there from the first
         self.paths: dict[State, tuple[str, ...]] = {first: ()}
         #: what can happen in a state, and the states to which that leads

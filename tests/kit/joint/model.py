@@ -39,7 +39,7 @@ HALTS = (
 )
 #: words that let it go; OPERATOR_LOST and the like let nothing go
 GOES = (
-    *(E.CONTINUE, E.GO_TO_FOLLOWS, E.RELEASE, E.RESTORE, E.RUN_NOW),
+    *(E.CONTINUE, E.GO_ON, E.RELEASE, E.RESTORE, E.RUN_NOW),
     *(E.ASK_OUR_MODE, E.ASK_OUR_MODE_STREAMING, E.ARM),
 )
 
@@ -54,7 +54,7 @@ class Deed(NamedTuple):
 def happens(event: Event, state: State) -> frozenset[State]:
     """Return the states to which an event can lead, by the table and by what the event shows."""
     states = {state}
-    if event in (E.MODE, E.MODE_IN_STOP):  # HOLD, or another one
+    if event in (E.MODE, E.MODE_IN_STOP, E.LATE_MODE):  # HOLD, or another one
         states = {state._replace(is_led=False), state._replace(is_led=True)}
     elif event in (E.LAPSED, E.PARKED):
         states = {state._replace(is_led=False)}
@@ -67,9 +67,10 @@ def happens(event: Event, state: State) -> frozenset[State]:
 
 
 def _follow(event: Event, steps: Iterable[Step], state: State) -> set[State]:
-    states = {state}
+    states, is_emptied = {state}, False
     for step in steps:
         following: set[State] = set()
+        is_emptied |= event is E.CLEAR and step is F.DO
         for each in states:
             if isinstance(step, Event):
                 following |= _follow(step, effects_of(step, each), each)
@@ -77,7 +78,7 @@ def _follow(event: Event, steps: Iterable[Step], state: State) -> set[State]:
                 following |= set(DO[event](each))
             else:
                 following |= set(RESULTS.get(step, _same)(each))
-        states = _emptied(following) if event is E.CLEAR else following
+        states = _emptied(following) if is_emptied else following
     return states
 
 
@@ -272,7 +273,7 @@ def _goes_on(state: State) -> Iterator[State]:
 
 def is_free(state: State) -> bool:
     """Whether a task can take the vehicle."""
-    return state.driver is Driver.NOBODY and not state.is_led
+    return state.driver is Driver.NOBODY and not (state.is_led and state.armed)
 
 
 def _released(state: State) -> Iterator[State]:
@@ -324,9 +325,7 @@ def _restarted(state: State) -> Iterator[State]:
     begun = () if state.work in NO_TASK else (Work.STANDS, Work.RUNS)
     for may_arm in {False, state.may_arm}:
         for work in {state.work, *begun}:  # it begins again if nothing of it was driven
-            each = state._replace(
-                may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE, is_urgent=False
-            )
+            each = state._replace(may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE)
             yield each
             if work not in NO_TASK and each.queue in (Queue.RUNS, Queue.TAKEN):
                 yield each._replace(queue=Queue.PAUSED)
@@ -370,7 +369,7 @@ DO: dict[Event, Callable[[State], Iterator[State]]] = {
     E.UNQUEUE: _unqueued,
     E.CLEAR_WAITING: _unqueued,
     E.CONTINUE: _goes_on,
-    E.GO_TO_FOLLOWS: _goes_on,
+    E.GO_ON: _goes_on,
     E.RELEASE: _released,
     E.RESTORE: _released,
     E.RUN_NOW: _run_now,

@@ -11,10 +11,20 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, HOLD, TEMPORARILY_REJECTED, command_long
+from tests.kit.client import (
+    ACCEPTED,
+    AUTO,
+    GUIDED,
+    HOLD,
+    SET_MODE,
+    TEMPORARILY_REJECTED,
+    command_long,
+    set_mode,
+)
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.world import World, at
@@ -22,6 +32,7 @@ from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_fr
 from tests.scenarios.conftest import MakeWorld
 
 CHANGE_MODE = 1  # of DO_REPOSITION
+COMMAND_LONG = 76
 
 
 def go_to(north: float, east: float, target: tuple[int, int] = (1, 1)) -> Any:
@@ -60,6 +71,55 @@ def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
     world.client.send(word)
     world.run(2)
     assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was meant"
+
+
+@pytest.mark.parametrize("way", ["command", "message", "elsewhere"])
+@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+def test_what_the_net_to_the_rover_delivers_after_a_halt_does_not_undo_it(
+    world: World, halt: str, way: str
+) -> None:
+    """It is overtaken between the server and the rover."""
+    person = world.add_client("person")
+    away_from_home(world)
+    world.client.mode(GUIDED)
+    world.run(1)
+    caught: list[bytes] = []
+
+    def loses(_source: str, target: str, data: bytes) -> bool:
+        is_it = target == "rover1" and data[7] in (SET_MODE, COMMAND_LONG) and not caught
+        caught.extend([data] if is_it else [])
+        return is_it
+
+    world.watched.loses = loses
+    match way:
+        case "command":
+            world.client.mode(AUTO)
+        case "message":
+            world.client.send(set_mode(AUTO))
+        case _:
+            world.client.send(command_long(RETURN, target=ELSEWHERE))
+    world.run(0.1)
+    assert caught
+    world.watched.loses = lambda *_: False
+    halted = person.mode(HOLD) if halt == "HOLD" else person.pause()
+    world.run(0.5)
+    assert halted.result == ACCEPTED
+    world.net.send(VEHICLE_LINK, "rover1", caught[0])
+    world.run(2)
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert stays(world, 5)
+
+
+def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
+    """Though a client had asked for something just before the HOLD."""
+    away_from_home(world)
+    world.client.send(command_long(RETURN, target=ELSEWHERE))
+    world.run(0.5)
+    world.add_client("person").mode(HOLD)
+    world.run(1)
+    world.operator_mode(Mode.MANUAL)
+    world.run(3)
+    assert world.rover.autopilot.mode is Mode.MANUAL
 
 
 @pytest.fixture

@@ -1,0 +1,86 @@
+"""What the table of joint control goes by, put together of what the parts of a vehicle know."""
+
+from collections.abc import Hashable
+
+from mav_tasks.engine.vehicles.control import NOTHING, Driver, Grip, Queue, State, Waits, Work
+from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.engine.vehicles.pilot import Pilot
+from mav_tasks.services.offboard import Phase
+from mav_tasks.tasks.lifecycle import RUNNING, TAKEN, TaskReason, TaskState
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+from mav_tasks.tasks.view import ModeKind
+
+GRIPS = {
+    Phase.IDLE: Grip.FREE,
+    Phase.ASKING_HOLD: Grip.TAKING,
+    Phase.ASKING_ARM: Grip.TAKING,
+    Phase.LEADING_IN: Grip.TAKING,
+    Phase.ASKING_MODE: Grip.TAKING,
+    Phase.CONTROL: Grip.DRIVING,
+    Phase.RELEASING: Grip.RELEASING,
+    Phase.DISARMING: Grip.RELEASING,
+    Phase.STOPPING: Grip.STOPPING,
+}
+
+
+def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
+    """Return the state; ``is_late``: what left before the last STOP may still arrive."""
+    persona, tasks, authority = parts.persona, parts.tasks, parts.authority
+    kind = authority.kind_of(parts.monitor.custom_mode, armed=parts.monitor.armed)
+    return State(
+        queue=_queue(tasks.paused),
+        grip=GRIPS[parts.control.phase],
+        work=_work(tasks),
+        driver=_driver(parts, now=now),
+        armed=parts.monitor.armed,
+        may_arm=authority.may_arm,
+        waits=_waits(parts, now=now),
+        is_led=kind in (ModeKind.MANUAL, ModeKind.OTHER),
+        is_urgent=tasks.urgent is not None,
+        is_idle=tasks.is_idle,
+        is_stopping=pilot.guard.ladder.is_on,
+        is_late=is_late,
+        lingers=persona.is_held_before_places,
+        has_failsafe=persona.has_loss_failsafe,
+        heeds_stick=persona.heeds_throttle_stick,
+        brakes=pilot.brakes_against_stick(now=now),
+    )
+
+
+def client_driving(parts: Parts, *, now: float) -> Hashable:
+    """Return the client whose set-points the vehicle may still follow, or None."""
+    return parts.authority.driver(within=parts.settings.watch.other_controller, now=now)
+
+
+def _queue(paused: TaskReason) -> Queue:
+    if not paused:
+        return Queue.RUNS
+    if paused is TaskReason.STOPPED:
+        return Queue.STOPPED
+    return Queue.TAKEN if paused in TAKEN else Queue.PAUSED
+
+
+def _work(tasks: VehicleTasks) -> Work:
+    begun = tasks.begun
+    if begun is None:
+        return Work.NONE if tasks.is_empty else Work.WAITS
+    if begun.state in RUNNING:
+        return Work.ENDS if begun.state is TaskState.CANCELLING else Work.RUNS
+    if begun.reason in TAKEN:
+        return Work.TAKEN
+    return Work.LOST if tasks.resumes_by_itself else Work.STANDS
+
+
+def _driver(parts: Parts, *, now: float) -> Driver:
+    if client_driving(parts, now=now) is not None:
+        return Driver.CLIENT
+    return Driver.OTHERS if parts.is_driven_by_others(now=now) else Driver.NOBODY
+
+
+def _waits(parts: Parts, *, now: float) -> Waits:
+    waits = Waits.GO_TO if parts.hold_before.is_open(now=now) else NOTHING
+    if parts.start_mark.is_put(now=now):
+        waits |= Waits.START
+    if parts.tasks.has_release:
+        waits |= Waits.RELEASE
+    return waits | Waits.GRANT if parts.authority.has_any_grant else waits
