@@ -1,0 +1,100 @@
+"""Draws who lets a rover's queue stand and go on in README.md, from the table of joint control.
+
+`--check` tells if it is old.
+"""
+
+import sys
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
+
+from mav_tasks.engine.vehicles.control import Event, Grip, Queue, State, Work  # noqa: E402
+from tests.kit.joint.graph import can_happen, variants  # noqa: E402
+from tests.kit.joint.model import MAKES, happens  # noqa: E402
+
+README = ROOT / "README.md"
+BEGIN = "<!-- control diagram: made by tools/control_diagram.py -->\n"
+END = "<!-- end of control diagram -->\n"
+NAMES = {
+    Queue.RUNS: "runs",
+    Queue.PAUSED: "paused",
+    Queue.TAKEN: "taken",
+    Queue.STOPPED: "stopped",
+}
+NOTES = {
+    Queue.RUNS: "tasks take the rover, one after the other",
+    Queue.PAUSED: "nothing begins; continue goes on",
+    Queue.TAKEN: "somebody else has it; set HOLD, then continue",
+    Queue.STOPPED: "it stands, in HOLD; continue goes on",
+}
+WORDS = {
+    Event.STOP: "STOP",
+    Event.HOLD: "HOLD",
+    Event.MODE: "another mode",
+    Event.LAPSED: "HOLD while it is driven",
+    Event.DISARM: "disarm",
+    Event.STICK: "stick off its centre",
+    Event.SECOND: "second controller",
+    Event.REBOOTED: "restart of the rover",
+    Event.PAUSE_TASKS: "key revoked",
+    Event.OPERATOR_LOST: "no ground station",
+    Event.EXPLAINED: "its failsafe",
+    Event.ASK_OTHER_MODE: "other mode asked for",
+    Event.CLOSE: "end of the server",
+    Event.TAKEN: "armed to be driven by hand",
+    Event.GO_ON: "go-to after HOLD, start of the mission",
+    Event.RUN_NOW: "go-to that runs at once",
+}
+
+
+def edges() -> dict[tuple[Queue, Queue], list[Event]]:
+    """Return which events lead from each state of the queue to another."""
+    found: dict[tuple[Queue, Queue], list[Event]] = {}
+    for make, queue, grip, work in product(MAKES, Queue, Grip, Work):
+        make_of: dict[str, Any] = {**MAKES[make]}
+        state = State(queue, grip, work, armed=True, **make_of)
+        for event in Event:
+            if event is not Event.CLOSE and not can_happen(event, state):
+                continue
+            for each in variants(event, state):
+                for there in happens(event, each):
+                    events = found.setdefault((queue, there.queue), [])
+                    if there.queue is not queue and event not in events:
+                        events.append(event)
+    return {pair: sorted(events, key=list(Event).index) for pair, events in found.items() if events}
+
+
+def diagram() -> str:
+    """Return the table as a Mermaid state diagram."""
+    lines = ["```mermaid", "stateDiagram-v2", "    [*] --> runs"]
+    lines += [f"    {NAMES[queue]}: {NAMES[queue]}, {note}" for queue, note in NOTES.items()]
+    for (old, new), events in edges().items():
+        words = ", ".join(
+            WORDS.get(event, event.name.lower().replace("_", " ")) for event in events
+        )
+        lines.append(f"    {NAMES[old]} --> {NAMES[new]}: {words}")
+    return "\n".join([*lines, "```", ""])
+
+
+def main() -> int:
+    text = README.read_text(encoding="utf-8")
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        print(f"README.md lacks the lines {BEGIN.strip()} and {END.strip()}")
+        return 1
+    current = before + begin + diagram() + end + after
+    if current == text:
+        return 0
+    if "--check" in sys.argv[1:]:
+        print("README.md: the diagram of control is old; run tools/control_diagram.py")
+        return 1
+    README.write_text(current, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
