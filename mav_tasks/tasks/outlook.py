@@ -25,14 +25,14 @@ def estimate(tasks: VehicleTasks, task: Task, book: TaskBook, *, now: float) -> 
     """Give the estimated seconds until a task starts, and until it ends; NaN: not known."""
     match task.state:
         case S.STARTING | S.EXECUTING:
-            return 0.0, time_left(task.goal, task.progress, tasks.driving)
+            return 0.0, time_left(task.goal, task.progress, tasks.terms.driving)
         case S.SCHEDULED:
             to_start = tasks.start_time(task) - now
         case S.QUEUED:
             to_start = _time_ahead(tasks, task, book)
         case _:
             return nan, nan
-    return to_start, to_start + duration_of(task.goal, tasks.driving)
+    return to_start, to_start + duration_of(task.goal, tasks.terms.driving)
 
 
 def _time_ahead(tasks: VehicleTasks, task: Task, book: TaskBook) -> float:
@@ -42,7 +42,7 @@ def _time_ahead(tasks: VehicleTasks, task: Task, book: TaskBook) -> float:
         return nan
     ahead = [book[task_id] for task_id in tasks.queue.page(0, place)]
     begun = [task for task in (tasks.begun, *tasks.aside) if task is not None]
-    return sum(time_left(t.goal, t.progress, tasks.driving) for t in (*begun, *ahead))
+    return sum(time_left(t.goal, t.progress, tasks.terms.driving) for t in (*begun, *ahead))
 
 
 def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
@@ -55,7 +55,7 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
         case S.QUEUED:
             return _why_queued(tasks, task)
         case S.HELD | S.STARTING:
-            return tasks.blocker_of(task.id) or task.reason
+            return tasks.turns.blocker_of(task.id) or task.reason
         case _:
             return task.reason
 
@@ -69,4 +69,4 @@ def _why_queued(tasks: VehicleTasks, task: Task) -> TaskReason:
         return R.STOP_UNCONFIRMED
     if tasks.begun is not None or tasks.queue.position(task.id):
         return R.BEHIND_OTHERS
-    return tasks.blocker_of(task.id)
+    return tasks.turns.blocker_of(task.id)

@@ -212,5 +212,5 @@ class TestBrakes:
         profile = profile_of(probed.finish().findings, probed="2026-11-21T10:00:00Z")
         world = make_world(persona=chosen, settings=known(profile))
         tasks = world.server.engine._fleet.of(1)
-        assert tasks._stop == (profile.speed, profile.stopping_distance)
-        assert tasks.driving == Driving()
+        assert tasks.terms._stop == (profile.speed, profile.stopping_distance)
+        assert tasks.terms.driving == Driving()

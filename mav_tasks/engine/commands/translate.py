@@ -140,7 +140,7 @@ def task_status(
         submitter_system=task.submitter.system_id,
         submitter_component=task.submitter.component_id,
         submitter_link=link_number,
-        text=_words(task, reason, tasks.words_of_blocker(task.id)).encode()[:50],
+        text=_words(task, reason, tasks.turns.words_of_blocker(task.id)).encode()[:50],
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
     )
 

@@ -43,7 +43,7 @@ class Agenda:
                 self._due[system_id] = due
                 if due < inf:
                     heappush(self._heap, (due, system_id))
-            if vehicle.tasks.awaits_commit:
+            if vehicle.tasks.turns.awaits_commit:
                 self._awaiting[system_id] = vehicle
             else:
                 self._awaiting.pop(system_id, None)

@@ -81,6 +81,6 @@ def _waits(parts: Parts, *, now: float) -> Waits:
     waits = Waits.GO_TO if parts.hold_before.is_open(now=now) else NOTHING
     if parts.start_mark.is_put(now=now):
         waits |= Waits.START
-    if parts.tasks.has_release:
+    if parts.tasks.released is not None:
         waits |= Waits.RELEASE
     return waits | Waits.GRANT if parts.authority.has_any_grant else waits

@@ -207,7 +207,7 @@ def _withdraw_arming(on: Reach, _word: Word, now: float) -> None:
 def _restore_arming(on: Reach, _word: Word, now: float) -> None:
     """A person said that all is well."""
     on.parts.authority.restore_arming()
-    on.parts.tasks.let_arm(may_be_armed=True, now=now)
+    on.parts.tasks.terms.let_arm(may_be_armed=True, now=now)
 
 
 @_does(Effect.LINGER)

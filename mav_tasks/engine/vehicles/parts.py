@@ -77,7 +77,7 @@ class Parts:
     def withdraw_arming(self, *, now: float) -> None:
         """Somebody else has a hand on it: it is armed no more, also after a restart of ours."""
         self.authority.withdraw_arming()
-        self.tasks.let_arm(may_be_armed=False, now=now)
+        self.tasks.terms.let_arm(may_be_armed=False, now=now)
 
     def forget_start(self) -> None:
         """The mission that was to begin when it is armed is another one now, or is not wanted."""
@@ -127,6 +127,6 @@ class Parts:
             turning=persona.turning,
             turns_by_course=persona.turns_by_course,
             turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
-            is_unknown=self.tasks.has_uid and not self.requests.is_identified,
+            is_unknown=self.tasks.terms.has_uid and not self.requests.is_identified,
             drives_on=drives_on,
         )

@@ -37,7 +37,7 @@ class Takeovers:
         """
         parts = self._parts
         mode, persona = parts.monitor.custom_mode, parts.persona
-        if parts.tasks.paused in TAKEN or not parts.tasks.may_be_armed:
+        if parts.tasks.paused in TAKEN or not parts.tasks.terms.may_be_armed:
             parts.withdraw_arming(now=now)
         # it holds because set-points were lost, and would follow them again if one came
         is_lost = persona.has_loss_failsafe and mode == persona.hold_mode

@@ -245,13 +245,13 @@ class Vehicle:
         """Where it is first armed is its home; one met armed has said where that was."""
         frame = self.where.frame.frame()
         if place and frame and self.tasks.bounds.home_in(frame) is None:
-            self.tasks.set_home(place, frame, actor=SERVER, now=now)
+            self.tasks.terms.set_home(place, frame, actor=SERVER, now=now)
 
     def home_was_set(self, command: m.Message, *, actor: str, now: float) -> None:
         """A client's DO_SET_HOME was accepted: its tasks return there, too."""
         place, frame = home_meant(command) or self.where.here, self.where.frame.frame()
         if place and frame:
-            self.tasks.set_home(place, frame, actor=actor, now=now)
+            self.tasks.terms.set_home(place, frame, actor=actor, now=now)
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
@@ -340,6 +340,6 @@ class Vehicle:
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # nothing is asked of one that cannot answer
             self.requests.ask_which(now=now)
-            if self.tasks.has_uid and self.requests.has_not_said_which(now=now):
+            if self.tasks.terms.has_uid and self.requests.has_not_said_which(now=now):
                 self.tasks.unidentified(now=now)
             self.requests.ask_for_rates(now=now)

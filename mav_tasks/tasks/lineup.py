@@ -1,0 +1,220 @@
+"""The tasks of one vehicle as they stand: its queue, those begun, and what makes the queue stand.
+
+The STOP latch is the queue's pause reason STOPPED: there is no second flag. One task at a time has
+the vehicle; others may have begun and be set aside: pre-empted, or held.
+"""
+
+from dataclasses import dataclass
+
+from mav_tasks.errors import Rejection
+from mav_tasks.settings import SET_FAILSAFE, Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.led_away import LedAway
+from mav_tasks.tasks.events import QueuePaused, VehicleHalted
+from mav_tasks.tasks.executor import Executor
+from mav_tasks.tasks.goal import SingleGoal
+from mav_tasks.tasks.halts import Halts
+from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.queue import TaskQueue
+from mav_tasks.tasks.scheduler import start_blocker
+from mav_tasks.tasks.task import Submitter, Task, TaskId, same_frame
+from mav_tasks.tasks.timing import Timing
+from mav_tasks.tasks.vehicle_terms import VehicleTerms
+from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.waiting_room import WaitingRoom
+
+R, S = TaskReason, TaskState
+
+#: what the person who reads a refusal may do about it
+WAYS_OUT = {
+    R.WRONG_MODE: "wrong mode, set HOLD first",
+    R.DISARMED: "disarmed; continue, or arm it",
+    R.LOSS_FAILSAFE: f"it would not stand without us, {SET_FAILSAFE}",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Released:
+    """A held task that a person has released, and that goes on when the vehicle is up."""
+
+    task_id: TaskId
+    again: bool
+    may_continue: bool  # who has released it might also let the queue go on
+    actor: str
+    until: float
+    waits_for: TaskReason
+
+
+class Lineup:
+    """What there is of tasks of the vehicle with this system id, and how it stands."""
+
+    def __init__(self, vehicle: int, book: TaskBook, room: WaitingRoom, settings: Settings) -> None:
+        self.vehicle = vehicle
+        self.book = book
+        self.room = room
+        self.settings = settings
+        #: the tasks that are ready
+        self.queue: TaskQueue = room.queue(vehicle)
+        #: where it may drive, and where it returns to
+        self.bounds = Bounds()
+        self.executor = Executor(book, settings, self.bounds)
+        #: what its tasks go by beside their own terms
+        self.terms = VehicleTerms(vehicle, book, self.executor, self.bounds, settings)
+        self.aside_ids: dict[TaskId, None] = {}
+        self.of_earlier_run: set[TaskId] = set()
+        self.led_away = LedAway()
+        #: why the queue stands, or NONE
+        self.paused = R.NONE
+        #: what made the vehicle stand, and when
+        self.halts = Halts()
+        #: the task that runs although the queue is paused
+        self.urgent: TaskId | None = None
+        #: killed: nothing begins before the vehicle stands
+        self.is_halting = False
+        self.begun_at = 0.0
+        #: a held task that waits until the vehicle has restarted, or the queue goes on
+        self.released: Released | None = None
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.vehicle}, {self.queue!r}, {self.paused.name})"
+
+    @property
+    def begun(self) -> Task | None:
+        """The task that has the vehicle: begun, not over and not set aside."""
+        return self.executor.task
+
+    @property
+    def aside(self) -> list[Task]:
+        """The tasks that have begun and were set aside."""
+        return [self.book[task_id] for task_id in self.aside_ids]
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether any task has begun and is not over."""
+        return self.begun is not None or bool(self.aside_ids)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether STOP is latched."""
+        return self.paused is R.STOPPED
+
+    @property
+    def waiting(self) -> list[TaskId]:
+        """Waiting tasks, next one first."""
+        return self.room.of(self.vehicle)
+
+    @property
+    def next_waiting(self) -> TaskId | None:
+        """The task that is next in the queue."""
+        return self.queue.first()
+
+    @property
+    def capacity(self) -> int:
+        """How many tasks may wait."""
+        return self.settings.queueing.capacity
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether there is neither a begun task nor one that could begin now."""
+        return not self.is_driving and len(self.queue) == 0
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no task at all that is not over."""
+        return not self.is_driving and self.room.count(self.vehicle) == 0
+
+    @property
+    def unfinished(self) -> list[Task]:
+        """All tasks that are not over, in the order of their ids."""
+        begun = [] if self.begun is None else [self.begun.id]
+        return [self.book[task_id] for task_id in sorted([*begun, *self.aside_ids, *self.waiting])]
+
+    def page(self, first: int, count: int) -> list[TaskId]:
+        """Give up to ``count`` waiting tasks from a position on."""
+        if first + count <= len(self.queue):
+            return self.queue.page(first, count)
+        if first >= self.room.count(self.vehicle):
+            return []  # without putting all that wait in order
+        return self.waiting[first : first + count]
+
+    def start_time(self, task: Task) -> float:
+        """Give the monotonic time before which a task does not begin; -inf without one."""
+        return self.room.due_at(task)
+
+    def timing_of(self, task: Task) -> Timing | None:
+        """Give how evenly a task's setpoints have left, None if it was not driven."""
+        begun = self.begun
+        return self.executor.timing if begun is not None and begun.id == task.id else task.timing
+
+    @property
+    def held(self) -> Task | None:
+        """The task that somebody must decide about; None: there is none, or it is decided."""
+        begun = self.begun
+        if begun is not None and begun.state is S.HELD:
+            return begun if self.released is None else None
+        return next((task for task in self.aside if task.state is S.HELD), None)
+
+    @property
+    def is_held_ahead(self) -> bool:
+        """Whether a held task keeps all others from beginning."""
+        begun = self.begun
+        if begun is not None and begun.state is S.HELD:
+            return True
+        return bool(self.aside_ids) and any(task.state is S.HELD for task in self.aside)
+
+    @property
+    def resumes_by_itself(self) -> bool:
+        """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
+        return self.executor.resumes_by_itself
+
+    def count_of(self, submitter: Submitter) -> int:
+        """Give how many tasks of a submitter wait, on any vehicle."""
+        return self.room.count_of(submitter)
+
+    def waits(self, task: Task) -> bool:
+        """Whether a task has not begun."""
+        return task.state in WAITING
+
+    # what several parts do
+
+    def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
+        """Note that the vehicle is to stand: what lets it go on has to be newer than this.
+
+        What was to run at once and has not begun waits as any other; what was released and has not
+        begun is held as before.
+        """
+        self.released = None
+        if self.urgent is not None and (self.begun is None or self.begun.id != self.urgent):
+            self.urgent = None
+        if self.halts.raise_epoch(reason, actor=actor, now=now):
+            epoch = self.halts.epoch
+            self.book.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
+
+    def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
+        """Let the queue stand; a STOP is not undone, nor that somebody else has the vehicle."""
+        if self.paused in (reason, R.STOPPED):
+            return
+        if self.paused in TAKEN and reason is R.OPERATOR:
+            return  # a pause does not say that all is well with the vehicle again
+        self.paused = reason
+        self.book.record(QueuePaused(self.vehicle, reason, actor, now))
+
+    def set_aside(self, task_id: TaskId) -> None:
+        """Let another task have the vehicle: this one has begun, and is not over."""
+        self.executor.give_up()
+        self.aside_ids[task_id] = None
+
+    def check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
+        """Raise Rejection, with what may be done about it, while a goal could not be begun."""
+        blocker = start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
+        if blocker:
+            raise Rejection(blocker, f"cannot go on: {WAYS_OUT.get(blocker, words_of(blocker))}")
+
+    def is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:
+        """Whether what is left of an earlier run was in coordinates that mean nothing any more."""
+        return (
+            task.id in self.of_earlier_run
+            and task.progress.anchor is not None
+            and not same_frame(task.progress.frame, seen.frame)
+        )

@@ -1,0 +1,142 @@
+"""Held tasks that somebody releases: what is left of them, and what they wait for before it."""
+
+from dataclasses import replace
+
+from mav_tasks.errors import Rejection
+from mav_tasks.tasks.driving.itinerary import goal_of, has_local_place
+from mav_tasks.tasks.driving.legs import leg_of
+from mav_tasks.tasks.driving.way_back import is_off_line
+from mav_tasks.tasks.events import TaskWaits, VehicleNoted
+from mav_tasks.tasks.goal import MoveTurned, Rotate
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.lineup import Lineup, Released
+from mav_tasks.tasks.scheduler import start_blocker
+from mav_tasks.tasks.task import Task, same_frame
+from mav_tasks.tasks.view import VehicleView
+
+R, S = TaskReason, TaskState
+
+#: of a vehicle that restarts: what a release waits for
+OF_RESTART = frozenset({R.VEHICLE_SILENT, R.NO_POSITION})
+
+
+class Releases:
+    """The releases of one vehicle's held tasks; one waits at a time."""
+
+    def __init__(self, lineup: Lineup) -> None:
+        self._lineup = lineup
+
+    def __repr__(self) -> str:
+        return f"Releases({self._lineup.released})"
+
+    def release(
+        self,
+        task: Task,
+        *,
+        again: bool,
+        may_continue: bool,
+        seen: VehicleView,
+        actor: str,
+        now: float,
+    ) -> None:
+        """Let a held task go on from here: all of it again, or its remainder.
+
+        Raise Rejection, and change nothing, while it could not take the vehicle. While the queue is
+        paused, or a vehicle that has restarted is not up yet, the task waits for that, until
+        something halts it. A pause for a restart is over for it if who releases it
+        ``may_continue``.
+        """
+        if self._lineup.is_stopped:
+            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        begun = self._lineup.begun
+        if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
+            words = f"task {begun.id} is {begun.state.name.lower()}"
+            raise Rejection(R.WRONG_STATE, words)
+        waits_for = self._waits_for(task, seen, may_continue=may_continue, now=now)
+        if not waits_for:
+            self._lineup.check_start(seen, goal_of(task), now=now)
+        if not again:
+            self._check_remainder(task, seen)
+        if begun is not None and begun.id != task.id:
+            self._lineup.set_aside(begun.id)
+        if self._lineup.begun is None:
+            self._lineup.aside_ids.pop(task.id, None)
+            self._lineup.executor.adopt(task)
+        self._lineup.of_earlier_run.discard(task.id)
+        if waits_for:
+            until = now + self._lineup.settings.watch.ready_timeout
+            self._lineup.released = Released(task.id, again, may_continue, actor, until, waits_for)
+            self._lineup.book.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
+            return
+        self._begin_released(again=again, actor=actor, now=now)
+
+    def look(self, seen: VehicleView, *, now: float) -> None:
+        """Let a released task begin when the vehicle is up, or hold it as before."""
+        release, task = self._lineup.released, self._lineup.begun
+        if release is None:
+            return
+        if task is None or task.id != release.task_id or task.state is not S.HELD:
+            self._lineup.released = None
+            return
+        waits_for = self._waits_for(task, seen, may_continue=release.may_continue, now=now)
+        if not waits_for:
+            try:
+                self._lineup.check_start(seen, goal_of(task), now=now)
+            except Rejection as refusal:
+                self._note_held(task, refusal.text, now=now)
+            else:
+                self._begin_released(again=release.again, actor=release.actor, now=now)
+        elif now >= release.until and waits_for is not R.QUEUE_PAUSED:
+            self._note_held(task, f"waited too long: {words_of(waits_for)}", now=now)
+        elif waits_for is not release.waits_for:
+            self._lineup.released = replace(release, waits_for=waits_for)
+            self._lineup.book.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
+
+    def _begin_released(self, *, again: bool, actor: str, now: float) -> None:
+        self._lineup.released = None
+        self._lineup.executor.release(again=again, actor=actor, now=now)
+        self._lineup.begun_at = now
+
+    def _waits_for(
+        self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
+    ) -> TaskReason:
+        """Return what a held task waits for that is released, NONE if it can go on."""
+        if self._lineup.paused and not (self._lineup.paused is R.RESTARTED and may_continue):
+            return R.QUEUE_PAUSED
+        return self._waits_for_restart(task, seen, now=now)
+
+    def _waits_for_restart(self, task: Task, seen: VehicleView, *, now: float) -> TaskReason:
+        """Return what a held task waits for, NONE unless the vehicle restarts and is not up."""
+        if task.reason is not R.FRAME_RESET:
+            return R.NONE
+        if seen.heard and seen.is_booting:  # and shows another mode for a moment
+            return R.NO_POSITION
+        goal = goal_of(task)
+        blocker = start_blocker(seen, watch=self._lineup.settings.watch, now=now, goal=goal)
+        return blocker if blocker in OF_RESTART else R.NONE
+
+    def _note_held(self, task: Task, why: str, *, now: float) -> None:
+        self._lineup.released = None
+        words = f"task {task.id} is on hold, release it again: {why}"
+        self._lineup.book.record(VehicleNoted(self._lineup.vehicle, words, now))
+
+    def _check_remainder(self, task: Task, seen: VehicleView) -> None:
+        """What is left must be known: measured along its line, or counted until it was held."""
+        progress = task.progress
+        if task.reason is R.FRAME_RESET and has_local_place(task.goal):
+            words = (
+                f"places of task {task.id} were in a frame that is lost: run it again, or skip it"
+            )
+            raise Rejection(R.WRONG_STATE, words)
+        counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_LINE)
+        if not counts_from_here and seen.motion and is_off_line(task, seen.motion.pose):
+            words = f"off the line of task {task.id}: run it again from here, or skip it"
+            raise Rejection(R.OFF_LINE, words)
+        if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
+            return
+        goal = goal_of(task)
+        leg = leg_of(goal, progress) if isinstance(goal, Rotate | MoveTurned) else None
+        turned = isinstance(leg, Rotate) and abs(leg.angle) > 3.0
+        if turned or not same_frame(progress.frame, seen.frame):
+            words = f"what task {task.id} had done is not known: run it again, or skip it"
+            raise Rejection(R.WRONG_STATE, words)

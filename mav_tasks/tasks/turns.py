@@ -1,0 +1,138 @@
+"""Whose turn it is: which task of a vehicle begins next, what keeps it, and which may interrupt."""
+
+from mav_tasks.tasks.driving.itinerary import goal_of
+from mav_tasks.tasks.events import SERVER, TaskWaits
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.lineup import Lineup
+from mav_tasks.tasks.queue import Rank
+from mav_tasks.tasks.scheduler import outranks, start_blocker
+from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.view import VehicleView
+
+R, S = TaskReason, TaskState
+
+
+class Turns:
+    """The turns of one vehicle's tasks."""
+
+    def __init__(self, lineup: Lineup) -> None:
+        self._lineup = lineup
+        self._blocker = R.NONE  # why the next task does not begin
+        self._blocked: TaskId | None = None  # which task that was
+
+    def __repr__(self) -> str:
+        return f"Turns({self._blocked}, {self._blocker.name})"
+
+    @property
+    def awaits_commit(self) -> bool:
+        """Whether the next task waits for nothing but its submission being durable."""
+        first = None if self._lineup.begun is not None else self._next()
+        return first is not None and not self._lineup.book.is_durable(first)
+
+    def blocker_of(self, task_id: TaskId) -> TaskReason:
+        """Give what keeps the next task, or a begun one, from being driven; NONE for others."""
+        if self._lineup.released is not None and self._lineup.released.task_id == task_id:
+            return self._lineup.released.waits_for
+        begun = self._lineup.begun
+        if begun is not None and begun.id == task_id:
+            return self._lineup.executor.waits_for[0]
+        return self._blocker if self._blocked == task_id else R.NONE
+
+    def words_of_blocker(self, task_id: TaskId) -> str:
+        """Return what the vehicle itself says of what keeps a task from beginning, or ""."""
+        begun = self._lineup.begun
+        return (
+            self._lineup.executor.waits_for[1] if begun is not None and begun.id == task_id else ""
+        )
+
+    def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
+        """Set the running task aside if a waiting one may interrupt it, and could begin."""
+        running = self._lineup.begun
+        if (
+            running is None
+            or self._lineup.paused
+            or not self._lineup.queue
+            or self._lineup.is_held_ahead
+        ):
+            return False
+        if now - self._lineup.begun_at < self._lineup.settings.queueing.preemption_rest:
+            return False
+        for task_id in self._lineup.queue.interrupters():
+            if not self._lineup.book.is_durable(task_id):
+                continue
+            waiting = self._lineup.book[task_id]
+            if self._lineup.room.is_too_late(waiting, now=now):
+                continue
+            if outranks(
+                waiting, running, queueing=self._lineup.settings.queueing
+            ) and not start_blocker(
+                seen,
+                watch=self._lineup.settings.watch,
+                now=now,
+                goal=goal_of(waiting),
+            ):
+                self._lineup.executor.pause(R.PREEMPTED, actor=SERVER, now=now)
+                self._lineup.set_aside(running.id)
+                self._begin(waiting, seen, now=now)
+                return True
+        return False
+
+    def begin_next(self, seen: VehicleView, *, now: float) -> None:
+        """Begin the task whose turn it is, if it can begin."""
+        first = None if self._lineup.begun is not None else self._next()
+        if first is None:
+            return
+        task = self._lineup.book[first]
+        if task.state is S.QUEUED and self._lineup.room.is_too_late(task, now=now):
+            self._lineup.room.handle_deadline(now=now)  # after a delay this may be looked at first
+            self.begin_next(seen, now=now)
+            return
+        blocker = start_blocker(
+            seen, watch=self._lineup.settings.watch, now=now, goal=goal_of(task)
+        )
+        self._note_blocker(first, blocker, now=now)
+        if not blocker and self._lineup.book.is_durable(first):
+            self._begin(task, seen, now=now)
+
+    def _next(self) -> TaskId | None:
+        """The task that has the next turn: the urgent one, a pre-empted one, or a waiting one."""
+        if self._lineup.is_held_ahead:
+            return None
+        if self._lineup.urgent is not None and self._lineup.urgent in self._lineup.queue:
+            return self._lineup.urgent
+        if self._lineup.paused:
+            return None
+        first = self._lineup.queue.first()
+        if not self._lineup.aside_ids:
+            return first
+        resumable = [task for task in self._lineup.aside if task.state is S.PAUSED]
+        if not resumable:
+            return first
+        best = min(resumable, key=self._rank)
+        if first is not None and self._lineup.queue.rank(first) < self._rank(best):
+            return first
+        return best.id
+
+    def _rank(self, task: Task) -> Rank:
+        return self._lineup.room.rank(task)
+
+    def _begin(self, task: Task, seen: VehicleView, *, now: float) -> None:
+        if task.state is S.QUEUED:
+            self._lineup.room.leave(task)
+        else:
+            del self._lineup.aside_ids[task.id]
+        self._lineup.begun_at = now
+        if self._lineup.is_of_another_frame(task, seen):
+            self._lineup.executor.adopt(task)
+            self._lineup.executor.hold(R.FRAME_RESET, now=now)
+        elif self._lineup.led_away.from_line_of(task, seen):
+            self._lineup.executor.adopt(task)
+            self._lineup.executor.hold(R.OFF_LINE, now=now)
+        else:
+            self._lineup.executor.begin(task, actor=SERVER, now=now)
+
+    def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
+        """Keep why the next task does not begin, and tell of it once each time that it changes."""
+        if blocker and (first, blocker) != (self._blocked, self._blocker):
+            self._lineup.book.record(TaskWaits(first, self._lineup.vehicle, blocker, now))
+        self._blocked, self._blocker = first, blocker
