@@ -11,7 +11,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
 
-from mav_tasks.engine.vehicles.control import Event, Grip, Queue, State, Work  # noqa: E402
+from mav_tasks.engine.vehicles.control import Event  # noqa: E402
+from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work  # noqa: E402
 from tests.kit.joint.graph import can_happen, variants  # noqa: E402
 from tests.kit.joint.model import MAKES, happens  # noqa: E402
 

@@ -138,7 +138,7 @@ class ModeRequests:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
-        if vehicle.is_by_hand and not vehicle.motion_rights.is_armed_by_client(now=now):
+        if vehicle.parts.is_by_hand and not vehicle.motion_rights.is_armed_by_client(now=now):
             return  # by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)

@@ -135,7 +135,7 @@ class Plans:
         rights.require(SUBMITTER, "start a plan")
         if vehicle.tasks.paused:
             rights.require(OPERATOR, "start a plan while tasks are paused")
-        if vehicle.armed and vehicle.is_by_hand:
+        if vehicle.armed and vehicle.parts.is_by_hand:
             rights.require(OPERATOR, "end driving by hand")
         for task in (vehicle.tasks.begun, self.task(vehicle)):
             if task is not None and isinstance(task.goal, Plan):

@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable
 
-from mav_tasks.engine.vehicles.control import NOTHING, Driver, Grip, Queue, State, Waits, Work
+from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.services.offboard import Phase

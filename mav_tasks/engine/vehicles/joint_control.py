@@ -9,13 +9,10 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from mav_tasks.engine.vehicles.control import (
-    Event,
-    State,
-    effects_of,
-)
+from mav_tasks.engine.vehicles.control import Event, effects_of
 from mav_tasks.engine.vehicles.facts import client_driving, state_of
 from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
+from mav_tasks.engine.vehicles.joint_state import State
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.errors import Rejection
@@ -92,19 +89,10 @@ class JointControl:
         paused: TaskId | None = self.on(Event.PAUSE, Word(actor=actor), now=now)
         return paused
 
-    def pause_tasks(self, *, now: float) -> None:
-        """Let task and queue stand, and not what else may move the vehicle."""
-        self.on(Event.PAUSE_TASKS, Word(), now=now)
-
     def disarm(self, *, actor: str, now: float) -> None:
         """A client disarms it: nothing arms it again but a word that is newer."""
         word = Word(R.DISARMED, actor, "disarmed by a client")
         self.on(Event.DISARM, word, now=now)
-
-    def operator_lost(self, *, now: float) -> None:
-        """No ground station is heard any more: nothing runs unseen, nor begins."""
-        word = Word(text="no ground station is heard: paused")
-        self.on(Event.OPERATOR_LOST, word, now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
         """Setpoints or an address like ours, not from us: HOLD once, then let go."""
@@ -113,14 +101,8 @@ class JointControl:
 
     def sticks_moved(self, *, now: float) -> None:
         """A person drives by the sticks of a client."""
-        self._stick(Event.DRIVEN_BY_HAND, "driven by hand", now=now)
-
-    def stick_held(self, *, now: float) -> None:
-        """A person holds a stick of the vehicle's transmitter."""
-        self._stick(Event.STICK, "", now=now)
-
-    def _stick(self, event: Event, what: str, *, now: float) -> None:
-        self.on(event, Word(R.TAKEOVER, self._parts.actor, what), now=now)
+        word = Word(R.TAKEOVER, self._parts.actor, "driven by hand")
+        self.on(Event.DRIVEN_BY_HAND, word, now=now)
 
     def check_late(self, *, now: float) -> None:
         """What drove on without us for too long stops, and somebody looks at it first.

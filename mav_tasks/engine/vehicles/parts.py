@@ -79,6 +79,18 @@ class Parts:
         self.authority.withdraw_arming()
         self.tasks.terms.let_arm(may_be_armed=False, now=now)
 
+    def forget_answers(self) -> None:
+        """It has restarted: what it has said of itself may not be so any more."""
+        requests = self.requests
+        requests.ask_which_again()
+        requests.intervals.ask_all_again()
+        requests.loss_failsafe.forget()
+        requests.turning.forget()
+        requests.cruise.forget()
+        self.failsafes = OwnFailsafes()
+        self.where.forget()
+        self.sticks.forget()
+
     def forget_start(self) -> None:
         """The mission that was to begin when it is armed is another one now, or is not wanted."""
         self.start_mark.remove()

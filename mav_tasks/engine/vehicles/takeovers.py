@@ -8,7 +8,7 @@ from mav_tasks.engine.vehicles.authority import Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import BUTTONS, Word
 from mav_tasks.engine.vehicles.joint_control import LATE_REQUESTS, JointControl
-from mav_tasks.engine.vehicles.own_failsafes import News, OwnFailsafes
+from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.services.offboard import Phase
 from mav_tasks.tasks.events import VehicleSeen
@@ -80,10 +80,7 @@ class Takeovers:
         """
         parts = self._parts
         self._shows_restart = True
-        parts.failsafes = OwnFailsafes()
-        parts.where.forget()
-        parts.requests.forget_answers()
-        parts.sticks.forget()
+        parts.forget_answers()
         before = parts.authority.take_disarmed(since=booted_at)
         was_engaged = parts.control.is_engaged
 

@@ -11,6 +11,8 @@ from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
+from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.motion_rights import MotionRights
@@ -129,11 +131,6 @@ class Vehicle:
         return self._monitor.armed
 
     @property
-    def is_by_hand(self) -> bool:
-        """Whether it is in a mode in which a person drives."""
-        return self.parts.is_by_hand
-
-    @property
     def heartbeat(self) -> m.Heartbeat:
         """What it said last."""
         return self._monitor.latest
@@ -215,7 +212,7 @@ class Vehicle:
         elif isinstance(message, m.RcChannels):
             sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
             if self.parts.sticks.look(message, armed=self.armed, sent_at=sent_at):
-                self.joint.stick_held(now=now)
+                self.joint.on(Event.STICK, Word(TaskReason.TAKEOVER, self.parts.actor), now=now)
         elif isinstance(message, m.AutopilotVersion):
             self._says.receive_identity(identity_of(message), now=now)
 

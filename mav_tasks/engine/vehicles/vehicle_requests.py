@@ -205,14 +205,6 @@ class VehicleRequests:
         self.is_identified = False
         self._versions_asked, self._ask_version_at = 0, -inf
 
-    def forget_answers(self) -> None:
-        """It has restarted: what it has said of itself may not be so any more."""
-        self.ask_which_again()
-        self.intervals.ask_all_again()
-        self.loss_failsafe.forget()
-        self.turning.forget()
-        self.cruise.forget()
-
     def next_deadline(self) -> float | None:
         """Give when a command is to be repeated or given up."""
         deadlines = (self._sender.next_deadline(), self._uploader.next_deadline())

@@ -14,6 +14,8 @@ from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.vehicles.agenda import Agenda
+from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
@@ -198,7 +200,7 @@ class VehicleSide:
             if vehicle is None:
                 tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
             else:
-                vehicle.joint.pause_tasks(now=now)
+                vehicle.joint.on(Event.PAUSE_TASKS, Word(), now=now)
 
     def settle(self) -> list[Vehicle]:
         """Look at what became of those to which something was done; gives them."""

@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.vehicles.control import Event, State
+from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
+from mav_tasks.engine.vehicles.joint_state import State
 from tests.kit.joint.model import FREE, happens
 
 LEFT_OPEN: dict[str, Any] = dict.fromkeys(FREE, False)

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 from itertools import product
 from typing import Any
 
-from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event, Grip, Queue, State, Work
+from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event
+from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work
 from tests.kit.joint.model import FREE, MAKES, START, happens, others_do, passes
 
 #: of each event, what its rows ask for that the graph leaves open

@@ -7,19 +7,8 @@ the server really does, in each scenario.
 from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
-from mav_tasks.engine.vehicles.control import (
-    NOTHING,
-    Driver,
-    Effect,
-    Event,
-    Grip,
-    Queue,
-    State,
-    Step,
-    Waits,
-    Work,
-    effects_of,
-)
+from mav_tasks.engine.vehicles.control import Effect, Event, Step, effects_of
+from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
 
 E, F = Event, Effect
 #: by its make: what a PX4 is, and what an ArduPilot is

@@ -5,19 +5,8 @@ from functools import cache
 
 import pytest
 
-from mav_tasks.engine.vehicles.control import (
-    STANDS,
-    TABLE,
-    Driver,
-    Effect,
-    Event,
-    Grip,
-    Queue,
-    State,
-    Step,
-    Work,
-    effects_of,
-)
+from mav_tasks.engine.vehicles.control import STANDS, TABLE, Effect, Event, Step, effects_of
+from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Work
 from tests.kit.joint.graph import PEOPLE, TIME, Graph, variants
 from tests.kit.joint.model import MAKES
 

@@ -1,0 +1,165 @@
+"""What comes in, in the order in which it counts, to whoever sees to it."""
+
+from collections.abc import Iterator, Sequence
+
+from mav_tasks.engine.clients.broadcasts import Broadcasts
+from mav_tasks.engine.clients.displays import Displays
+from mav_tasks.engine.clients.door import Door
+from mav_tasks.engine.clients.flood_gate import FloodGates
+from mav_tasks.engine.clients.gcs_side import GcsSide, Received
+from mav_tasks.engine.clients.operator_watch import OperatorWatch
+from mav_tasks.engine.clients.parameters import MESSAGES as PARAMETER_MESSAGES
+from mav_tasks.engine.clients.parameters import ParameterDesk
+from mav_tasks.engine.clients.publisher import Publisher
+from mav_tasks.engine.clients.restart_watch import RestartWatch
+from mav_tasks.engine.clients.rights import OPERATOR
+from mav_tasks.engine.clients.setup_signing import SetupSigning
+from mav_tasks.engine.commands.asked import AskedByMessage
+from mav_tasks.engine.commands.dispatch import Commands
+from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.ordering import kind_of_message
+from mav_tasks.engine.commands.passing import Passing
+from mav_tasks.engine.inputs import Packets
+from mav_tasks.engine.intake import Intake
+from mav_tasks.engine.missions.mission_desk import MESSAGES, MissionDesks
+from mav_tasks.engine.missions.mission_reports import MissionReports
+from mav_tasks.engine.policy import Kind
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.mavlink import messages as m
+from mav_tasks.services.command_receiver import command_of
+
+
+class Reception:
+    """Takes in what links bring."""
+
+    def __init__(
+        self,
+        *,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        gates: FloodGates,
+        intake: Intake,
+        door: Door,
+        broadcasts: Broadcasts,
+        commands: Commands,
+        modes: ModeRequests,
+        displays: Displays,
+        setup: SetupSigning,
+        desks: MissionDesks,
+        operator: OperatorWatch,
+        parameters: ParameterDesk,
+        passing: Passing,
+        publisher: Publisher,
+        reports: MissionReports,
+    ) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._gates = gates
+        self._intake = intake
+        self._door = door
+        self._broadcasts = broadcasts
+        self._commands = commands
+        self._modes = modes
+        self._displays = displays
+        self._setup = setup
+        self._desks = desks
+        self._operator = operator
+        self._parameters = parameters
+        self._passing = passing
+        self._publisher = publisher
+        self._reports = reports
+        self._restarts = RestartWatch()
+
+    def __repr__(self) -> str:
+        return f"Reception({self._intake!r})"
+
+    def receive(self, items: Sequence[Packets], *, now: float) -> None:
+        """Take in what came at one moment: what makes a rover stand comes first."""
+        received: list[Received] = []
+        for item in items:
+            if self._gcs.owns(item.link):
+                received += self._received(item, now=now)
+        if len(received) > 1:
+            received = self._halts_first(received)
+        for each in received:
+            self._gcs.hear_out(each, now=now)
+            self._receive_from_client(each, now=now)
+        for item in items:
+            if self._vehicles.owns(item.link):
+                self._receive_from_vehicles(item, now=now)
+
+    def _received(self, item: Packets, *, now: float) -> Iterator[Received]:
+        let_in = self._gates.let_in(item, now=now)
+        for peer, packet, measured in self._intake.packets(let_in, self._gcs.counts, now=now):
+            waited = self._vehicles.may_have_waited(now=now) if measured is None else measured
+            received = self._gcs.receive(item.link, peer, packet, waited=waited, now=now)
+            if received is not None:
+                yield received
+
+    def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
+        for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
+            vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
+            if vehicle is not None:
+                if self._restarts.begins_anew(packet, now=now):
+                    self._gcs.continue_numbers(packet)
+                is_ours = self._vehicles.is_answer_to_us(packet)
+                is_withheld = is_ours or packet.message_id == m.CommandAck.id
+                if is_withheld or self._reports.replaces(packet):
+                    self._publisher.withhold(packet)
+                else:
+                    self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
+
+    def _halts_first(self, received: list[Received]) -> list[Received]:
+        """Put what lets a rover go, or drives it, behind what makes one stand.
+
+        All else keeps its order.
+        """
+        if len(received) < 2:
+            return received
+        kinds = [self._kind_of(each.message) for each in received]
+        if Kind.HALT not in kinds or (Kind.GO not in kinds and Kind.MOTION not in kinds):
+            return received
+        goes = [kind in (Kind.GO, Kind.MOTION) for kind in kinds]
+        return [
+            *(each for each, is_last in zip(received, goes, strict=True) if not is_last),
+            *(each for each, is_last in zip(received, goes, strict=True) if is_last),
+        ]
+
+    def _kind_of(self, message: m.Message | None) -> Kind:
+        target = getattr(message, "target_system", 0)
+        vehicle = self._vehicles.look_at(target) if target else next(iter(self._vehicles), None)
+        return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
+
+    def _receive_from_client(self, received: Received, *, now: float) -> None:
+        client, packet, message = received.client, received.packet, received.message
+        if not self._door.may_pass(client, packet, message, now=now):
+            return
+        self._publisher.welcome(client, now=now)
+        for each in self._broadcasts.addressed(received):
+            self._see_to(each, now=now)
+
+    def _see_to(self, received: Received, *, now: float) -> None:
+        client, packet, message = received.client, received.packet, received.message
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            self._commands.receive(client, packet, command_of(message), now=now)
+        elif isinstance(message, m.CommandCancel):
+            self._commands.cancel_latest(client, packet, message, now=now)
+        elif isinstance(message, m.SetMode):
+            vehicle = self._vehicles.get(message.target_system)
+            if vehicle is not None:
+                asked = AskedByMessage.of(client, vehicle, packet, int(message.custom_mode))
+                self._modes.heard(asked, now=now)
+        elif isinstance(message, m.RequestDataStream):
+            self._displays.set_streams(client, message)
+        elif isinstance(message, m.SetupSigning):
+            self._setup.receive(client, message, now=now)
+        elif isinstance(message, MESSAGES) and self._desks.receive(
+            client, packet, message, now=now
+        ):
+            return
+        else:
+            if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
+                self._operator.receive(message, now=now)
+            elif isinstance(message, PARAMETER_MESSAGES):
+                self._parameters.receive(client, packet, message, now=now)
+            self._passing.pass_on(client, packet, message, now=now)
