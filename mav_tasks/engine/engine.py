@@ -196,7 +196,7 @@ class Engine:
                 self._gates.change_link(item)
                 self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
-                (self._gcs if clients else self._vehicles).change_link(item, now=now)
+                (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
             case KeysChanged():
                 gone = self.signatures.change_keys(item)
                 self._vehicles.pause_tasks_of(gone, now=now)
@@ -205,7 +205,7 @@ class Engine:
             case PeerChanged():
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
-                self._vehicles.change_peer(item)
+                self._vehicles.links.change_peer(item)
                 if self._gcs.owns(item.link):
                     self._passing.end(item.link, item.peer, now=now)
             case Congestion():

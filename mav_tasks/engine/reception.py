@@ -85,7 +85,7 @@ class Reception:
             self._gcs.hear_out(each, now=now)
             self._receive_from_client(each, now=now)
         for item in items:
-            if self._vehicles.owns(item.link):
+            if self._vehicles.links.owns(item.link):
                 self._receive_from_vehicles(item, now=now)
 
     def _received(self, item: Packets, *, now: float) -> Iterator[Received]:

@@ -223,7 +223,7 @@ class Commands:
         is_question = row_said(asked.command).kind is Kind.QUESTION
         if is_question and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
-            why_not = self._vehicles.why_not_asked(
+            why_not = self._vehicles.links.why_not_asked(
                 asked.vehicle, asked.client.key, asked.packet, message, now=now
             )
             if why_not is not None:

@@ -5,26 +5,23 @@ changes anything.
 """
 
 from collections import deque
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
-from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.vehicles.agenda import Agenda
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place, Router
-from mav_tasks.services.heartbeat import HeartbeatSender, gcs_heartbeat
+from mav_tasks.services.heartbeat import gcs_heartbeat
 from mav_tasks.services.persona import persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -35,9 +32,8 @@ from mav_tasks.tasks.lifecycle import TaskReason
 NANO = 1e9  # TIMESYNC is in ns
 ASKED = 64  # questions for the time, one a second and link, to which an answer may come
 OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
-MAX_PEERS = 256  # endpoints on one vehicle link
+MOST_NOTES = 256
 MOST_NAMED = 5  # tasks in one text
-BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
 
 #: messages that nobody but a controller of the vehicle sends
 SETPOINTS = frozenset(
@@ -70,14 +66,6 @@ NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
 DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 
 
-@dataclass(slots=True)
-class _Link:
-    is_local: bool
-    capacity: float | None
-    heartbeat: HeartbeatSender
-    outlets: dict[Peer, Outlet] = field(default_factory=dict)
-
-
 class VehicleSide:
     """The vehicles by system id, and the vehicle links."""
 
@@ -91,29 +79,28 @@ class VehicleSide:
         fleet: Fleet,
         settings: Settings,
     ) -> None:
-        self._queue = queue
-        self._packer = packer
         self._signatures = signatures
         self._book = book
         self._fleet = fleet
         self._settings = settings
         self._decoder = Decoder()
-        self._links: dict[str, _Link] = {}
-        self._router = Router()
         self._agenda = Agenda()
         self._old_until = -inf
         self._stood_for = 0.0  # s, that this process stood still before that
         self._noted: set[str] = set()
         self._answer: Packet | None = None  # the last that told the time
         self._asked: deque[int] = deque(maxlen=ASKED)  # what vehicles were asked the time with, ns
-        self._outlets: dict[tuple[str, Peer], Outlet] = {}  # kept: their numbers go on
-        #: heartbeats of a known vehicle's id from another place: when the first one came
-        self._rivals: dict[tuple[int, str, Peer], float] = {}
-        #: where nobody is any more: whoever was there may be back at once, anywhere
-        self._left: set[Place] = set()
         self._vehicles: dict[int, Vehicle] = {}
-        #: by endpoint; made again when a link, a setting or who is where changes
-        self._budgets: dict[Place, LinkBudget] = {}
+        #: the ways to them
+        self.links = VehicleLinks(
+            self._vehicles,
+            queue=queue,
+            packer=packer,
+            signatures=signatures,
+            settings=settings,
+            book=book,
+            note_once=self._note_once,
+        )
 
     def __iter__(self) -> Iterator[Vehicle]:
         """Give every vehicle, to be looked at only."""
@@ -155,28 +142,6 @@ class VehicleSide:
         for tasks in unheard:
             tasks.stop(clear=clear, actor=actor, now=now)
         return [tasks.vehicle for tasks in unheard]
-
-    def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
-        """Return what the way to a vehicle carries, shared with the others behind its endpoint."""
-        place = vehicle.requests.place
-        budget = self._budgets.get(place)
-        if budget is None:
-            link = self._links.get(place[0])
-            budget = self._budgets[place] = LinkBudget(
-                budget=self._settings.clients.telemetry_budget,
-                capacity=None if link is None else link.capacity,
-                vehicles=sum(each.requests.place == place for each in self),
-                now=now,
-            )
-        return budget
-
-    def why_not_asked(
-        self, vehicle: Vehicle, who: Hashable, packet: Packet, message: m.Message, *, now: float
-    ) -> str | None:
-        """Return why an observer's question is too much for a vehicle's link, None if it is not."""
-        budget, place = self.link_budget(vehicle, now=now), vehicle.requests.place
-        is_driven = any(v.tasks.is_driving for v in self if v.requests.place == place)
-        return budget.why_not(who, packet, message, is_driven=is_driven, now=now)
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle with a task of a key that counts no more, whosever task is driven.
@@ -224,43 +189,10 @@ class VehicleSide:
         """What came in on these links."""
         return self._decoder.counts
 
-    def change_link(self, change: LinkChanged, *, now: float) -> None:
-        """Take a link into use, or out of it."""
-        if not change.up:
-            self._links.pop(change.link, None)
-            return
-        link = _Link(change.is_local, change.capacity, HeartbeatSender(now=now))
-        self._budgets.clear()
-        places = [self._router.place_of(vehicle.system_id) for vehicle in self]
-        known = [place[1] for place in places if place is not None and place[0] == change.link]
-        for peer in (*change.peers, *known):
-            link.outlets[peer] = self._outlet(change.link, peer)
-        self._links[change.link] = link
-
-    def change_peer(self, change: PeerChanged) -> None:
-        """Speak to who has come; who is gone may come back from another place."""
-        link, place = self._links.get(change.link), (change.link, change.peer)
-        if link is None:
-            return
-        if not change.up:
-            link.outlets.pop(change.peer, None)
-            self._left.add(place)
-            self._forget_if_empty(place)
-        elif len(link.outlets) < MAX_PEERS:
-            self._left.discard(place)
-            link.outlets[change.peer] = self._outlet(*place)
-            for vehicle in self:
-                if self._router.place_of(vehicle.system_id) == place:
-                    vehicle.comes_anew()
-
-    def owns(self, link: str) -> bool:
-        """Whether a link of this name is a vehicle link."""
-        return link in self._links
-
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
-        self._budgets.clear()
+        self.links.apply(settings)
         for vehicle in self:
             vehicle.apply(settings)
             self._agenda.touch(vehicle)  # its deadlines may be others
@@ -289,10 +221,10 @@ class VehicleSide:
             vehicle = self._meet(link, peer, packet, message, now=now)
             if vehicle is None:
                 return None
-        elif self._router.place_of(vehicle.system_id) != (link, peer) and not (
+        elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
             isinstance(message, m.Heartbeat)
             and packet.component_id == AUTOPILOT
-            and self._moves(vehicle, link, peer, now=now)
+            and self.links.moves(vehicle, link, peer, now=now)
         ):
             return None
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
@@ -333,13 +265,13 @@ class VehicleSide:
 
     def next_deadline(self) -> float:
         """Give when ``handle_deadline`` has something to do; inf: never, as things are."""
-        heartbeats = [link.heartbeat.next_deadline() for link in self._links.values()]
+        heartbeats = [link.heartbeat.next_deadline() for link in self.links]
         return min(self._agenda.next_deadline(), *heartbeats, inf)
 
     def handle_deadline(self, *, now: float) -> None:
         """Send heartbeats and let each vehicle do what is due."""
         source = self.our_address
-        for link in self._links.values():
+        for link in self.links:
             if link.heartbeat.is_due(now=now):
                 question = round(now * NANO)
                 self._asked.append(question)
@@ -356,14 +288,6 @@ class VehicleSide:
         """As whom the server speaks to vehicles."""
         identity = self._settings.identity
         return Address(identity.system_id, identity.component_id)
-
-    def _outlet(self, link: str, peer: Peer) -> Outlet:
-        outlet = self._outlets.get((link, peer))
-        if outlet is None:
-            outlet = self._outlets[link, peer] = Outlet(
-                link, peer, self._queue, self._packer, self._signatures
-            )
-        return outlet
 
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
@@ -386,14 +310,12 @@ class VehicleSide:
                 now=now,
             )
             return None
-        link = self._links[link_name]
-        outlet = link.outlets.get(peer)
-        if outlet is None:
-            if len(link.outlets) >= MAX_PEERS:
-                return None
-            outlet = link.outlets[peer] = self._outlet(link_name, peer)
+        way = self.links.meets(link_name, peer)
+        if way is None:
+            return None
+        outlet, is_new = way
+        if is_new:
             outlet.send(gcs_heartbeat(), self.our_address)
-        self._router.learn(packet.system_id, (link_name, peer))
         vehicle = Vehicle(
             packet.system_id,
             heartbeat=heartbeat,
@@ -402,56 +324,16 @@ class VehicleSide:
             book=self._book,
             tasks=self._fleet.of(packet.system_id),
             settings=self._settings,
-            may_arm=self._may_arm(link),
+            may_arm=self.links.may_arm(link_name),
             now=now,
         )
         self._vehicles[packet.system_id] = vehicle
-        self._budgets.clear()
+        self.links.learn(packet.system_id, (link_name, peer))
         self._agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
         vehicle.joint.step(now)
         return vehicle
-
-    def _may_arm(self, link: _Link) -> bool:
-        arming = self._settings.arming
-        return arming == "server" or (arming == "auto" and link.is_local)
-
-    def _moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
-        """Whether a vehicle that fell silent is back at another place; two are not mixed.
-
-        One that was there while the vehicle itself still was is another one, for good.
-        """
-        rival = vehicle.system_id, link, peer
-        if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
-            del self._rivals[next(iter(self._rivals))]
-        is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
-        old = self._router.place_of(vehicle.system_id)
-        if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
-            words = f"one of this id at {peer} has no key, this one had: ignored"
-            self._note_once(vehicle.system_id, words, now=now)
-            return False
-        if is_another or (old not in self._left and vehicle.is_heard(now=now)):
-            self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
-            return False
-        outlets, may_arm = self._links[link].outlets, self._may_arm(self._links[link])
-        if peer not in outlets and len(outlets) >= MAX_PEERS:
-            return False
-        del self._rivals[rival]
-        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
-        self._router.learn(vehicle.system_id, (link, peer))
-        self._budgets.clear()
-        self._forget_if_empty(old)
-        self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
-        return True
-
-    def _forget_if_empty(self, place: Place | None) -> None:
-        """Keep nothing of a place that was left, unless a vehicle may still come back to it."""
-        if place in self._left and all(
-            self._router.place_of(vehicle.system_id) != place for vehicle in self
-        ):
-            self._left.discard(place)
-            self._outlets.pop(place, None)
 
     def _is_intruder(self, packet: Packet) -> bool:
         return packet.source == self.our_address or packet.message_id in SETPOINTS
@@ -462,13 +344,13 @@ class VehicleSide:
         """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
         target = getattr(message, "target_system", 0)
         for vehicle in self:
-            place = self._router.place_of(vehicle.system_id)
+            place = self.links.router.place_of(vehicle.system_id)
             if target in (0, vehicle.system_id) and place is not None and place[0] == link:
                 self._agenda.touch(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
         key = f"{system_id} {text}"
-        if key not in self._noted and len(self._noted) < MAX_PEERS:
+        if key not in self._noted and len(self._noted) < MOST_NOTES:
             self._noted.add(key)
             self._book.record(VehicleNoted(system_id, text, now))

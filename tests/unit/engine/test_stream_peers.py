@@ -14,7 +14,7 @@ from mav_tasks.engine.inputs import (
     PeerChanged,
 )
 from mav_tasks.engine.intake import MAX_STREAMS, Intake
-from mav_tasks.engine.vehicles.vehicle_side import MAX_PEERS
+from mav_tasks.engine.vehicles.vehicle_links import MAX_PEERS
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import DecodeCounts, Packer

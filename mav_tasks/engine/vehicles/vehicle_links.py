@@ -1,0 +1,196 @@
+"""The ways to vehicles: links, endpoints on them, which vehicle is where, what a link carries."""
+
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.vehicles.link_budget import LinkBudget
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.codec import Packer
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Place, Router
+from mav_tasks.services.heartbeat import HeartbeatSender
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.events import VehicleSeen
+
+MAX_PEERS = 256  # endpoints on one vehicle link
+BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
+
+
+@dataclass(slots=True)
+class Link:
+    """One vehicle link that is in use."""
+
+    is_local: bool
+    capacity: float | None
+    heartbeat: HeartbeatSender
+    outlets: dict[Peer, Outlet] = field(default_factory=dict)
+
+
+class VehicleLinks:
+    """The vehicle links, and the endpoints at which vehicles are."""
+
+    def __init__(
+        self,
+        vehicles: Mapping[int, Vehicle],
+        *,
+        queue: list[Outgoing],
+        packer: Packer,
+        signatures: Signatures,
+        settings: Settings,
+        book: TaskBook,
+        note_once: Callable[..., None],
+    ) -> None:
+        """``vehicles`` are all that were found, by system id; ``note_once`` tells of one, once."""
+        self._all = vehicles
+        self._queue = queue
+        self._packer = packer
+        self._signatures = signatures
+        self._settings = settings
+        self._book = book
+        self._note_once = note_once
+        self._links: dict[str, Link] = {}
+        #: which vehicle is where
+        self.router = Router()
+        self._outlets: dict[Place, Outlet] = {}  # kept: their numbers go on
+        #: heartbeats of a known vehicle's id from another place: when the first one came
+        self._rivals: dict[tuple[int, str, Peer], float] = {}
+        #: where nobody is any more: whoever was there may be back at once, anywhere
+        self._left: set[Place] = set()
+        #: by endpoint; made again when a link, a setting or who is where changes
+        self._budgets: dict[Place, LinkBudget] = {}
+
+    def __repr__(self) -> str:
+        return f"VehicleLinks({list(self._links)})"
+
+    def __iter__(self) -> Iterator[Link]:
+        """Give every link."""
+        return iter(self._links.values())
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        self._budgets.clear()
+
+    def change_link(self, change: LinkChanged, *, now: float) -> None:
+        """Take a link into use, or out of it."""
+        if not change.up:
+            self._links.pop(change.link, None)
+            return
+        link = Link(change.is_local, change.capacity, HeartbeatSender(now=now))
+        self._budgets.clear()
+        places = [self.router.place_of(vehicle.system_id) for vehicle in self._all.values()]
+        known = [place[1] for place in places if place is not None and place[0] == change.link]
+        for peer in (*change.peers, *known):
+            link.outlets[peer] = self._outlet(change.link, peer)
+        self._links[change.link] = link
+
+    def change_peer(self, change: PeerChanged) -> None:
+        """Speak to who has come; who is gone may come back from another place."""
+        link, place = self._links.get(change.link), (change.link, change.peer)
+        if link is None:
+            return
+        if not change.up:
+            link.outlets.pop(change.peer, None)
+            self._left.add(place)
+            self._forget_if_empty(place)
+        elif len(link.outlets) < MAX_PEERS:
+            self._left.discard(place)
+            link.outlets[change.peer] = self._outlet(*place)
+            for vehicle in self._all.values():
+                if self.router.place_of(vehicle.system_id) == place:
+                    vehicle.comes_anew()
+
+    def owns(self, link: str) -> bool:
+        """Whether a link of this name is a vehicle link."""
+        return link in self._links
+
+    def meets(self, link_name: str, peer: Peer) -> tuple[Outlet, bool] | None:
+        """Give the way to somebody new at an endpoint, and whether it is new; None: too many."""
+        link = self._links[link_name]
+        outlet = link.outlets.get(peer)
+        if outlet is not None:
+            return outlet, False
+        if len(link.outlets) >= MAX_PEERS:
+            return None
+        link.outlets[peer] = self._outlet(link_name, peer)
+        return link.outlets[peer], True
+
+    def learn(self, system_id: int, place: Place) -> None:
+        """A vehicle is at a place."""
+        self.router.learn(system_id, place)
+        self._budgets.clear()
+
+    def may_arm(self, name: str) -> bool:
+        """Whether we may arm what is on a link of this name."""
+        arming = self._settings.arming
+        return arming == "server" or (arming == "auto" and self._links[name].is_local)
+
+    def moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
+        """Whether a vehicle that fell silent is back at another place; two are not mixed.
+
+        One that was there while the vehicle itself still was is another one, for good.
+        """
+        rival = vehicle.system_id, link, peer
+        if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
+            del self._rivals[next(iter(self._rivals))]
+        is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
+        old = self.router.place_of(vehicle.system_id)
+        if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
+            words = f"one of this id at {peer} has no key, this one had: ignored"
+            self._note_once(vehicle.system_id, words, now=now)
+            return False
+        if is_another or (old not in self._left and vehicle.is_heard(now=now)):
+            self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
+            return False
+        outlets, may_arm = self._links[link].outlets, self.may_arm(link)
+        if peer not in outlets and len(outlets) >= MAX_PEERS:
+            return False
+        del self._rivals[rival]
+        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
+        self.learn(vehicle.system_id, (link, peer))
+        self._forget_if_empty(old)
+        self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
+        return True
+
+    def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
+        """Return what the way to a vehicle carries, shared with the others behind its endpoint."""
+        place = vehicle.requests.place
+        budget = self._budgets.get(place)
+        if budget is None:
+            link = self._links.get(place[0])
+            budget = self._budgets[place] = LinkBudget(
+                budget=self._settings.clients.telemetry_budget,
+                capacity=None if link is None else link.capacity,
+                vehicles=sum(each.requests.place == place for each in self._all.values()),
+                now=now,
+            )
+        return budget
+
+    def why_not_asked(
+        self, vehicle: Vehicle, who: Hashable, packet: Packet, message: m.Message, *, now: float
+    ) -> str | None:
+        """Return why an observer's question is too much for a vehicle's link, None if it is not."""
+        budget, place = self.link_budget(vehicle, now=now), vehicle.requests.place
+        is_driven = any(v.tasks.is_driving for v in self._all.values() if v.requests.place == place)
+        return budget.why_not(who, packet, message, is_driven=is_driven, now=now)
+
+    def _outlet(self, link: str, peer: Peer) -> Outlet:
+        outlet = self._outlets.get((link, peer))
+        if outlet is None:
+            outlet = self._outlets[link, peer] = Outlet(
+                link, peer, self._queue, self._packer, self._signatures
+            )
+        return outlet
+
+    def _forget_if_empty(self, place: Place | None) -> None:
+        """Keep nothing of a place that was left, unless a vehicle may still come back to it."""
+        if place in self._left and all(
+            self.router.place_of(vehicle.system_id) != place for vehicle in self._all.values()
+        ):
+            self._left.discard(place)
+            self._outlets.pop(place, None)
