@@ -23,6 +23,7 @@ from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.passing import Passing
+from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.inputs import (
@@ -316,7 +317,7 @@ class Engine:
         for vehicle in self._vehicles.settle():
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
-                self._commands.deliver(vehicle, answered, now=now)
+                deliver(self._gcs, vehicle, answered, now=now)
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)

@@ -18,8 +18,6 @@ from mav_tasks.store.codec import MONOTONIC
 from mav_tasks.tasks.events import (
     Event,
     QueuePaused,
-    SignatureRefused,
-    SignaturesSeen,
     SubmissionRefused,
     TaskProgressed,
     TaskSubmitted,
@@ -27,6 +25,7 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
 )
 from mav_tasks.tasks.goal import Goal, Place
+from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.task import Submitter, Task
 
 #: digests, the items of a plan as they came, how many intervals had which length, and times that

@@ -8,9 +8,10 @@ from dataclasses import fields, is_dataclass
 from typing import Any, get_args, get_origin, get_type_hints
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import SignatureTime, VehicleHomeSet
+from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Frame, Task
 
 

@@ -6,11 +6,9 @@ from typing import Any
 from mav_tasks.store.codec import Encoder, dumps
 from mav_tasks.tasks.events import (
     Event,
-    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
-    SignaturesSeen,
     TaskAdvanced,
     TaskChanged,
     TaskModified,
@@ -23,6 +21,7 @@ from mav_tasks.tasks.events import (
     VehicleIdentified,
     VehicleSpeedSet,
 )
+from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
 from mav_tasks.tasks.task import following
 
 

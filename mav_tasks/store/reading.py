@@ -17,7 +17,6 @@ from mav_tasks.store.codec import Decoder, Unreadable, loads
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.schema import check
 from mav_tasks.tasks.events import (
-    SignatureTime,
     TaskAdvanced,
     TaskChanged,
     TaskModified,
@@ -26,6 +25,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
 CHUNK = 1_000  # rows whose JSON is read in one go

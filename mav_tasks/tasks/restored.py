@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mav_tasks.tasks.events import SignatureTime, VehicleHomeSet
+from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
 

@@ -10,9 +10,9 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.engine.engine import Engine
 from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Driving, Settings
-from mav_tasks.tasks.events import ParameterSet
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.server_events import ParameterSet
 from tests.kit.client import FakeClient
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World

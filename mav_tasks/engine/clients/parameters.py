@@ -22,7 +22,7 @@ from mav_tasks.services.param_receiver import HASH_CHECK, name_in
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import ParameterSet
+from mav_tasks.tasks.server_events import ParameterSet
 
 MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
 LIST_EACH = 0.2  # s: one packet asks for many, and no client asks again so soon

@@ -26,7 +26,7 @@ from mav_tasks.mavlink.signing import (
     timestamp_at,
     timestamp_of,
 )
-from mav_tasks.tasks.events import SignatureRefused, SignaturesSeen, SignatureTime
+from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen, SignatureTime
 
 #: who signs nothing, where that is allowed
 UNSIGNED = Key("", b"", fingerprint="-")

@@ -4,9 +4,6 @@ Every command is answered exactly once, from the component that was addressed, t
 asked. What is not ours is forwarded to the vehicle, whose answer comes back through ``deliver``.
 """
 
-from math import isfinite
-from typing import NamedTuple
-
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -14,15 +11,12 @@ from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import (
-    CHANGE_MODE,
     bad,
     becomes_task,
     has_place,
-    reposition_flags,
     whole,
 )
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.commands.ordering import (
     halts_again,
     has_left_before_halt,
@@ -31,13 +25,12 @@ from mav_tasks.engine.commands.ordering import (
     require_newer,
     row_said,
 )
+from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import result_of
-from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.missions.plans import Plans, begins_with
-from mav_tasks.engine.policy import Kind, Row, is_task_command
-from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -45,8 +38,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
-from mav_tasks.services.command_sender import Answered, Standing
-from mav_tasks.settings import ROLES, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import TaskId
@@ -54,14 +46,6 @@ from mav_tasks.tasks.task import TaskId
 R = TaskReason
 
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
-
-
-class _Asker(NamedTuple):
-    """Whose command was forwarded: the endpoint, the address there, and whom it addressed."""
-
-    client: tuple[str, Peer]
-    source: Address
-    answering: Address
 
 
 class Commands:
@@ -214,9 +198,9 @@ class Commands:
             lets_go = row.kind is not Kind.GO and not row.passed_on.passes_under_stop
             if lets_go and not asked.vehicle.tasks.is_stopped:
                 require_newer(asked, now=now)
-            _check_relay(asked, row.passed_on, now=now)
+            check_relay(asked, row.passed_on, now=now)
             self._check_question(asked, now=now)
-            _relay(asked, now=now)
+            relay(asked, now=now)
 
     def _check_question(self, asked: Asked, *, now: float) -> None:
         """Refuse an observer's question that is too much for the link to the rover."""
@@ -283,38 +267,6 @@ class Commands:
                 now=now,
             )
 
-    def deliver(self, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
-        """Bring a vehicle's answer, or its silence, to the client that asked."""
-        asker = answered.origin
-        assert isinstance(asker, _Asker), "only _relay gives commands an origin"
-        is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
-        if is_accepted and answered.command == MavCmd.DO_SET_HOME:
-            actor = f"{asker.source.system_id}/{asker.source.component_id}"
-            vehicle.home_was_set(answered.request, actor=actor, now=now)
-        client = self._gcs.client(asker.client)
-        if client is None:
-            return
-        ack, command = answered.ack, answered.command
-        if ack is not None:
-            # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK
-            result = ack.result if ack.result <= MavResult.CANCELLED else MavResult.UNSUPPORTED
-            if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
-                result = MavResult.UNSUPPORTED  # as some say that they have no such message
-            answer = Answer(command, result, ack.result_param2, asker.answering)
-        elif not answered.was_sent:
-            reason = int(R.RATE_LIMITED)
-            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
-            words = f"command {command}: rover {vehicle.system_id} is busy, ask again"
-            client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
-        elif command == MavCmd.REQUEST_MESSAGE:
-            answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
-        else:
-            reason = int(R.VEHICLE_SILENT)
-            answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
-            words = f"command {command}: no answer from vehicle {vehicle.system_id}"
-            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-        client.answer(answer, asker.source)
-
     # STOP, pause, modes
 
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
@@ -377,36 +329,3 @@ def _check_last_item(asked: Asked) -> None:
     last = whole(asked.command, 2, "last item", high=0xFFFF)
     if last:
         raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)
-
-
-def _check_relay(asked: Asked, row: Row, *, now: float) -> None:
-    """Refuse what would move a stopped vehicle, or drive one that a task drives."""
-    vehicle, command = asked.vehicle, asked.command
-    number, params = command.command, command.params
-    asked.rights.require(row.role, f"send command {number} to a rover")
-    if vehicle.tasks.is_stopped and not row.passes_under_stop:
-        raise Rejection(R.STOPPED, "STOP is latched: continue first")
-    if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
-        vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
-    why_not = why_not_sent(row, vehicle, asked.client.key)
-    if why_not:
-        raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
-    if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
-        raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
-    if row.needs_grant:
-        vehicle.motion_rights.passed(asked.client.key, now=now)
-
-
-def _relay(asked: Asked, *, now: float) -> None:
-    command = asked.command
-    answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
-    asker = _Asker(asked.client.key, asked.packet.source, answering)
-    asked.vehicle.relay(
-        asked.packet,
-        command.message,
-        asker,
-        command=command.command,
-        actor=asked.actor,
-        standing=Standing(asked.client.key, ROLES.index(asked.rights.role)),
-        now=now,
-    )

@@ -27,7 +27,7 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.engine.snapshot import Snapshot
 from mav_tasks.mavlink.signing import Key, timestamp_at
 from mav_tasks.settings import Clients, Queueing, Settings
-from mav_tasks.tasks.events import SignaturesSeen
+from mav_tasks.tasks.server_events import SignaturesSeen
 from tests.kit.client import command_long
 from tests.kit.soak.bounds import containers, too_large
 from tests.kit.soak.mutants import Mutant, Mutants, Sign, badly_signed

@@ -11,9 +11,9 @@ import pytest
 
 from mav_tasks.engine.inputs import KeysChanged, WallClock
 from mav_tasks.mavlink.signing import timestamp_at
-from mav_tasks.tasks.events import SignaturesSeen, SignatureTime
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.server_events import SignaturesSeen, SignatureTime
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World

@@ -13,7 +13,7 @@ import pytest
 from mav_tasks.cli.app import main
 from mav_tasks.store.reading import read_parameters
 from mav_tasks.store.sqlite import SqliteStore
-from mav_tasks.tasks.events import ParameterSet
+from mav_tasks.tasks.server_events import ParameterSet
 
 Result = tuple[int, str, str]
 Run = Callable[..., Result]

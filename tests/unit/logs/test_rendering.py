@@ -16,13 +16,10 @@ from mav_tasks.logs.lines import json_line
 from mav_tasks.logs.rendering import clean, utc_text
 from mav_tasks.tasks.events import (
     Event,
-    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
     ServerStopped,
-    SignatureRefused,
-    SignaturesSeen,
     StepReached,
     SubmissionRefused,
     TaskAdvanced,
@@ -42,6 +39,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.goal import Drive, GlobalPlace, Goal, GoTo, Move, Plan, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.server_events import ParameterSet, SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.task import Frame, Marks, Pose, Progress, Task, TaskId, Terms
 from mav_tasks.tasks.timing import Timing
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE

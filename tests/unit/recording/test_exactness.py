@@ -39,9 +39,10 @@ from mav_tasks.recording.surroundings import (
 )
 from mav_tasks.settings import Clients, Retention, Settings
 from mav_tasks.store.codec import Decoder
-from mav_tasks.tasks.events import ParameterSet, ServerStopped, VehicleHomeSet, VehicleSeen
+from mav_tasks.tasks.events import ServerStopped, VehicleHomeSet, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Frame, Pose, Progress, Task, TaskId, Terms
 from tests.unit.tasks.samples import draft
 

@@ -13,7 +13,6 @@ from mav_tasks.store.schema import APPLICATION_ID, MIGRATIONS, migrate
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
-    ParameterSet,
     PlanStored,
     QueueContinued,
     QueuePaused,
@@ -27,6 +26,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import MAX_TASK_ID, Frame, Pose, Progress, TaskId, Terms
 from tests.unit.store.samples import (
     OFFSET,

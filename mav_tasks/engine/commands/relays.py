@@ -1,0 +1,96 @@
+"""Commands of clients that are the vehicle's own affair: passed on, their answers brought back."""
+
+from math import isfinite
+from typing import NamedTuple
+
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
+from mav_tasks.engine.commands.motion_gate import why_not_sent
+from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.policy import Row
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.services.command_receiver import Answer
+from mav_tasks.services.command_sender import Answered, Standing
+from mav_tasks.settings import ROLES
+from mav_tasks.tasks.lifecycle import TaskReason
+
+R = TaskReason
+
+
+class _Asker(NamedTuple):
+    """Whose command was forwarded: the endpoint, the address there, and whom it addressed."""
+
+    client: tuple[str, Peer]
+    source: Address
+    answering: Address
+
+
+def check_relay(asked: Asked, row: Row, *, now: float) -> None:
+    """Refuse what would move a stopped vehicle, or drive one that a task drives."""
+    vehicle, command = asked.vehicle, asked.command
+    number, params = command.command, command.params
+    asked.rights.require(row.role, f"send command {number} to a rover")
+    if vehicle.tasks.is_stopped and not row.passes_under_stop:
+        raise Rejection(R.STOPPED, "STOP is latched: continue first")
+    if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
+        vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
+    why_not = why_not_sent(row, vehicle, asked.client.key)
+    if why_not:
+        raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
+    if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
+        raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
+    if row.needs_grant:
+        vehicle.motion_rights.passed(asked.client.key, now=now)
+
+
+def relay(asked: Asked, *, now: float) -> None:
+    """Pass a command on; ``deliver`` brings its answer to who asked."""
+    command = asked.command
+    answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
+    asker = _Asker(asked.client.key, asked.packet.source, answering)
+    asked.vehicle.relay(
+        asked.packet,
+        command.message,
+        asker,
+        command=command.command,
+        actor=asked.actor,
+        standing=Standing(asked.client.key, ROLES.index(asked.rights.role)),
+        now=now,
+    )
+
+
+def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
+    """Bring a vehicle's answer, or its silence, to the client that asked."""
+    asker = answered.origin
+    assert isinstance(asker, _Asker), "only relay gives commands an origin"
+    is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
+    if is_accepted and answered.command == MavCmd.DO_SET_HOME:
+        actor = f"{asker.source.system_id}/{asker.source.component_id}"
+        vehicle.home_was_set(answered.request, actor=actor, now=now)
+    client = gcs.client(asker.client)
+    if client is None:
+        return
+    ack, command = answered.ack, answered.command
+    if ack is not None:
+        # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK
+        result = ack.result if ack.result <= MavResult.CANCELLED else MavResult.UNSUPPORTED
+        if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
+            result = MavResult.UNSUPPORTED  # as some say that they have no such message
+        answer = Answer(command, result, ack.result_param2, asker.answering)
+    elif not answered.was_sent:
+        reason = int(R.RATE_LIMITED)
+        answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
+        words = f"command {command}: rover {vehicle.system_id} is busy, ask again"
+        client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+    elif command == MavCmd.REQUEST_MESSAGE:
+        answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
+    else:
+        reason = int(R.VEHICLE_SILENT)
+        answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
+        words = f"command {command}: no answer from vehicle {vehicle.system_id}"
+        client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+    client.answer(answer, asker.source)
