@@ -193,15 +193,16 @@ class VehicleTasks(Lineup):
         """Let a plan that is not over go on, or begin, with another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
         if self.begun is not None and self.begun.id == task.id:
-            self.executor.skip_to(step, now=now)
+            self.executor.drive.skip_to(self.begun, step, now=now)
         else:
             progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
             self.book.advance(task.id, progress, now=now)
 
     def rest(self, seen: VehicleView, *, now: float) -> None:
         """The server ends, and the vehicle was stopped for it: what it has rolled counts."""
-        if seen.motion is not None:
-            self.executor.rest(seen.motion, now=now)
+        begun = self.begun
+        if seen.motion is not None and begun is not None and begun.state is S.PAUSED:
+            self.executor.drive.rest(begun, seen.motion, now=now)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
         """Set the speed of the task that runs, and of those to come; gives the one that runs."""

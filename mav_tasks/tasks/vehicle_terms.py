@@ -55,7 +55,7 @@ class VehicleTerms:
 
     def _apply_driving(self) -> None:
         self._executor.apply(replace(self._settings, driving=self.driving))
-        self._executor.cruise = self._cruise if self._speed is None else None
+        self._executor.drive.cruise = self._cruise if self._speed is None else None
 
     @property
     def driving(self) -> Driving:

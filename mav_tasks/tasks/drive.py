@@ -1,0 +1,340 @@
+"""Drives the begun task of a vehicle while it is EXECUTING: course, arrival, fence, mishaps.
+
+It changes no state: what is to become of the task is the outcome, for the executor to record.
+"""
+
+from dataclasses import replace
+from math import copysign
+from typing import NamedTuple
+
+from mav_tasks.settings import Driving, Settings
+from mav_tasks.tasks import view
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.driving.arrival import Arrival
+from mav_tasks.tasks.driving.astray import AstrayWatch
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.course import Course
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
+from mav_tasks.tasks.driving.itinerary import following, is_over, present_goal, skipped_to
+from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.driving.limits import limited, within_fence
+from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.stage import (
+    course_of,
+    look_on_the_way,
+    may_go_on_rolling,
+    set_out,
+    steering_of,
+)
+from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
+from mav_tasks.tasks.driving.way_back import way_back
+from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.task import Progress, Task
+from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
+
+S, R = TaskState, TaskReason
+
+#: times that a vehicle may drive past a place that its turning circle keeps it from
+MISSES = 3
+KEEP_EACH = 1.0  # s between two writes of the progress of a task that is being driven
+
+
+class Becomes(NamedTuple):
+    """What is to become of the task that is driven."""
+
+    state: TaskState
+    reason: TaskReason = R.NONE
+
+
+class Drive:
+    """The drive of one vehicle's begun task; it begins anew with each EXECUTING."""
+
+    def __init__(self, book: TaskBook, settings: Settings, bounds: Bounds) -> None:
+        self._book = book
+        self._bounds = bounds
+        self._settings = settings
+        #: m/s, of tasks that are driven as the vehicle itself would; None: as the settings say
+        self.cruise: float | None = None
+        self._course: Course | None = None
+        self._way_back: Course | None = None  # driven before it
+        self._last_velocity = ZERO
+        self._moved_at = 0.0  # when a velocity other than zero was last asked for
+        self._stuck = StuckWatch()
+        self._follows = Follows()
+        self._astray = AstrayWatch()
+        self._arrival = Arrival()
+        self._is_coming_back = False  # from outside the fence
+        self._kept_at = 0.0  # when progress was last given to the store
+        self._kept_as = 0  # the number of that event
+
+    def __repr__(self) -> str:
+        return f"Drive({self._course!r}, {self._last_velocity})"
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+
+    def forget(self) -> None:
+        """Another task takes the place of this one."""
+        self._course = self._way_back = None
+
+    def entered(self, *, now: float) -> None:
+        """The task has changed its state: its progress was kept with that."""
+        self._kept_at = now
+
+    def set_speed(self, speed: float | None) -> None:
+        """Drive at this speed from now on, m/s; None: as the task says itself."""
+        if self._course is not None:
+            self._course.progress = replace(self._course.progress, speed=speed)
+
+    def limit(self, demand: Demand, *, elapsed: float, now: float) -> Demand:
+        """Give a demand as the vehicle may be asked for it, by what it was asked for before."""
+        if demand.kind is not DemandKind.DRIVE:
+            self._last_velocity = ZERO
+            return demand
+        self._last_velocity = limited(
+            demand.velocity, self._last_velocity, driving=self._settings.driving, elapsed=elapsed
+        )
+        if not self._last_velocity.is_zero:
+            self._moved_at = now
+        self._astray.commanded(self._last_velocity)
+        self._stuck.commanded(self._last_velocity, seconds=self._settings.watch.setpoint_period)
+        return Demand(DemandKind.DRIVE, self._last_velocity)
+
+    def begin(
+        self, task: Task, seen: VehicleView, motion: Motion, *, now: float
+    ) -> Progress | Becomes:
+        """Set the course of a task that starts, or goes on, where the vehicle stands."""
+        here = self._set_out(task, task.progress, seen, motion, now=now)
+        if isinstance(here, Becomes):
+            return here
+        self._way_back, self._astray = None, AstrayWatch()
+        if task.progress.anchor is not None:
+            self._way_back = way_back(
+                present_goal(task.goal, here),
+                here,
+                motion,
+                honours_yaw_rate=seen.honours_yaw_rate,
+                steering=steering_of(seen, self._bounds),
+            )
+        return here
+
+    def _set_out(
+        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
+    ) -> Progress | Becomes:
+        """Set the course of a stage that begins here, if it can."""
+        steering = steering_of(seen, self._bounds)
+        if steering is not None and isinstance(
+            present_goal(task.goal, progress), Rotate | Face | MoveTurned
+        ):
+            return Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
+        here = set_out(task.goal, progress, seen, motion, steering=steering)
+        if here is None:
+            return Becomes(S.PAUSED, R.POSITION_LOST)
+        longest = self._settings.driving.max_distance
+        if here.target is not None and distance(motion.pose, here.target) > longest:
+            return Becomes(S.FAILED, R.BAD_PARAMETER)
+        if not self._bounds.allows_stage(
+            present_goal(task.goal, here), here, motion.pose, seen.origin
+        ):
+            return _refused(task)
+        self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
+        driving = self._settings.driving
+        self._course = course_of(task.goal, here, seen, driving=driving, steering=steering)
+        self._begin_leg(now=now)
+        return here
+
+    def go_on(
+        self,
+        task: Task,
+        seen: VehicleView,
+        motion: Motion,
+        *,
+        executed: float,
+        elapsed: float,
+        now: float,
+    ) -> Demand | Becomes:
+        """Drive on in this tick; ``executed`` are the s of EXECUTING so far."""
+        if self._course is None:  # another step is gone on with
+            steering = steering_of(seen, self._bounds)
+            if not seen.still and not may_go_on_rolling(
+                task.goal, task.progress, seen, motion, steering=steering
+            ):
+                return view.STAND
+            stopped = self._go_on(task, task.progress, seen, motion, now=now)
+            if stopped is not None:
+                return stopped
+        course = self._way_back or self._course
+        assert course is not None, "EXECUTING begins by setting the course"
+        is_held_back = not self._book.is_durable(task.id)
+        elapsed = 0.0 if is_held_back else elapsed
+        course.look(motion, elapsed=elapsed)
+        if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
+            self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
+            if course.has_passed(motion):
+                after = self._leave_step(task, task.goal, now=now)
+                if isinstance(after, Becomes):
+                    return after
+                self._book.note_progress(task.id, after)
+                self._course = None
+                return Demand(DemandKind.DRIVE, self._last_velocity)
+        self._note_progress(task, executed, now=now)
+        stands = seen.still and self._has_asked_to_stand(now)
+        if self._arrival.stands_here(
+            course,
+            motion,
+            self._last_velocity,
+            stands=stands,
+            driving=self._settings.driving,
+            now=now,
+        ):
+            arrives = stands or isinstance(course.leg, Wait)
+            end = self._arrive(task, course, seen, motion, now) if arrives else None
+            return end or view.STAND
+        if is_held_back:
+            self._stuck.begin(now=now)
+            return view.STAND
+        if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
+            return Becomes(S.FAILED, R.STUCK)
+        period = self._settings.watch.setpoint_period
+        news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
+        if news:
+            self._book.record(VehicleNoted(task.vehicle, news, now))
+        if self._astray.is_astray(course, motion):
+            words = "does not go where it is told to: is its heading right?"
+            self._book.record(VehicleNoted(task.vehicle, words, now))
+            return Becomes(S.HELD, R.OFF_LINE)
+        speed = None if course is self._way_back else course.progress.speed
+        driving, slowest = self._driving_of(task), self._arrival.slowest(course)
+        wish = course.steer(motion, driving=driving, speed=speed, slowest=slowest)
+        top = task.terms.top_speed
+        if top is not None and abs(wish.forward) > top:
+            wish = replace(wish, forward=copysign(top, wish.forward))
+        velocity = self._within_fence(course, wish, motion, seen, now=now)
+        if velocity is None:
+            return Becomes(S.HELD, R.FENCE)
+        return Demand(DemandKind.DRIVE, velocity)
+
+    def _driving_of(self, task: Task) -> Driving:
+        """Return the settings for a task: of a stock client's the speed is the vehicle's own."""
+        driving = self._settings.driving
+        if self.cruise is None or not task.terms.is_cruising:
+            return driving
+        return replace(driving, speed=min(self.cruise, driving.max_speed))
+
+    def _begin_leg(self, *, now: float) -> None:
+        self._stuck.begin(now=now)
+        self._astray.begin_leg()
+        self._follows.begin()
+        self._arrival.begin_leg()
+
+    def _within_fence(
+        self, course: Course, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
+    ) -> Velocity | None:
+        """Slow down before the fence; None: stop. A vehicle that began outside may come back in."""
+        if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
+            self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
+            if self._is_coming_back:
+                return wish
+        fence = self._bounds.local(seen.origin)
+        return within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
+
+    def _arrive(
+        self, task: Task, course: Course, seen: VehicleView, motion: Motion, now: float
+    ) -> Becomes | None:
+        """The end of a leg: the next one, the next step, back to the task itself, or all done."""
+        self._begin_leg(now=now)
+        if course.advance(motion):
+            if (course.by_course or course.steering) and course.misses > MISSES:
+                return Becomes(S.FAILED, R.STUCK)
+            if course is self._course:
+                self._book.advance(task.id, course.progress, now=now)
+        elif course is self._way_back:
+            self._way_back = None
+        elif not isinstance(task.goal, Plan):
+            return Becomes(S.COMPLETED)
+        elif not (is_over(task.goal, course.progress) and course.progress.pending):
+            after = self._leave_step(task, task.goal, now=now)
+            if isinstance(after, Becomes):
+                return after
+            return self._go_on(task, after, seen, motion, now=now)
+        return None
+
+    def skip_to(self, task: Task, step: int, *, now: float) -> None:
+        """Go on with another step of a plan; at once, if it is being driven."""
+        assert isinstance(task.goal, Plan), "only plans have steps"
+        progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
+        self._course = self._way_back = None
+        self._book.advance(task.id, progress, now=now)
+
+    def _look_on_the_way(
+        self,
+        task: Task,
+        plan: Plan,
+        course: Course,
+        motion: Motion,
+        *,
+        elapsed: float,
+        now: float,
+    ) -> None:
+        if not course.progress.pending:
+            return
+        target = course.progress.target
+        to_place = None if target is None else distance(motion.pose, target)
+        looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
+        course.progress = looked.progress
+        for step in looked.done:
+            self._book.reached(task.id, step, performs=step in looked.performed, now=now)
+        if looked.done:
+            self._book.advance(task.id, course.progress, now=now)
+
+    def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
+        """A step is done; gives the progress of the next one, unless the plan is over."""
+        assert self._course is not None, "a step is driven on its course"
+        progress = self._course.progress
+        if not is_over(plan, progress):
+            self._book.reached(task.id, progress.step, performs=False, now=now)
+        left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
+        after = following(plan, replace(progress, pending=left))  # nearer than here it will not be
+        return Becomes(S.COMPLETED) if after is None else after
+
+    def _go_on(
+        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
+    ) -> Becomes | None:
+        """Begin the next step where the vehicle is, moving or not; gives why it does not."""
+        self._book.note_progress(task.id, progress)  # whatever becomes of it: the last one is done
+        here = self._set_out(task, progress, seen, motion, now=now)
+        if isinstance(here, Becomes):
+            return here
+        self._book.advance(task.id, here, now=now)
+        return None
+
+    def _has_asked_to_stand(self, now: float) -> bool:
+        """Whether zeros have been asked for long enough to call slowness a standstill."""
+        return now - self._moved_at >= self._settings.watch.still_time
+
+    def _note_progress(self, task: Task, executed: float, *, now: float) -> None:
+        assert self._course is not None
+        self._course.progress = replace(self._course.progress, execution_time=executed)
+        self._book.note_progress(task.id, self._course.progress)
+        is_written = self._book.durable >= self._kept_as  # a store that is away is not piled up on
+        if now - self._kept_at >= KEEP_EACH and is_written:
+            self._book.keep_progress(task.id, now=now)
+            self._kept_at, self._kept_as = now, self._book.recorded
+
+    def rest(self, task: Task, motion: Motion, *, now: float) -> None:
+        """Count what the vehicle has rolled since the task was paused: it stands here."""
+        course = self._course
+        if course is None or self._way_back:
+            return
+        course.look(motion, elapsed=0.0)
+        self._book.advance(task.id, course.progress, now=now)
+
+
+def _refused(task: Task) -> Becomes:
+    """The way leads over the fence: nothing of it is driven."""
+    if task.progress.anchor is None and task.progress.step < 0:
+        return Becomes(S.FAILED, R.OUTSIDE_FENCE)
+    return Becomes(S.HELD, R.FENCE)
