@@ -238,7 +238,7 @@ class Engine:
             self._submissions.next_deadline(),
             self._desks.next_deadline(),
             self._reports.next_deadline(),
-            self._fleet.room.next_deadline(),
+            self._fleet.room.times.next_deadline(),
             self._operator.next_deadline(limit=self._settings.watch.operator_lost),
             self.signatures.next_deadline(),
             None if self._stopped else self._stop_by,

@@ -140,7 +140,7 @@ class Lineup:
 
     def start_time(self, task: Task) -> float:
         """Give the monotonic time before which a task does not begin; -inf without one."""
-        return self.room.due_at(task)
+        return self.room.times.start(task.terms)
 
     def timing_of(self, task: Task) -> Timing | None:
         """Give how evenly a task's setpoints have left, None if it was not driven."""

@@ -7,6 +7,7 @@ from mav_tasks.tasks.lineup import Lineup
 from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.scheduler import outranks, start_blocker
 from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.times import is_too_late
 from mav_tasks.tasks.view import VehicleView
 
 R, S = TaskReason, TaskState
@@ -61,7 +62,7 @@ class Turns:
             if not self._lineup.book.is_durable(task_id):
                 continue
             waiting = self._lineup.book[task_id]
-            if self._lineup.room.is_too_late(waiting, now=now):
+            if is_too_late(waiting, now=now):
                 continue
             if outranks(
                 waiting, running, queueing=self._lineup.settings.queueing
@@ -83,7 +84,7 @@ class Turns:
         if first is None:
             return
         task = self._lineup.book[first]
-        if task.state is S.QUEUED and self._lineup.room.is_too_late(task, now=now):
+        if task.state is S.QUEUED and is_too_late(task, now=now):
             self._lineup.room.handle_deadline(now=now)  # after a delay this may be looked at first
             self.begin_next(seen, now=now)
             return

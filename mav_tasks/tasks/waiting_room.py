@@ -7,16 +7,16 @@ as the most urgent of them, directly or through others again.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from heapq import heappop, heappush
-from math import inf
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.dependencies import Dependencies
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState
 from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, full, rank_of
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.times import Times
 
 R, S = TaskReason, TaskState
 
@@ -40,10 +40,9 @@ class WaitingRoom:
         self._queues: dict[int, TaskQueue] = {}
         self._of_vehicle: dict[int, int] = {}  # how many wait
         self._of_owner: dict[str, int] = {}
-        self._dependents: dict[TaskId, dict[TaskId, None]] = {}
-        self._starts: list[tuple[float, TaskId]] = []  # heaps; entries out of date are passed over
-        self._deadlines: list[tuple[float, TaskId]] = []
-        self._wall_offset = 0.0
+        self._dependencies = Dependencies(book)
+        #: when each may begin, and until when
+        self.times = Times()
         self._woken: set[int] = set()
 
     def __repr__(self) -> str:
@@ -73,29 +72,23 @@ class WaitingRoom:
         ready = self.queue(vehicle).in_order()
         if len(ready) == self.count(vehicle):
             return ready
+
+        def due_or_rank(task_id: TaskId) -> tuple[float, Rank]:
+            return self.times.start(self._book[task_id].terms), self._waiters[task_id].rank
+
         others = [
             task_id
             for task_id in self._waiters
             if self._book[task_id].vehicle == vehicle and task_id not in self.queue(vehicle)
         ]
-        return ready + sorted(others, key=self._due_or_rank)
+        return ready + sorted(others, key=due_or_rank)
 
     def rank(self, task: Task) -> Rank:
         """Give a task's rank among those that are ready; of a begun one, as if it were."""
         waiter = self._waiters.get(task.id)
         if waiter is not None:
             return waiter.rank
-        return self._most_urgent(task.id, self._own_rank(task, task.submitted_at))
-
-    def due_at(self, task: Task) -> float:
-        """Give the monotonic time before which a task does not begin; -inf without one."""
-        return self._due_by(task.terms)
-
-    def _due_by(self, terms: Terms) -> float:
-        if terms.start_utc is None and terms.start_at is None:  # as nearly always
-            return -inf
-        from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
-        return max(from_utc, -inf if terms.start_at is None else terms.start_at)
+        return self._most_urgent(task.id, _own_rank(self._settings, task, task.submitted_at))
 
     def take_woken(self) -> set[int]:
         """Give the vehicles whose queues have got a task since the last call."""
@@ -106,8 +99,12 @@ class WaitingRoom:
 
     def submit(self, draft: Draft, *, now: float) -> Task:
         """Take a new task in; Rejection when there is no room, or nothing to run after."""
-        self._check_room(draft)
-        self._check_dependency(draft.terms.after)
+        queueing = self._settings.queueing
+        if self.count(draft.vehicle) >= queueing.capacity:
+            raise full(queueing.capacity)
+        if self.count_of(draft.submitter) >= queueing.quota:
+            raise Rejection(R.QUOTA, f"quota: {queueing.quota} tasks of this client wait")
+        self._dependencies.check(draft.terms.after)
         state = self._state_by(draft.terms, now=now)
         task = self._book.submit(draft, state=state, now=now)
         self._enter(task, now=now)
@@ -119,7 +116,7 @@ class WaitingRoom:
         """Take in the waiting ones of an earlier run's tasks, as they were."""
         waiting = [task for task in tasks if task.state in WAITING]
         for task in waiting:
-            due = self.due_at(task)
+            due = self.times.start(task.terms)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
             self._enter(task, now=came_at)
         ready: dict[int, list[Entry]] = {}
@@ -134,55 +131,22 @@ class WaitingRoom:
         for task in others:
             if task.id not in self._waiters or task.id in self.queue(task.vehicle):
                 continue
-            if self._has_failed_dependency(task):  # the end of it was kept, what follows was not
+            if self._dependencies.have_failed(task):  # the end of it was kept, what follows was not
                 self._fail(task.id, now=now)
                 self.ended(task.id, now=now)
             else:
                 self._settle(task, now=now)
 
-    def _check_room(self, draft: Draft) -> None:
-        queueing = self._settings.queueing
-        if self.count(draft.vehicle) >= queueing.capacity:
-            raise full(queueing.capacity)
-        if self.count_of(draft.submitter) >= queueing.quota:
-            words = f"quota: {queueing.quota} tasks of this client wait"
-            raise Rejection(R.QUOTA, words)
-
-    def _check_dependency(self, after: int) -> None:
-        if not after:
-            return
-        task = self._book.get(after)
-        if task is None:
-            raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
-        if task.state in TERMINAL and task.state is not S.COMPLETED:
-            words = f"run after {after}: it is over, {task.state.name.lower()}"
-            raise Rejection(R.DEPENDENCY_FAILED, words)
-
     def _enter(self, task: Task, *, now: float) -> None:
-        own = self._own_rank(task, now)
+        own = _own_rank(self._settings, task, now)
         self._waiters[task.id] = _Waiter(now, own, own)
         self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
         owner = task.submitter.owner
         self._of_owner[owner] = self._of_owner.get(owner, 0) + 1
-        self._note_times(task)
-        if task.terms.after:
-            self._dependents.setdefault(TaskId(task.terms.after), {})[task.id] = None
-        if task.terms.after or task.id in self._dependents:  # after a modification, in any order
+        self.times.note(task)
+        self._dependencies.add(task.id, task.terms.after)
+        if task.terms.after or task.id in self._dependencies:  # after a modification, in any order
             self._lift(task.id)
-
-    def _note_times(self, task: Task) -> None:
-        due = self.due_at(task)
-        if due > -inf:
-            heappush(self._starts, (due, task.id))
-        if task.terms.deadline is not None:
-            heappush(self._deadlines, (task.terms.deadline, task.id))
-
-    def _own_rank(self, task: Task, came_at: float) -> Rank:
-        aging = self._settings.queueing.aging
-        return rank_of(task.priority, came_at=came_at, task_id=task.id, aging=aging)
-
-    def _due_or_rank(self, task_id: TaskId) -> tuple[float, Rank]:
-        return self.due_at(self._book[task_id]), self._waiters[task_id].rank
 
     # going on
 
@@ -191,7 +155,7 @@ class WaitingRoom:
         wanted = self._state_by(task.terms, now=now)
         if task.state is S.SCHEDULED and wanted is not S.SCHEDULED:
             waiter = self._waiters[task.id]
-            waiter.came_at = max(waiter.came_at, self.due_at(task))
+            waiter.came_at = max(waiter.came_at, self.times.start(task.terms))
             self._rerank(task)
         if task.state is not wanted:
             task = self._book.change(task.id, wanted, reason=R.NONE, actor=SERVER, now=now)
@@ -210,75 +174,46 @@ class WaitingRoom:
         return Entry(task.id, rank, task.priority, task.terms.is_preemptive)
 
     def _state_by(self, terms: Terms, *, now: float) -> TaskState:
-        if self._due_by(terms) > now:
+        if self.times.start(terms) > now:
             return S.SCHEDULED
-        is_blocked = terms.is_staged or self._is_waited_for(terms.after)
+        is_blocked = terms.is_staged or self._dependencies.is_waited_for(terms.after)
         return S.BLOCKED if is_blocked else S.QUEUED
-
-    def _is_waited_for(self, after: int) -> bool:
-        """Whether a task that others run after is still to complete."""
-        task = self._book.get(after) if after else None
-        return task is not None and task.state not in TERMINAL
-
-    def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do; inf: never, as things are."""
-        first_start = self._starts[0][0] if self._starts else inf
-        return min(first_start, self._deadlines[0][0] if self._deadlines else inf)
-
-    def is_too_late(self, task: Task, *, now: float) -> bool:
-        """Whether a waiting task must not begin any more."""
-        return task.terms.deadline is not None and task.terms.deadline <= now
 
     def handle_deadline(self, *, now: float) -> None:
         """Let go on whose time has come, and end whose time is over."""
-        while self._deadlines and self._deadlines[0][0] <= now:
-            at, task_id = heappop(self._deadlines)
+        for at, task_id in self.times.take_over(now=now):
             task = self._waiting(task_id)
             if task is not None and task.terms.deadline == at:  # not modified since
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
-        while self._starts and self._starts[0][0] <= now:
-            _, task_id = heappop(self._starts)
+        for task_id in self.times.take_starts(now=now):
             task = self._waiting(task_id)
             if task is not None:
                 self._settle(task, now=now)
 
     def set_wall_offset(self, offset: float, *, now: float) -> None:
         """UTC = monotonic time + offset from now on: moves what starts at a UTC time."""
-        self._wall_offset = offset
-        self._starts.clear()
-        for task_id in self._waiters:
-            due = self.due_at(self._book[task_id])
-            if due > -inf:
-                heappush(self._starts, (due, task_id))
-        for task in [self._book[task_id] for task_id in self._waiters]:
+        waiting = [self._book[task_id] for task_id in self._waiters]
+        self.times.set_wall_offset(offset, waiting)
+        for task in waiting:
             if task.terms.start_utc is not None:
                 self._settle(task, now=now)
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change the terms of a waiting task; Rejection when it would wait for itself."""
         if terms.after != task.terms.after:
-            self._check_dependency(terms.after)
-            self._check_cycle(task, terms.after)
+            self._dependencies.check(terms.after)
+            self._dependencies.check_cycle(task, terms.after)
         before = task.terms.after
         if task.terms.is_staged and not terms.is_staged:
             self._waiters[task.id].came_at = now  # it has not waited for the others until now
         task = self._book.modify(task.id, terms, actor=actor, now=now)
-        self._note_times(task)
+        self.times.note(task)
         if before != terms.after:
-            self._forget_dependent(task.id, before)
-            if terms.after:
-                self._dependents.setdefault(TaskId(terms.after), {})[task.id] = None
+            self._part(task.id, before)
+            self._dependencies.add(task.id, terms.after)
         self._rerank(task)
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
-
-    def _check_cycle(self, task: Task, after: int) -> None:
-        seen: int = after
-        while seen:
-            if seen == task.id:
-                raise Rejection(R.CYCLE, f"run after {after}: they would wait for each other")
-            ahead = self._book.get(seen)
-            seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
 
     # leaving
 
@@ -293,7 +228,7 @@ class WaitingRoom:
             self._of_owner[owner] = left
         else:
             del self._of_owner[owner]
-        self._forget_dependent(task.id, task.terms.after)
+        self._part(task.id, task.terms.after)
         self._woken.add(task.vehicle)
 
     def end(
@@ -308,7 +243,7 @@ class WaitingRoom:
         """Take back a submission that did not become durable, and what waits for it."""
         self.leave(task)
         self._book.withdraw(task.id, now=now)
-        for dependent in self._dependents.pop(task.id, {}):
+        for dependent in self._dependencies.take(task.id):
             self._fail(dependent, now=now)
             self.ended(dependent, now=now)
 
@@ -328,7 +263,7 @@ class WaitingRoom:
             ended = self._book.get(over.pop())
             if ended is None:
                 continue
-            for dependent in self._dependents.pop(ended.id, {}):
+            for dependent in self._dependencies.take(ended.id):
                 task = self._waiting(dependent)
                 if task is None:
                     continue
@@ -342,33 +277,24 @@ class WaitingRoom:
         self.leave(self._book[task_id])
         self._book.change(task_id, S.FAILED, reason=R.DEPENDENCY_FAILED, actor=SERVER, now=now)
 
-    def _has_failed_dependency(self, task: Task) -> bool:
-        ahead = self._book.get(task.terms.after) if task.terms.after else None
-        return ahead is not None and ahead.state in TERMINAL and ahead.state is not S.COMPLETED
-
     def _waiting(self, task_id: TaskId) -> Task | None:
         return self._book[task_id] if task_id in self._waiters else None
 
-    def _forget_dependent(self, task_id: TaskId, after: int) -> None:
-        if not after:
-            return
-        dependents = self._dependents.get(TaskId(after))
-        if dependents is not None and task_id in dependents:
-            del dependents[task_id]
-            if not dependents:
-                del self._dependents[TaskId(after)]
+    def _part(self, task_id: TaskId, after: int) -> None:
+        """A task runs after another one no more, which may be less urgent by that."""
+        if self._dependencies.forget(task_id, after):
             self._lift(TaskId(after))
 
     # order
 
     def _rerank(self, task: Task) -> None:
         waiter = self._waiters[task.id]
-        waiter.own = self._own_rank(task, waiter.came_at)
+        waiter.own = _own_rank(self._settings, task, waiter.came_at)
         self._lift(task.id)
 
     def _most_urgent(self, task_id: TaskId, own: Rank) -> Rank:
         """Give a task's own rank, or that of one that waits for it."""
-        dependents = map(self._waiters.get, self._dependents.get(task_id, ()))
+        dependents = map(self._waiters.get, self._dependencies.of(task_id))
         return min([own, *(waiter.rank for waiter in dependents if waiter is not None)])
 
     def _lift(self, task_id: TaskId) -> None:
@@ -388,3 +314,9 @@ class WaitingRoom:
             if not task.terms.after:
                 return
             seen = TaskId(task.terms.after)
+
+
+def _own_rank(settings: Settings, task: Task, came_at: float) -> Rank:
+    """Give a task's own rank, if it has competed with others since ``came_at``."""
+    aging = settings.queueing.aging
+    return rank_of(task.priority, came_at=came_at, task_id=task.id, aging=aging)

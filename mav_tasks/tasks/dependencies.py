@@ -1,0 +1,75 @@
+"""Which tasks wait for which: who runs after whom, and whether that can ever be."""
+
+from mav_tasks.errors import Rejection
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.task import Task, TaskId
+
+R, S = TaskReason, TaskState
+
+
+class Dependencies:
+    """The tasks that run after others, by those."""
+
+    def __init__(self, book: TaskBook) -> None:
+        self._book = book
+        self._dependents: dict[TaskId, dict[TaskId, None]] = {}
+
+    def __repr__(self) -> str:
+        return f"Dependencies(of {len(self._dependents)} tasks)"
+
+    def __contains__(self, task_id: TaskId) -> bool:
+        return task_id in self._dependents
+
+    def of(self, task_id: TaskId) -> tuple[TaskId, ...]:
+        """Give the tasks that run after this one, in the order in which they came."""
+        return tuple(self._dependents.get(task_id, ()))
+
+    def add(self, task_id: TaskId, after: int) -> None:
+        """A task runs after another one; 0: after none."""
+        if after:
+            self._dependents.setdefault(TaskId(after), {})[task_id] = None
+
+    def take(self, task_id: TaskId) -> tuple[TaskId, ...]:
+        """Give the tasks that run after this one, which is over, and forget that they do."""
+        return tuple(self._dependents.pop(task_id, ()))
+
+    def forget(self, task_id: TaskId, after: int) -> bool:
+        """A task does not run after another one any more; whether it did."""
+        dependents = self._dependents.get(TaskId(after)) if after else None
+        if dependents is None or task_id not in dependents:
+            return False
+        del dependents[task_id]
+        if not dependents:
+            del self._dependents[TaskId(after)]
+        return True
+
+    def check(self, after: int) -> None:
+        """Raise Rejection if a task could never run after this one."""
+        if not after:
+            return
+        task = self._book.get(after)
+        if task is None:
+            raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
+        if task.state in TERMINAL and task.state is not S.COMPLETED:
+            words = f"run after {after}: it is over, {task.state.name.lower()}"
+            raise Rejection(R.DEPENDENCY_FAILED, words)
+
+    def check_cycle(self, task: Task, after: int) -> None:
+        """Raise Rejection if two tasks would wait for each other."""
+        seen: int = after
+        while seen:
+            if seen == task.id:
+                raise Rejection(R.CYCLE, f"run after {after}: they would wait for each other")
+            ahead = self._book.get(seen)
+            seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
+
+    def is_waited_for(self, after: int) -> bool:
+        """Whether a task that others run after is still to complete."""
+        task = self._book.get(after) if after else None
+        return task is not None and task.state not in TERMINAL
+
+    def have_failed(self, task: Task) -> bool:
+        """Whether what a task runs after is over, and was not completed."""
+        ahead = self._book.get(task.terms.after) if task.terms.after else None
+        return ahead is not None and ahead.state in TERMINAL and ahead.state is not S.COMPLETED

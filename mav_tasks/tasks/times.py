@@ -1,0 +1,61 @@
+"""Start times and deadlines of waiting tasks: which come next, by the clock that counts on."""
+
+from collections.abc import Iterable, Iterator
+from heapq import heapify, heappop, heappush
+from math import inf
+
+from mav_tasks.tasks.task import Task, TaskId, Terms
+
+
+class Times:
+    """What is due when. Entries out of date stay in the heaps, and are passed over."""
+
+    def __init__(self) -> None:
+        self._starts: list[tuple[float, TaskId]] = []
+        self._deadlines: list[tuple[float, TaskId]] = []
+        self._wall_offset = 0.0
+
+    def __repr__(self) -> str:
+        return f"Times({len(self._starts)} starts, {len(self._deadlines)} deadlines)"
+
+    def start(self, terms: Terms) -> float:
+        """Give the monotonic time before which a task does not begin; -inf without one."""
+        if terms.start_utc is None and terms.start_at is None:  # as nearly always
+            return -inf
+        from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
+        return max(from_utc, -inf if terms.start_at is None else terms.start_at)
+
+    def note(self, task: Task) -> None:
+        """Keep when a waiting task may begin, and until when."""
+        due = self.start(task.terms)
+        if due > -inf:
+            heappush(self._starts, (due, task.id))
+        if task.terms.deadline is not None:
+            heappush(self._deadlines, (task.terms.deadline, task.id))
+
+    def next_deadline(self) -> float:
+        """Give when the first of all is due; inf: never, as things are."""
+        first_start = self._starts[0][0] if self._starts else inf
+        return min(first_start, self._deadlines[0][0] if self._deadlines else inf)
+
+    def take_over(self, *, now: float) -> Iterator[tuple[float, TaskId]]:
+        """Give the deadlines that have passed, and of what."""
+        while self._deadlines and self._deadlines[0][0] <= now:
+            yield heappop(self._deadlines)
+
+    def take_starts(self, *, now: float) -> Iterator[TaskId]:
+        """Give the tasks of which a start time has come."""
+        while self._starts and self._starts[0][0] <= now:
+            yield heappop(self._starts)[1]
+
+    def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
+        """UTC = monotonic time + offset from now on, for all that wait."""
+        self._wall_offset = offset
+        starts = [(self.start(task.terms), task.id) for task in tasks]
+        self._starts = [(due, task_id) for due, task_id in starts if due > -inf]
+        heapify(self._starts)
+
+
+def is_too_late(task: Task, *, now: float) -> bool:
+    """Whether a waiting task must not begin any more."""
+    return task.terms.deadline is not None and task.terms.deadline <= now
