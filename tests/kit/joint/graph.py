@@ -96,12 +96,18 @@ class Graph:
         #: each state, and what leads there from the first
         self.paths: dict[State, tuple[str, ...]] = {first: ()}
         #: what can happen in a state, and the states to which that leads
-        self.leads: dict[State, dict[str, set[State]]] = {}
+        self.leads: dict[State, dict[str, frozenset[State]]] = {}
+        # each state, and each set of them, is there once: there are hundreds of thousands of sets
+        one: dict[State, State] = {}
+        once: dict[frozenset[State], frozenset[State]] = {}
         waiting = deque([first])
         while waiting:
             state = waiting.popleft()
-            self.leads[state] = dict(_leads(state))
-            for name, states in self.leads[state].items():
+            ways = self.leads[state] = {}
+            for name, found in _leads(state):
+                same = frozenset(one.setdefault(each, each) for each in found)
+                ways[name] = once.setdefault(same, same)
+            for name, states in ways.items():
                 for there in states:
                     if there not in self.paths:
                         self.paths[there] = (*self.paths[state], name)

@@ -28,7 +28,7 @@ def graph_of(make: str) -> Graph:
     return Graph(make)
 
 
-@pytest.fixture(params=MAKES)
+@pytest.fixture(params=MAKES, scope="module")  # a graph takes its time
 def graph(request: pytest.FixtureRequest) -> Graph:
     return graph_of(request.param)
 
