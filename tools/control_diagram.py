@@ -11,14 +11,12 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
 
+from generated import keep_current  # noqa: E402
 from mav_tasks.engine.vehicles.control import Event  # noqa: E402
 from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work  # noqa: E402
 from tests.kit.joint.graph import can_happen, variants  # noqa: E402
 from tests.kit.joint.model import MAKES, happens  # noqa: E402
 
-README = ROOT / "README.md"
-BEGIN = "<!-- control diagram: made by tools/control_diagram.py -->\n"
-END = "<!-- end of control diagram -->\n"
 NAMES = {
     Queue.RUNS: "runs",
     Queue.PAUSED: "paused",
@@ -80,22 +78,5 @@ def diagram() -> str:
     return "\n".join([*lines, "```", ""])
 
 
-def main() -> int:
-    text = README.read_text(encoding="utf-8")
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        print(f"README.md lacks the lines {BEGIN.strip()} and {END.strip()}")
-        return 1
-    current = before + begin + diagram() + end + after
-    if current == text:
-        return 0
-    if "--check" in sys.argv[1:]:
-        print("README.md: the diagram of control is old; run tools/control_diagram.py")
-        return 1
-    README.write_text(current, encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(keep_current("README.md", "control diagram", "control_diagram.py", diagram()))

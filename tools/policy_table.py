@@ -3,17 +3,14 @@
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
+from generated import keep_current
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.policy import commands as of_commands
 from mav_tasks.engine.policy import messages as of_messages
 from mav_tasks.engine.policy.row import UNKNOWN
 from mav_tasks.settings import ROLES
 
-README = Path(__file__).resolve().parent.parent / "dialects" / "README.md"
-BEGIN = "<!-- policy table: made by tools/policy_table.py -->\n"
-END = "<!-- end of policy table -->\n"
 KINDS = list(Kind)
 HEAD = "| kind | from | what it is about | what becomes of it | which |\n|---|---|---|---|---|"
 NAMELESS = replace(UNKNOWN, name="every other one")
@@ -67,22 +64,5 @@ def _way(row: Row) -> str:
     return "passes always" if row.passes_under_stop else "not under STOP"
 
 
-def main() -> int:
-    text = README.read_text(encoding="utf-8")
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        print(f"dialects/README.md lacks the lines {BEGIN.strip()} and {END.strip()}")
-        return 1
-    current = before + begin + table() + end + after
-    if current == text:
-        return 0
-    if "--check" in sys.argv[1:]:
-        print("dialects/README.md: the policy table is not in force; run tools/policy_table.py")
-        return 1
-    README.write_text(current, encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(keep_current("dialects/README.md", "policy table", "policy_table.py", table()))

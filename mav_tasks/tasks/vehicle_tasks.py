@@ -34,7 +34,8 @@ class VehicleTasks(Lineup):
         super().__init__(vehicle, book, room, settings)
         #: whose turn it is
         self.turns = Turns(self)
-        self._releases = Releases(self)
+        #: of tasks that are held
+        self.releases = Releases(self)
         self._jumps = JumpWatch()
 
     # coming, changing, going
@@ -169,21 +170,6 @@ class VehicleTasks(Lineup):
             return
         for task in [*self.aside, *([] if self.begun is None else [self.begun])]:
             self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
-
-    def release(
-        self,
-        task: Task,
-        *,
-        again: bool,
-        may_continue: bool,
-        seen: VehicleView,
-        actor: str,
-        now: float,
-    ) -> None:
-        """Let a held task go on from here: all of it again, or its remainder. Rejection."""
-        self._releases.release(
-            task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
-        )
 
     def forget_release(self) -> None:
         """A released task that has not begun is held as before: something has halted it."""
@@ -330,7 +316,7 @@ class VehicleTasks(Lineup):
             if not seen.still:
                 return view.HALT
             self.is_halting = False
-        self._releases.look(seen, now=now)
+        self.releases.look(seen, now=now)
         before = self.begun
         demand = self.executor.step(seen, now=now)
         if before is not None:

@@ -183,7 +183,7 @@ class Lives(RuleBasedStateMachine):
         tasks, seen = self.fleet.of(task.vehicle), self.view(task.vehicle)
         before = self.book.all()
         if refused(
-            lambda: tasks.release(
+            lambda: tasks.releases.release(
                 task, again=again, may_continue=True, seen=seen, actor="client", now=self.now
             )
         ):

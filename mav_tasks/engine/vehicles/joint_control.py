@@ -207,7 +207,7 @@ class JointControl:
             seen = replace(seen, may_arm=authority.may_arm_again)
 
         def let_go_on() -> None:
-            self._parts.tasks.release(
+            self._parts.tasks.releases.release(
                 task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
             )
 

@@ -119,7 +119,7 @@ class TestWhatHadBegun:
         if frame == HERE:
             run(after, rover, seconds=1.0)
             seen = rover.view(after.now)
-            after.tasks.release(
+            after.tasks.releases.release(
                 after.task(1), again=False, may_continue=True, seen=seen, actor=BY, now=after.now
             )
             run_until(after, rover, lambda: after.state(1) is S.COMPLETED)
@@ -127,7 +127,7 @@ class TestWhatHadBegun:
         else:
             seen = rover.view(after.now)
             with pytest.raises(Rejection, match="is not known: run it again, or skip it"):
-                after.tasks.release(
+                after.tasks.releases.release(
                     after.task(1),
                     again=False,
                     may_continue=True,

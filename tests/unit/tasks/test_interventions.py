@@ -131,7 +131,7 @@ class TestHeldTasks:
 
     def release(self, rig: Rig, rover: Rover, *, again: bool, task_id: int = 1) -> None:
         seen = rover.view(rig.now)
-        rig.tasks.release(
+        rig.tasks.releases.release(
             rig.task(task_id), again=again, may_continue=True, seen=seen, actor=BY, now=rig.now
         )
         rig.keep()
@@ -168,7 +168,7 @@ class TestHeldTasks:
         before = rig.book.all()
         seen = replace(in_control(rig.now), mode=ModeKind.OTHER)
         with pytest.raises(Rejection) as refusal:
-            rig.tasks.release(
+            rig.tasks.releases.release(
                 rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
             )
         assert (refusal.value.reason, rig.book.all()) == (R.WRONG_MODE, before)
@@ -180,17 +180,17 @@ class TestHeldTasks:
         rig.tasks.hold(R.FRAME_RESET, now=rig.now)
         assert rig.states() == [S.HELD, S.HELD]
         seen = in_control(rig.now)
-        rig.tasks.release(
+        rig.tasks.releases.release(
             rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
         )
         assert ([t.id for t in rig.tasks.aside], rig.states()) == ([2], [S.STARTING, S.HELD])
         with pytest.raises(Rejection, match="task 1 is starting"):
-            rig.tasks.release(
+            rig.tasks.releases.release(
                 rig.task(2), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
             )
         rig.cancel(1)
         rig.steps(in_control, seconds=2 * TICK)
-        rig.tasks.release(
+        rig.tasks.releases.release(
             rig.task(2), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
         )
         assert rig.states() == [S.CANCELLED, S.STARTING]
@@ -343,7 +343,7 @@ class TestStop:
         rig.steps(in_control, seconds=1.0)
         assert rig.states() == [S.HELD, S.KILLED]
         seen = in_control(rig.now)
-        rig.tasks.release(
+        rig.tasks.releases.release(
             rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
         )
         rig.keep()

@@ -173,7 +173,7 @@ def test_a_crash_in_mid_plan_is_continued_with_the_same_step() -> None:
     drive.rig = again
     drive.rover.is_ours = False
     seen = drive.rover.view(again.now)
-    again.tasks.release(
+    again.tasks.releases.release(
         again.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=again.now
     )
     drive.until_over()

@@ -196,7 +196,7 @@ class TestAfterwards:
         rig.step(in_control)
         rig.tasks.hold(R.FRAME_RESET, now=rig.now)
         seen = in_control(rig.now)
-        rig.tasks.release(
+        rig.tasks.releases.release(
             rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
         )
         rig.submit(LONG, terms=replace(URGENT, priority=9))

@@ -1,0 +1,29 @@
+"""Parts of documents that are made by a tool, between two lines that say so."""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def keep_current(document: str, what: str, tool: str, made: str) -> int:
+    """Put what was made into a document of ours; gives the exit code.
+
+    With ``--check`` on the command line it only tells if what is there is old, which is 1.
+    """
+    path = ROOT / document
+    begin, end = f"<!-- {what}: made by tools/{tool} -->\n", f"<!-- end of {what} -->\n"
+    text = path.read_text(encoding="utf-8")
+    before, has_begin, rest = text.partition(begin)
+    _, has_end, after = rest.partition(end)
+    if not has_begin or not has_end:
+        print(f"{document} lacks the lines {begin.strip()} and {end.strip()}")
+        return 1
+    current = before + begin + made + end + after
+    if current == text:
+        return 0
+    if "--check" in sys.argv[1:]:
+        print(f"{document}: the {what} is not what it is made of; run tools/{tool}")
+        return 1
+    path.write_text(current, encoding="utf-8")
+    return 0
