@@ -41,7 +41,7 @@ class Executor:
         self._settings = settings
         #: what drives it
         self.drive = Drive(book, settings, bounds)
-        self._task_id: TaskId | None = None
+        self.task_id: TaskId | None = None  #: of the begun task
         self._since = 0.0  # when the present state was entered
         self._executed_before = 0.0  # s of EXECUTING in earlier stretches
         self._last_tick = 0.0
@@ -59,7 +59,7 @@ class Executor:
     @property
     def task(self) -> Task | None:
         """The begun task."""
-        return None if self._task_id is None else self._book[self._task_id]
+        return None if self.task_id is None else self._book[self.task_id]
 
     @property
     def timing(self) -> Timing | None:
@@ -86,13 +86,13 @@ class Executor:
 
     def adopt(self, task: Task) -> None:
         """Take a task on as it is."""
-        self._task_id = task.id
+        self.task_id = task.id
         self._executed_before = task.progress.execution_time
         self._resumes_by_itself = False
 
     def give_up(self) -> None:
         """Let the task go as it is: another takes its place."""
-        self._task_id = None
+        self.task_id = None
         self.drive.forget()
 
     def resume(self, seen: VehicleView, *, actor: str, now: float) -> None:
@@ -170,7 +170,7 @@ class Executor:
 
     def kill(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
         """End the begun task at once; gives its id."""
-        killed = self._task_id
+        killed = self.task_id
         if killed is not None:
             self._finish(S.KILLED, reason, actor=actor, now=now)
         return killed
@@ -342,8 +342,8 @@ class Executor:
         now: float,
         progress: Progress | None = None,
     ) -> None:
-        assert self._task_id is not None
-        old, timing = self._book[self._task_id], None
+        assert self.task_id is not None
+        old, timing = self._book[self.task_id], None
         if old.state is S.EXECUTING:
             self._executed_before += now - self._since
             progress = replace(old.progress, execution_time=self._executed_before)
@@ -352,7 +352,7 @@ class Executor:
         self.drive.entered(now=now)
         self._ask_again_at, self.waits_for = None, (R.NONE, "")
         self._book.change(
-            self._task_id,
+            self.task_id,
             new,
             reason=reason,
             actor=actor,

@@ -82,7 +82,8 @@ class Lineup:
     @property
     def begun(self) -> Task | None:
         """The task that has the vehicle: begun, not over and not set aside."""
-        return self.executor.task
+        task_id = self.executor.task_id
+        return None if task_id is None else self.book[task_id]
 
     @property
     def aside(self) -> list[Task]:

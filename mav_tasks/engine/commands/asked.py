@@ -37,15 +37,12 @@ class Asked:
     #: who asks, and what he may do: later the endpoint may have signed with another key
     submitter: Submitter = field(init=False)
     rights: Rights = field(init=False)
+    command: Command = field(init=False)  #: what is asked for
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "submitter", self.client.submitter(self.packet.source))
         object.__setattr__(self, "rights", self.client.rights)
-
-    @property
-    def command(self) -> Command:
-        """What is asked for."""
-        return self.pending.command
+        object.__setattr__(self, "command", self.pending.command)
 
     @property
     def actor(self) -> str:
