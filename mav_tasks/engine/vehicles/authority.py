@@ -31,8 +31,7 @@ class Authority:
         self._arming_allowed = may_arm  # by setting
         self._asked_mode = -1  # by a client, through us
         self._asked_at = -inf
-        #: a mode that a client has asked for, and is not shown yet; None: whichever one drives
-        self._passed_on: tuple[int | None, float] = (-1, -inf)
+        self._passed_on = (-1, -inf)  # a mode that a client has asked for, and is not shown yet
         self._mode_is_ours = False
         self._granted: set[Hashable] = set()
         self._other_at = -inf  # sticks, or a second controller
@@ -115,21 +114,20 @@ class Authority:
         self._mode_is_ours = by_us or by_client
         return self._mode_is_ours
 
-    def note_passed_on(self, *, now: float) -> None:
-        """A client's command goes to the vehicle that may make it drive, in a mode of its own."""
-        self._passed_on = None, now
+    def note_passed_on(self, mode: int, *, now: float) -> None:
+        """A client's command goes to the vehicle that makes it drive, in this mode of its own."""
+        self._passed_on = mode, now
 
-    def was_asked_before(self, mode: int, *, halt: float) -> bool:
-        """Whether a mode that is shown now was asked for by a client before the halt at this time.
+    def was_asked_before(self, mode: int, *, halt: float, within: float) -> bool:
+        """Whether a client asked for a mode that is shown now so many s before a halt, or less.
 
         It is told once: who sets it again means it.
         """
         passed_on, at = self._passed_on
-        is_any = passed_on is None and mode not in self._persona.manual_modes
-        if mode != passed_on and not is_any:
+        if mode != passed_on:
             return False
         self._passed_on = (-1, -inf)
-        return at < halt
+        return at < halt <= at + within
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
         """Return what the present mode means for taking control.

@@ -180,6 +180,14 @@ TABLE = (
         grip=Grip.FREE,
         armed=True,
     ),
+    _row(
+        _E.PAUSE,
+        *(*TAKE_BACK, _F.PAUSE, _E.HOLD),
+        work=Work.STANDS,
+        is_led=True,  # by whoever has taken it since
+        grip=Grip.FREE,
+        armed=True,
+    ),
     _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _F.STEP),
     _row(_E.PAUSE_TASKS, _F.FORGET_GO_TO, _F.FORGET_START, _F.PAUSE, _F.STEP),
     _row(_E.DISARM, _F.COUNT, _F.WITHDRAW_ARMING, _F.ZERO_KEPT, _E.TAKEN, grip=ENGAGED),
@@ -223,6 +231,8 @@ TABLE = (
     # a failsafe's HOLD ends with the next set-point that is under way
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
+    # since then something was let go: it is a person at the vehicle, or as good as one
+    _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.ENDS, Work.LOST)),
     _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
     _row(_E.EXPLAINED, _F.TELL, _F.PAUSE_TAKEN),

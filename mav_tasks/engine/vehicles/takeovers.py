@@ -127,7 +127,7 @@ class Takeovers:
             self.rebooted(booted_at=now, now=now)
         elif self._shows_restart:
             pass  # a restart, which its clock has told of before, and nobody's doing
-        elif self._comes_late(mode, now=now):
+        elif not ours and self._comes_late(mode, now=now):
             words = f"shows {persona.mode_name(mode)}, asked for before it was to stand: HOLD again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif not ours and was_mode != persona.booting_mode:
@@ -147,7 +147,9 @@ class Takeovers:
         halts = self._parts.tasks.halts
         if mode == self._parts.persona.hold_mode:
             return False
-        was_before = self._parts.authority.was_asked_before(mode, halt=halts.at)
+        was_before = self._parts.authority.was_asked_before(
+            mode, halt=halts.at, within=LATE_REQUESTS
+        )
         is_halted = now - halts.at <= LATE_REQUESTS and not halts.is_undone
         return was_before and is_halted
 

@@ -8,7 +8,6 @@ from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.engine.outlet import Outlet
-from mav_tasks.engine.policy import row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
@@ -282,8 +281,8 @@ class Vehicle:
             self.joint.disarm(actor=actor, now=now)
         elif command == MavCmd.COMPONENT_ARM_DISARM:
             self.joint.arm(now=now)
-        elif not row_of_command(command).passed_on.passes_under_stop:
-            self.parts.authority.note_passed_on(now=now)
+        elif command == MavCmd.NAV_RETURN_TO_LAUNCH:
+            self.parts.authority.note_passed_on(self.persona.return_mode, now=now)
         self.requests.relay(
             packet,
             message,

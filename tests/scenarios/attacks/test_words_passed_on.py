@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
@@ -32,7 +33,7 @@ from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_fr
 from tests.scenarios.conftest import MakeWorld
 
 CHANGE_MODE = 1  # of DO_REPOSITION
-COMMAND_LONG = 76
+COMMAND_LONG, CANCEL = 76, 54010
 
 
 def go_to(north: float, east: float, target: tuple[int, int] = (1, 1)) -> Any:
@@ -120,6 +121,37 @@ def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
     world.operator_mode(Mode.MANUAL)
     world.run(3)
     assert world.rover.autopilot.mode is Mode.MANUAL
+
+
+def test_who_takes_it_for_a_return_while_a_task_drives_has_it(world: World) -> None:
+    """Though a client had asked for a mode before, and a task was called off just now."""
+    world.client.move(20)
+    world.client.move(21)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.client.mode(GUIDED)
+    world.run(5)
+    world.client.command(CANCEL, 1)
+    world.until_state(2, S.EXECUTING)
+    world.run(0.3)
+    world.operator_mode(Mode.RTL)
+    world.run(3)
+    assert world.rover.autopilot.mode is Mode.RTL
+    assert world.paused() is R.TAKEOVER
+
+
+def test_a_pause_stops_what_somebody_has_taken_since_its_task_was_paused(world: World) -> None:
+    world.client.move(20)
+    world.until(lambda: world.truth.north > 3, within=40)
+    world.client.pause()
+    world.run(3)
+    world.operator_mode(Mode.RTL)
+    world.run(1.5)
+    assert world.truth.forward_speed > 0.3 or not world.stands()
+    paused = world.client.pause()
+    world.run(4)
+    assert paused.result == ACCEPTED
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert stays(world, 3)
 
 
 @pytest.fixture
