@@ -19,12 +19,15 @@ RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 
 
-def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable) -> str:
-    """Return in words what keeps a word of a client from a rover now, "" if nothing does."""
+def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable, *, takes_over: bool = False) -> str:
+    """Return in words what keeps a word of a client from a rover now, "" if nothing does.
+
+    ``takes_over``: it also asks for the mode in which clients drive.
+    """
     if row.needs_grant:
-        return vehicle.motion_rights.why_not_moved(client)
+        return vehicle.motion_rights.why_not_moved(client, takes_over=takes_over)
     if not row.passes_beside_task:
-        return vehicle.motion_rights.why_no_motion()
+        return vehicle.motion_rights.why_no_motion(takes_over=takes_over)
     if not row.passes_under_stop and vehicle.tasks.is_stopped:
         return "STOP is latched"
     return ""

@@ -36,13 +36,15 @@ def check_relay(asked: Asked, row: Row, *, now: float) -> None:
     asked.rights.require(row.role, f"send command {number} to a rover")
     if vehicle.tasks.is_stopped and not row.passes_under_stop:
         raise Rejection(R.STOPPED, "STOP is latched: continue first")
-    if number == MavCmd.DO_REPOSITION and reposition_flags(command) & CHANGE_MODE:
-        vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
-    why_not = why_not_sent(row, vehicle, asked.client.key)
+    is_reposition = number == MavCmd.DO_REPOSITION
+    takes_over = is_reposition and bool(reposition_flags(command) & CHANGE_MODE)
+    why_not = why_not_sent(row, vehicle, asked.client.key, takes_over=takes_over)
     if why_not:
         raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
+    if takes_over:
+        vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
     if row.needs_grant:
         vehicle.motion_rights.passed(asked.client.key, now=now)
 

@@ -3,6 +3,7 @@
 from collections.abc import Hashable
 
 from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.services.offboard import Phase
 
 
 class MotionRights:
@@ -14,26 +15,33 @@ class MotionRights:
     def __repr__(self) -> str:
         return f"MotionRights({self._parts.authority!r})"
 
-    def why_not_moved(self, client: Hashable) -> str:
-        """Give in words what keeps a client's motion message from passing, "" if nothing does."""
+    def why_not_moved(self, client: Hashable, *, takes_over: bool = False) -> str:
+        """Give in words what keeps a client's motion message from passing, "" if nothing does.
+
+        ``takes_over``: it asks for the mode in which clients drive as well.
+        """
         parts = self._parts
-        why_not = self.why_no_motion()
+        why_not = self.why_no_motion(takes_over=takes_over)
         if why_not:
             return why_not
         if parts.tasks.is_driving:  # also one that is paused
             return "not while tasks drive"
         if not parts.monitor.armed:
             return "the rover is not armed"
-        if not parts.authority.has_granted(client):
+        if not takes_over and not parts.authority.has_granted(client):
             return f"ask for {parts.persona.mode_name(parts.persona.control_mode)} first"
         return ""
 
-    def why_no_motion(self) -> str:
-        """Return in words why nobody else may have it move now, "" if somebody may."""
+    def why_no_motion(self, *, takes_over: bool = False) -> str:
+        """Return in words why nobody else may have it move now, "" if somebody may.
+
+        Who ``takes_over`` goes on from where we hand the vehicle back.
+        """
         parts = self._parts
         if parts.tasks.is_stopped:
             return "STOP is latched"
-        if parts.control.is_engaged:
+        is_handed_over = takes_over and parts.control.phase is Phase.RELEASING
+        if parts.control.is_engaged and not is_handed_over:
             return "not while tasks drive"
         if parts.control.awaits_mode:
             return "HOLD is being asked for"
