@@ -114,6 +114,7 @@ class OffboardControl:
         self._is_braking = False  # while STOPPING: zeros alone, as long as they slow it down
         self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
         self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
+        self.arming_asked_at = -inf  #: s, the last time
         self.phase = Phase.IDLE
         self.refused: Refused | None = None
         self._arm_result: int | None = None  # of the last arm request; None: no answer
@@ -486,6 +487,8 @@ class OffboardControl:
                 self._hold_at = now
             case Phase.DISARMING:
                 self._disarm_at = now
+            case Phase.ASKING_ARM if self.we_armed:
+                self.arming_asked_at = now
 
     def _begin_asking(self, phase: Phase, *, now: float) -> None:
         self._withdraw_requests()
@@ -530,6 +533,7 @@ class OffboardControl:
         self._request(self._orders.hold(), until=self._ask_until, now=now)
 
     def _ask_arming(self, *, now: float) -> None:
+        self.arming_asked_at = now
         self._request(self._orders.arming(arm=True), until=self._ask_until, now=now)
 
     def _end_release(self, *, disarm: bool, now: float) -> None:

@@ -287,6 +287,10 @@ class World(VirtualWorld):
         self.watched.loses = look
         return numbers
 
+    def bring_late(self, data: bytes) -> None:
+        """Bring the first rover a packet of the server's that the net has kept until now."""
+        MemoryNet.send(self.net, VEHICLE_LINK, "rover1", data)
+
     def lose_acks(self) -> list[bytes]:
         """From now on lose the acks of the first rover; gives the list that they end up in."""
         lost: list[bytes] = []

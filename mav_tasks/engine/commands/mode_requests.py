@@ -129,7 +129,7 @@ class ModeRequests:
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Begin the mission of a vehicle that was to be armed first, if it has just been."""
-        if not vehicle.start_mark.is_put(now=now) or not vehicle.armed:
+        if not vehicle.start_mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
             return
         if vehicle.control.is_engaged or vehicle.control.we_armed:
             return  # armed by ourselves, for a task

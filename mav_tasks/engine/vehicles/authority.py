@@ -12,6 +12,8 @@ from mav_tasks.tasks.view import ModeKind
 
 STREAM_GAP = 0.5  # s between setpoints that are a stream: the least for OFFBOARD is 2 Hz
 BY_CLIENT = 2.0  # s after a client asked for a mode, in which a change to it is its doing
+LATE = 3.5  # s after a word, in which what had left before it may still come to the vehicle
+UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may be from before it
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,8 @@ class Authority:
         self._other_at = -inf  # sticks, or a second controller
         self._by_client: tuple[Hashable, float] = (None, -inf)  # the last that drove through us
         self._client_armed_at = -inf
+        self._outdated_at = -inf  # what was to arm it before that counts no more
+        self._was_disarmed = False  # then, or since
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
         #: until somebody disarms or changes the mode
         self.may_arm = may_arm
@@ -84,6 +88,7 @@ class Authority:
         self.may_arm = self._arming_allowed
         self.is_withdrawn_by_restart = False
         self._before = None
+        self.end_older_arming()
 
     def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
         """A client's mode request goes to the vehicle; our own mode counts as set by us then.
@@ -99,10 +104,36 @@ class Authority:
     def client_arms(self, *, now: float) -> None:
         """A client's wish to arm goes to the vehicle through us."""
         self._client_armed_at = now
+        self.end_older_arming()
 
     def armed_by_client(self, *, now: float) -> bool:
         """Whether that the vehicle is armed now is a client's doing, through us."""
-        return now - self._client_armed_at <= BY_CLIENT
+        is_newest = self._client_armed_at > self._outdated_at
+        return is_newest and now - self._client_armed_at <= BY_CLIENT
+
+    def outdate_arming(self, *, ours: float, armed: bool, now: float) -> None:
+        """It is to be disarmed, or stopped: what was to arm it before that does not count.
+
+        ``ours`` is when we last asked for arming ourselves.
+        """
+        if now - max(ours, self._client_armed_at) <= LATE:
+            self._outdated_at, self._was_disarmed = now, not armed
+
+    def shows_armed(self, *, armed: bool) -> None:
+        """Take note of what a heartbeat shows."""
+        self._was_disarmed |= not armed
+
+    def may_be_armed_by_older(self, *, now: float) -> bool:
+        """Whether what arms it now does not count: it may have left before the disarming."""
+        return self._was_disarmed and now <= self._outdated_at + LATE
+
+    def is_armed_by_older(self, *, now: float) -> bool:
+        """Whether it is, where it shows armed."""
+        return self.may_be_armed_by_older(now=now) and now >= self._outdated_at + UNSHOWN
+
+    def end_older_arming(self) -> None:
+        """Whatever arms it from here on is meant."""
+        self._outdated_at = -inf
 
     def mode_changed(self, mode: int, *, by_us: bool, now: float) -> bool:
         """The vehicle shows another mode; gives whether it is our, or our clients', doing."""
@@ -118,16 +149,16 @@ class Authority:
         """A client's command goes to the vehicle that makes it drive, in this mode of its own."""
         self._passed_on = mode, now
 
-    def was_asked_before(self, mode: int, *, halt: float, within: float) -> bool:
-        """Whether a client asked for a mode that is shown now so many s before a halt, or less.
+    def was_asked_before(self, mode: int, *, halt: float) -> bool:
+        """Whether a client asked for a mode that is shown now shortly before a halt.
 
         It is told once: who sets it again means it.
         """
         passed_on, at = self._passed_on
-        if mode != passed_on:
-            return False
+        if mode != passed_on or not at < halt <= at + LATE:
+            return False  # also where it was done before the halt: the net may have a copy of it
         self._passed_on = (-1, -inf)
-        return at < halt <= at + within
+        return True
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
         """Return what the present mode means for taking control.

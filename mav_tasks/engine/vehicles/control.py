@@ -33,6 +33,7 @@ class Event(Enum):
     MODE = auto()  # it shows a mode that we have not asked for
     LAPSED = auto()  # it shows HOLD while set-points stream: its failsafe's, or somebody's
     LATE_MODE = auto()  # it shows a mode that a client has asked for before a halt
+    LATE_ARMING = auto()  # it shows armed, by what has left before it was to be disarmed or stopped
     EXPLAINED = auto()  # it was its failsafe that has taken it
     MODE_IN_STOP = auto()  # the same, while STOP is latched
     DISARMED = auto()  # it shows that it is, and not by us
@@ -99,6 +100,8 @@ class Effect(Enum):
     # permissions, and what is told
     WITHDRAW_ARMING = auto()
     RESTORE_ARMING = auto()
+    OUTDATE_ARMING = auto()  # what left before, ours or a client's
+    DISARM = auto()
     LINGER = auto()  # leave its mode alone, a "go to" may follow
     HAND_OVER = auto()
     KEEP_ARMED = auto()
@@ -155,7 +158,7 @@ BUT_GO_TO = TAKE_BACK[1:]
 
 TABLE = (
     # words that let it stand
-    _row(_E.STOP, *TAKE_BACK, _F.LATCH, _F.BRAKE),
+    _row(_E.STOP, *TAKE_BACK, _F.OUTDATE_ARMING, _F.LATCH, _F.BRAKE),
     _row(_E.HOLD, _F.COUNT, _F.BRAKE, queue=Queue.STOPPED),
     _row(
         _E.HOLD,
@@ -190,15 +193,19 @@ TABLE = (
     ),
     _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _F.STEP),
     _row(_E.PAUSE_TASKS, _F.FORGET_GO_TO, _F.FORGET_START, _F.PAUSE, _F.STEP),
-    _row(_E.DISARM, _F.COUNT, _F.WITHDRAW_ARMING, _F.ZERO_KEPT, _E.TAKEN, grip=ENGAGED),
+    _row(
+        _E.DISARM,
+        *(_F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, _F.ZERO_KEPT, _E.TAKEN),
+        grip=ENGAGED,
+    ),
     # a stream that ends here would leave a velocity behind
     _row(
         _E.DISARM,
-        *(_F.COUNT, _F.WITHDRAW_ARMING, *TAKE_BACK, _F.ZERO),
+        *(_F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, *TAKE_BACK, _F.ZERO),
         driver=(Driver.CLIENT, Driver.OTHERS),
         has_failsafe=False,
     ),
-    _row(_E.DISARM, _F.COUNT, _F.WITHDRAW_ARMING, *TAKE_BACK),
+    _row(_E.DISARM, _F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, *TAKE_BACK),
     _row(_E.CANCEL, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.REVOKE, _F.STEP),
     _row(
         _E.CLEAR,
@@ -235,6 +242,9 @@ TABLE = (
     _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.ENDS, Work.LOST)),
     _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
+    _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, queue=Queue.STOPPED),
+    _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, work=Work.NONE),
+    _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, _F.PAUSE),  # or it would be armed for what waits
     _row(_E.EXPLAINED, _F.TELL, _F.PAUSE_TAKEN),
     # a request from before the STOP was late; later, it is a person at the vehicle
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING, _F.BRAKE, is_late=True, grip=Grip.FREE),

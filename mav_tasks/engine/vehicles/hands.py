@@ -203,6 +203,21 @@ def _withdraw_arming(on: Reach, _word: Word, now: float) -> None:
     on.parts.withdraw_arming(now=now)
 
 
+@_does(Effect.OUTDATE_ARMING)
+def _outdate_arming(on: Reach, _word: Word, now: float) -> None:
+    """What was to arm it before counts no more, also where the net still has it."""
+    ours, armed = on.parts.control.arming_asked_at, on.parts.monitor.armed
+    on.parts.authority.outdate_arming(ours=ours, armed=armed, now=now)
+
+
+@_does(Effect.DISARM)
+def _disarm(on: Reach, _word: Word, now: float) -> None:
+    """Ask for disarming, whoever armed it, until it is answered."""
+    on.parts.authority.end_older_arming()
+    on.parts.control.disarm_now(now=now)
+    on.parts.requests.flush(now=now)
+
+
 @_does(Effect.RESTORE_ARMING)
 def _restore_arming(on: Reach, _word: Word, now: float) -> None:
     """A person said that all is well."""

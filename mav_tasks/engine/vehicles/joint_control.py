@@ -9,6 +9,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
+from mav_tasks.engine.vehicles.authority import LATE
 from mav_tasks.engine.vehicles.control import Event, effects_of
 from mav_tasks.engine.vehicles.facts import client_driving, state_of
 from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
@@ -22,8 +23,6 @@ from mav_tasks.tasks.task import Draft, Task, TaskId
 from mav_tasks.tasks.view import VehicleView
 
 R = TaskReason
-
-LATE_REQUESTS = 3.5  # s after a halt, in which requests that left before it may still arrive
 
 
 class JointControl:
@@ -68,7 +67,7 @@ class JointControl:
 
     def state(self, *, now: float) -> State:
         """Return what decides about the next event."""
-        is_late = now - self.stopped_at <= LATE_REQUESTS
+        is_late = now - self.stopped_at <= LATE
         return state_of(self._parts, self._pilot, is_late=is_late, now=now)
 
     # words that let it stand

@@ -70,6 +70,10 @@ class Parts:
         """Whether a client, or somebody else, was driving it just now."""
         return self.authority.since_other(now=now) < self.settings.watch.other_controller
 
+    def is_armed(self, *, now: float) -> bool:
+        """Whether it shows armed, by a word that counts."""
+        return self.monitor.armed and not self.authority.may_be_armed_by_older(now=now)
+
     def note(self, text: str, *, now: float) -> None:
         """Tell everybody."""
         self.book.record(VehicleNoted(self.system_id, text, now))
@@ -122,7 +126,7 @@ class Parts:
             heard=monitor.is_heard(now=now),
             mode=self.authority.kind_of(mode, armed=monitor.armed),
             is_booting=mode == persona.booting_mode,
-            armed=monitor.armed,
+            armed=self.is_armed(now=now),
             may_arm=self.authority.may_arm,
             in_control=control.in_control,
             refusal=REFUSALS[control.refused],

@@ -4,10 +4,10 @@ A heartbeat may show our own doing, a client's through us, a person's at the veh
 failsafe's. Which it was is found here; what follows is the table's to say.
 """
 
-from mav_tasks.engine.vehicles.authority import Before
+from mav_tasks.engine.vehicles.authority import LATE, Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import BUTTONS, Word
-from mav_tasks.engine.vehicles.joint_control import LATE_REQUESTS, JointControl
+from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.services.offboard import Phase
@@ -61,6 +61,10 @@ class Takeovers:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
             self._disarmed(before, now=now)
+        parts.authority.shows_armed(armed=armed)
+        if armed and parts.authority.is_armed_by_older(now=now):
+            words = "is armed by a word from before it was to be disarmed: disarmed again"
+            self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
         by_client = parts.authority.armed_by_client(now=now)
         if armed and by_hand and not by_client and parts.control.is_asking_mode:
@@ -147,10 +151,8 @@ class Takeovers:
         halts = self._parts.tasks.halts
         if mode == self._parts.persona.hold_mode:
             return False
-        was_before = self._parts.authority.was_asked_before(
-            mode, halt=halts.at, within=LATE_REQUESTS
-        )
-        is_halted = now - halts.at <= LATE_REQUESTS and not halts.is_undone
+        was_before = self._parts.authority.was_asked_before(mode, halt=halts.at)
+        is_halted = now - halts.at <= LATE and not halts.is_undone
         return was_before and is_halted
 
     def _look_for_parking(self, was_mode: int, mode: int, *, now: float) -> None:

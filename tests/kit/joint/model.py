@@ -47,8 +47,10 @@ def happens(event: Event, state: State) -> frozenset[State]:
         states = {state._replace(is_led=False), state._replace(is_led=True)}
     elif event in (E.LAPSED, E.PARKED):
         states = {state._replace(is_led=False)}
+    elif event is E.LATE_ARMING:
+        states = {state._replace(armed=True)}
     elif event is E.DISARMED:
-        states = {state._replace(armed=False)}
+        states = {state, state._replace(armed=False)}  # a client may have armed it since
     found: set[State] = set()
     for each in states:
         found |= _follow(event, effects_of(event, each), each)
@@ -150,6 +152,11 @@ def _hold_task(state: State) -> Iterator[State]:
 
 def _restore(state: State) -> Iterator[State]:
     yield state._replace(may_arm=True)
+
+
+def _maybe_disarmed(state: State) -> Iterator[State]:
+    yield state
+    yield state._replace(armed=False)
 
 
 def _hand_over(state: State) -> Iterator[State]:
@@ -348,6 +355,8 @@ RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {
     F.RESTORE_ARMING: _restore,
     F.LINGER: lambda state: iter((state._replace(waits=state.waits | Waits.GO_TO),)),
     F.HAND_OVER: _hand_over,
+    F.OUTDATE_ARMING: _maybe_disarmed,  # of an arming that no heartbeat has shown
+    F.DISARM: _maybe_disarmed,
     F.KEEP_ARMED: _keep_armed,
     F.NOTE_OTHERS: _note_others,
 }
@@ -365,7 +374,7 @@ DO: dict[Event, Callable[[State], Iterator[State]]] = {
     E.ASK_OUR_MODE: _granted,
     E.ASK_OUR_MODE_STREAMING: _granted,
     E.ASK_OTHER_MODE: _same,
-    E.ARM: _same,
+    E.ARM: lambda state: iter((state, state._replace(armed=True))),
     E.REBOOTED: _restarted,
 }
 START = State(waits=NOTHING)

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -105,7 +104,7 @@ def test_what_the_net_to_the_rover_delivers_after_a_halt_does_not_undo_it(
     halted = person.mode(HOLD) if halt == "HOLD" else person.pause()
     world.run(0.5)
     assert halted.result == ACCEPTED
-    world.net.send(VEHICLE_LINK, "rover1", caught[0])
+    world.bring_late(caught[0])
     world.run(2)
     assert world.rover.autopilot.mode is Mode.HOLD
     assert stays(world, 5)

@@ -1,0 +1,171 @@
+"""What was to arm a rover, and comes to it after it was to be disarmed, does not let it go.
+
+The net between server and rover puts packets in another order, too. Whatever is seen armed may be
+taken by a task that waits: the rover of somebody who had armed it, thought better of it, and was
+answered that it is disarmed, drove off.
+"""
+
+from struct import unpack_from
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode
+from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long
+from tests.kit.world import World
+from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
+
+COMMAND_LONG, ARM = 76, 400
+PARAMETERS, NUMBER = 10, 38  # where they begin in a packet, and the command's number
+
+
+def is_arming(data: bytes) -> bool:
+    """Whether a packet of MAVLink 2 is a command that arms."""
+    if data[7] != COMMAND_LONG:
+        return False
+    filled = data[: PARAMETERS + data[1]] + bytes(NUMBER)
+    return (unpack_from("<H", filled, NUMBER), unpack_from("<f", filled, PARAMETERS)) == (
+        (ARM,),
+        (1.0,),
+    )
+
+
+def catch_arming(world: World) -> list[bytes]:
+    """Keep the next command that arms from the rover; it is put into the list."""
+    caught: list[bytes] = []
+
+    def loses(_source: str, target: str, data: bytes) -> bool:
+        is_it = target == "rover1" and not caught and is_arming(data)
+        caught.extend([data] if is_it else [])
+        return is_it
+
+    world.watched.loses = loses
+    return caught
+
+
+def disarmed_at_last(world: World) -> None:
+    """Have the client disarm the rover until that is acknowledged as done."""
+    for _ in range(2):  # the first waits for what the net has lost, and is not answered
+        answer = world.client.arm(False)
+        world.run(0.6)
+    assert answer.result == ACCEPTED
+
+
+def mode_of(world: World) -> Mode:
+    """Return the rover's mode."""
+    return world.rover.autopilot.mode
+
+
+@pytest.fixture
+def waiting(world: World) -> World:
+    """A rover that a client has disarmed, and a task that waits for its arming."""
+    world.operator_mode(Mode.HOLD)
+    world.run(2)
+    world.client.arm(False)
+    world.run(3)
+    world.client.move(5, speed=0.5)
+    world.run(3)
+    assert world.state(1)[0] is S.QUEUED
+    return world
+
+
+def test_an_arming_that_its_disarming_has_overtaken_begins_no_task(waiting: World) -> None:
+    caught = catch_arming(waiting)
+    waiting.client.arm()
+    waiting.run(0.1)
+    assert caught
+    waiting.watched.loses = lambda *_: False
+    disarmed_at_last(waiting)
+    waiting.bring_late(caught[0])
+    waiting.run(2)
+    assert stays(waiting, 6)
+    assert not waiting.rover.autopilot.armed
+    assert waiting.state(1)[0] is S.QUEUED
+    assert waiting.paused() is R.OPERATOR
+
+
+def test_who_arms_it_after_that_means_it(waiting: World) -> None:
+    catch_arming(waiting)
+    waiting.client.arm()
+    waiting.run(0.1)
+    disarmed_at_last(waiting)
+    waiting.client.arm()
+    waiting.until_state(1, S.EXECUTING)
+
+
+def test_our_own_arming_is_called_back_as_well(world: World) -> None:
+    caught = catch_arming(world)
+    world.client.move(5, speed=0.5)
+    world.until(lambda: bool(caught), within=5)
+    world.watched.loses = lambda *_: False
+    disarmed_at_last(world)
+    world.bring_late(caught[0])
+    world.run(2)
+    assert stays(world, 3)
+    assert not world.rover.autopilot.armed
+
+
+def test_nor_does_one_arm_it_that_comes_after_a_stop(world: World) -> None:
+    caught = catch_arming(world)
+    world.client.move(5, speed=0.5)
+    world.until(lambda: bool(caught), within=5)
+    world.watched.loses = lambda *_: False
+    world.client.stop()
+    world.run(0.5)
+    world.bring_late(caught[0])
+    world.run(2)
+    assert stays(world, 3)
+    assert not world.rover.autopilot.armed
+
+
+def test_a_person_at_the_rover_arms_it_all_the_same(waiting: World) -> None:
+    """Though a client had asked for that before its disarming."""
+    catch_arming(waiting)
+    waiting.client.arm()
+    waiting.run(0.1)
+    disarmed_at_last(waiting)
+    waiting.run(3)
+    waiting.operator_arm(armed=True)
+    waiting.until_state(1, S.EXECUTING)
+
+
+def test_a_second_copy_of_a_return_does_not_undo_a_hold(world: World) -> None:
+    """The net brings it to the rover twice, once before the HOLD and once after it."""
+    away_from_home(world)
+    world.client.mode(GUIDED)
+    world.run(1)
+    seen: list[bytes] = []
+
+    def loses(_source: str, target: str, data: bytes) -> bool:
+        if target == "rover1" and data[7] == COMMAND_LONG:
+            seen.append(data)
+        return False
+
+    world.watched.loses = loses
+    world.client.send(command_long(RETURN, target=ELSEWHERE))
+    world.run(1.2)
+    assert mode_of(world) is Mode.RTL
+    copies = [data for data in seen if unpack_from("<H", data + bytes(40), NUMBER) == (RETURN,)]
+    held = world.client.mode(HOLD)
+    world.run(0.7)
+    assert held.result == ACCEPTED
+    world.bring_late(copies[0])
+    world.run(2)
+    assert mode_of(world) is Mode.HOLD
+    assert stays(world, 4)
+
+
+def test_a_pause_stops_what_a_client_has_armed_just_now(world: World) -> None:
+    """No heartbeat has shown it yet."""
+    away_from_home(world)
+    world.client.arm(False)
+    world.run(2)
+    world.client.mode(GUIDED)
+    world.run(1.5)
+    world.client.arm()
+    world.run(0.02)
+    paused = world.client.pause()
+    world.run(3)
+    assert paused.result == ACCEPTED
+    assert mode_of(world) is Mode.HOLD
