@@ -358,6 +358,11 @@ class Observer:
         """Whether it was asked for HOLD in the step of a stick: with zeros until it shows that."""
         return now - self._stick_hold_at <= OWN_REQUEST
 
+    @property
+    def _is_held_since_stick(self) -> bool:
+        """Whether it is in our mode, and was asked for HOLD because of a stick."""
+        return self.mode == self.ways.ours and self._stick_hold_at >= self._sticks_at > -1e9
+
     def _take_over(self, now: float, *, zeros: int) -> None:
         """Somebody else has the rover; of interest only while the server is driving."""
         self._in_row = 0  # it may have been handing it back, and ends that, too
@@ -381,10 +386,11 @@ class Observer:
             return
         if self.taken_over and (moves or now != self._greeting_at):
             # a client's pause stops a rover that somebody else drives: zero and HOLD at once; to
-            # no other pause does a zero belong
-            if now == self._pause_at and not moves:
+            # no other pause does a zero belong. After a freeze, HOLD for a stick is asked for again
+            is_held = self._is_held_for_sticks(now)
+            if not moves and (now == self._pause_at or (self._is_held_since_stick and not is_held)):
                 self._hold_due = now
-            elif moves or (self._zeros_left == 0 and not self._is_held_for_sticks(now)):
+            elif moves or (self._zeros_left == 0 and not is_held):
                 self._violation(now, f"setpoint after a takeover: {self._name(message)}")
             self._zeros_left = max(0, self._zeros_left - 1)
         self._check_rate(now, moves=moves)
@@ -444,11 +450,12 @@ class Observer:
         ways = self.ways
         if wanted == ways.hold:
             self._hold_at = now
-            if now == self._sticks_at or self._is_held_for_sticks(now):
+            is_for_stick = self._is_held_for_sticks(now) or self._is_held_since_stick
+            if now == self._sticks_at or is_for_stick:
                 self._stick_hold_at = now
             if now == self._pause_at:  # carried out as HOLD it is a wish for HOLD
                 self._see_wish_of_client(now, wanted)
-                self._hold_due = None
+            self._hold_due = None
             if self._stop_due is not None:
                 self._stop_due[1].discard("HOLD")
         elif self.taken_over:

@@ -236,6 +236,20 @@ def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     world.until_state(1, S.COMPLETED)
 
 
+def test_a_rover_that_somebody_had_taken_is_left_to_it_after_a_restart(
+    world: World, path: Path
+) -> None:
+    """It shows our mode still: it was disarmed in it, and nothing of ours drove it since."""
+    world.client.move(2)
+    world.run(3)
+    world.operator_arm(False)
+    world.run(2)
+    assert (in_mode(world), world.paused()) == (Mode.GUIDED, R.TAKEOVER)
+    restart(world, path)
+    world.run(3)
+    assert in_mode(world) is Mode.GUIDED
+
+
 @pytest.mark.parametrize("answers_lost", [0, 1, 1000])
 def test_another_rover_of_the_same_id_runs_nothing_unasked(
     world: World, path: Path, answers_lost: int

@@ -12,10 +12,11 @@ from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.modes import Mode
 from rover_sim.realism import EXACT, Drive, Wire
 from tests.kit.client import ACCEPTED, rc_override, sticks
+from tests.kit.observer import SERVER
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
-CANCEL = 54010
+CANCEL, SETPOINT = 54010, 84  # a command, and a message
 FORWARD, CENTRE = 1750, 1500  # µs: 1.9 m/s by itself, on a rover of 4 m/s
 STANDS = 0.03  # m/s
 
@@ -122,3 +123,17 @@ def test_sticks_of_a_ground_station_leave_no_speed_behind(
     assert world.truth.north - north < 1.0
     assert world.rover.autopilot.mode is Mode.HOLD
     assert world.paused() is R.TAKEOVER
+
+
+def test_who_disarms_a_rover_that_somebody_drives_by_hand_sends_it_nothing_else(
+    world: World,
+) -> None:
+    """No set-point goes to what somebody has taken: there is none of a client's to end."""
+    world.client.move(5)
+    world.run(3)
+    world.client.stream(sticks(z=300), rate=5)
+    world.run(1)
+    sent = world.passed_on(SERVER)
+    world.client.arm(False)
+    world.run(0.5)
+    assert SETPOINT not in sent

@@ -202,7 +202,7 @@ TABLE = (
     _row(
         _E.DISARM,
         *(_F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, *TAKE_BACK, _F.ZERO),
-        driver=(Driver.CLIENT, Driver.OTHERS),
+        driver=Driver.CLIENT,
         has_failsafe=False,
     ),
     _row(_E.DISARM, _F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, *TAKE_BACK),
@@ -324,6 +324,7 @@ TABLE = (
     _row(_E.COME_BACK, _F.BRAKE, queue=Queue.STOPPED),
     _row(_E.COME_BACK),
     _row(_E.COME_BACK_DRIVEN, _F.BRAKE, queue=Queue.STOPPED),
+    _row(_E.COME_BACK_DRIVEN, queue=Queue.TAKEN, armed=False),  # somebody has it, and it stands
     _row(_E.COME_BACK_DRIVEN, _F.LET_GO),
     _row(_E.COME_BACK_LED_AWAY, _F.BRAKE, queue=Queue.STOPPED),
     _row(_E.COME_BACK_LED_AWAY, _F.TELL, has_failsafe=True),  # a zero would have it lose us again
