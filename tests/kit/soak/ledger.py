@@ -70,6 +70,7 @@ class Ledger:
         for task_id in self.given.keys() - found.keys():
             self._forget_mark(task_id)  # it never became durable: nobody was told
         yield from self._forget_what_was_lost(found, killed_at)
+        self.withdrawn.difference_update(found)  # stored in time, and the withdrawal was not
         self.states = found
 
     def accept(self, task_id: int, client: str) -> Iterator[str]:

@@ -9,6 +9,7 @@ from tests.kit.observer import Observer
 
 STANDS = 0.02  # m/s and rad/s
 BRAKING = 1.5  # s, from the highest speed that is driven here to a stand
+ROLLING = 2.5  # s, the same of one that is disarmed on the way: 0.5 m/s² from 1 m/s
 STOP_BOUND = 1.5  # s from when the server reads a STOP, where the rover hears it
 STOP_BOUND_UNHEARD = 3.0 + BRAKING  # s, where it does not: by its own time-out
 #: s that it must have moved: a mode of its own that is turned to and away from between two looks
@@ -37,7 +38,8 @@ class Stillness:
         speed = max(hypot(truth.forward_speed, truth.lateral_speed), abs(truth.yaw_rate))
         if speed <= STANDS:
             self._stood_at = now
-        if now - self._stood_at <= FLASH or now - self._by_itself_at <= BRAKING:
+        coasts = BRAKING if autopilot.armed else ROLLING
+        if now - self._stood_at <= FLASH or now - self._by_itself_at <= coasts:
             return
         number, observer = self.observer.system_id, self.observer
         if now > observer.may_move_until + BRAKING:
