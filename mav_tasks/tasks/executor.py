@@ -12,11 +12,11 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.drive import Becomes, Drive
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.itinerary import goal_of
-from mav_tasks.tasks.driving.way_back import is_off_line
+from mav_tasks.tasks.driving.way_back import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.scheduler import start_blocker
-from mav_tasks.tasks.task import Progress, Task, TaskId
+from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
 from mav_tasks.tasks.timing import Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, ModeKind, VehicleView
 
@@ -47,6 +47,8 @@ class Executor:
         self._last_tick = 0.0
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
         self._resumes_by_itself = False
+        self._lost_at: Pose | None = None  # where it was last, before the loss
+        self._was_silent = False  # during it
         self._meter: TimingMeter | None = None  # while EXECUTING
         self._taking_since = 0.0  # while STARTING
         self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
@@ -307,6 +309,7 @@ class Executor:
         elif motion is None or now - motion.at > self._settings.watch.position_lost:
             lost = R.POSITION_LOST
         if lost:
+            self._lost_at, self._was_silent = None if motion is None else motion.pose, False
             self.pause(lost, actor=SERVER, now=now)
         return bool(lost)
 
@@ -318,12 +321,17 @@ class Executor:
         if now - self._since > watch.lost_timeout:
             self._finish(S.FAILED, R.LINK_TIMEOUT, actor=SERVER, now=now)
             return
+        self._was_silent |= not seen.heard
         ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD) and seen.armed
         task = self._begun(S.PAUSED)
         if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):
             self._lost_until = now
         elif now - self._lost_until >= watch.fresh_before_resume:
-            self.resume(seen, actor=SERVER, now=now)
+            there, here = self._lost_at if self._was_silent else None, seen.motion
+            if there is not None and here is not None and was_handled(task, there, here.pose):
+                self._change(S.HELD, R.OFF_LINE, actor=SERVER, now=now)
+            else:
+                self.resume(seen, actor=SERVER, now=now)
 
     # states
 

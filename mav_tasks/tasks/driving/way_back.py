@@ -20,6 +20,7 @@ ON_SPOT = 0.02  # m from where it was: as good as there
 OFF_LINE = 1.0  # m, lifecycle: further off its line than this is no resumption after a takeover
 PAST_END = 0.1  # m, the same for the end of the line
 CONVERGES = 6.0  # m of line for each metre beside it, in which steering comes back to it
+PUT_BACK = 0.3  # m against its direction, that no estimate wanders in half a minute
 BESIDE_PATH = 0.5  # m, the same for a car on a path: much more it could not steer back
 ALIGNED = radians(10)  # a heading that differs by less is put right on the way
 TURNED = radians(30)  # a heading that differs by less cannot be mistaken by a whole turn
@@ -44,6 +45,19 @@ def is_off_line(task: Task, pose: Pose) -> bool:
             return hypot(pose.north - anchor.north, pose.east - anchor.east) > OFF_LINE
         case _:
             return False
+
+
+def was_handled(task: Task, before: Pose, after: Pose) -> bool:
+    """Whether somebody has had a vehicle while nothing was heard of it.
+
+    On a straight line it rolls on by itself; it does not turn, and does not come back.
+    """
+    leg = leg_of(goal_of(task), task.progress)
+    if task.progress.anchor is None or not isinstance(leg, Move):
+        return False
+    north, east = after.north - before.north, after.east - before.east
+    ahead = copysign(1.0, leg.distance) * (north * cos(before.yaw) + east * sin(before.yaw))
+    return ahead < -PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
 
 
 def resumed(

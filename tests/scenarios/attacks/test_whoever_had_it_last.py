@@ -16,6 +16,7 @@ from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED
 from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.world import World, at
+from tests.scenarios.attacks.test_left_waiting import stays, unheard
 from tests.scenarios.conftest import MakeWorld
 
 CHANGE_MODE = 1  # of DO_REPOSITION
@@ -77,3 +78,35 @@ def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(
     assert world.pose() == pytest.approx(before, abs=0.01)
     assert world.paused() is R.OPERATOR
     assert [task.goal for task in world.tasks()][1:], "the goal itself is queued"
+
+
+@pytest.mark.parametrize("way", ["put back", "turned round"])
+def test_a_rover_that_was_taken_and_parked_unheard_does_not_go_on_by_itself(
+    world: World, way: str
+) -> None:
+    """It is near its line and in HOLD, as one is that only its link was away."""
+    world.client.move(10, speed=0.5)
+    world.until(lambda: world.truth.north > 3, within=40)
+    unheard(world)
+    world.run(6)
+    world.operator_mode(Mode.MANUAL)
+    throttle, steering = (-0.5, 0.0) if way == "put back" else (0.0, 0.5)
+    for _ in range(3):  # the server asks for HOLD, of which it hears nothing
+        world.operator_mode(Mode.MANUAL)
+        world.rover.autopilot.operator_sticks(throttle, steering)
+        world.run(1)
+    world.rover.autopilot.operator_sticks(0.0, 0.0)
+    world.run(1)
+    world.operator_mode(Mode.HOLD)
+    world.watched.loses = lambda *_: False
+    assert stays(world, 10)
+    assert world.state(1)[0] is S.HELD
+
+
+def test_one_that_only_its_link_was_away_from_goes_on(world: World) -> None:
+    world.client.move(10, speed=0.5)
+    world.until(lambda: world.truth.north > 3, within=40)
+    unheard(world)
+    world.run(10)
+    world.watched.loses = lambda *_: False
+    world.until_state(1, S.COMPLETED, within=60)
