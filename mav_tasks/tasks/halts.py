@@ -47,6 +47,11 @@ class Halts:
         who = self._actor.partition("@")[0]  # the endpoint says nothing to people
         return what if self._actor in ("", SERVER) else f"{what} by {who}"
 
+    @property
+    def is_of_restart(self) -> bool:
+        """Whether nothing has made it stand since this server has begun, after another one."""
+        return self._reason is TaskReason.RESTARTED
+
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it is the last one again, and is not counted."""
         is_same = (reason, actor) == (self._reason, self._actor)

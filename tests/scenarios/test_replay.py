@@ -117,7 +117,7 @@ def restarted(make_world: MakeWorld, folder: Path) -> World:
     world.run(6)
     later = PromptSqliteStore(folder / "tasks.sqlite3", wall_offset=UTC)
     world.start_server(later, later.load())
-    world.run(2.5)
+    world.run(4.0)
     world.client.command(RELEASE, 2, AGAIN)
     world.run(0.2)
     world.client.proceed()

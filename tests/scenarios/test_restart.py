@@ -39,8 +39,13 @@ def world(make_world: MakeWorld, path: Path) -> World:
     return make_world(store=store, settings=settings)
 
 
-def restart(world: World, path: Path, *, well: bool = False, away: float = STOP_TIME) -> None:
-    """Let the server be killed, or end; and start another one on a copy of what is on the disk."""
+def restart(
+    world: World, path: Path, *, well: bool = False, away: float = STOP_TIME, settles: float = 4.0
+) -> None:
+    """Let the server be killed, or end; and start another one on a copy of what is on the disk.
+
+    What lets go does not count just after that.
+    """
     store = world.server.store
     world.end_server()
     if well:
@@ -53,7 +58,7 @@ def restart(world: World, path: Path, *, well: bool = False, away: float = STOP_
     world.run(away)
     later = PromptSqliteStore(again, wall_offset=UTC)
     world.start_server(later, later.load())
-    world.run(2.5)
+    world.run(settles)
 
 
 def in_mode(world: World) -> Mode:
@@ -129,6 +134,28 @@ def test_who_set_a_nonce_is_told_also_by_the_next_server(world: World, path: Pat
     assert release(world, 0, SKIP) == (ACCEPTED, 1)
     world.run(0.5)
     assert script.statuses(1)[-1].state == S.CANCELLED
+
+
+def test_a_copy_of_what_the_server_before_has_heard_lets_nothing_go(
+    world: World, path: Path
+) -> None:
+    """The pause between them was acknowledged, and only the server before knew of the first."""
+    world.client.move(5)
+    world.run(3)
+    world.client.proceed()
+    world.run(0.3)
+    paused = world.add_client("person").pause()
+    world.run(0.3)
+    assert paused.result == ACCEPTED
+    restart(world, path, well=True, away=0.5, settles=1.0)
+    late = world.client.proceed()
+    world.run(3)
+    assert late.answer == (TEMPORARILY_REJECTED, R.STALE)
+    assert world.paused() is R.OPERATOR
+    world.run(1)
+    meant = world.client.proceed()
+    world.run(1)
+    assert meant.result == ACCEPTED
 
 
 def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> None:
