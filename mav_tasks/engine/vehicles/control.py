@@ -181,7 +181,7 @@ TABLE = (
         *(*TAKE_BACK, _F.PAUSE, _E.HOLD),
         work=(Work.NONE, Work.WAITS, Work.TAKEN),
         grip=Grip.FREE,
-        armed=True,
+        may_be_armed=True,
     ),
     _row(
         _E.PAUSE,
@@ -189,7 +189,7 @@ TABLE = (
         work=Work.STANDS,
         is_led=True,  # by whoever has taken it since
         grip=Grip.FREE,
-        armed=True,
+        may_be_armed=True,
     ),
     _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _F.STEP),
     _row(_E.PAUSE_TASKS, _F.FORGET_GO_TO, _F.FORGET_START, _F.PAUSE, _F.STEP),

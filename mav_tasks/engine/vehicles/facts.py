@@ -32,8 +32,8 @@ def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
         grip=GRIPS[parts.control.phase],
         work=_work(tasks),
         driver=_driver(parts, now=now),
-        # a client may have armed it, though no heartbeat has shown that yet
-        armed=parts.monitor.armed or authority.armed_by_client(now=now),
+        armed=parts.monitor.armed,
+        may_be_armed=parts.monitor.armed or authority.armed_by_client(now=now),
         may_arm=authority.may_arm,
         waits=_waits(parts, now=now),
         is_led=kind in (ModeKind.MANUAL, ModeKind.OTHER),

@@ -85,6 +85,7 @@ class State(NamedTuple):
     work: Work = Work.NONE
     driver: Driver = Driver.NOBODY
     armed: bool = False
+    may_be_armed: bool = False  # also by a client that has asked for that, and it is not shown yet
     may_arm: bool = True  # we may, of our own accord
     waits: Waits = NOTHING
     is_led: bool = False  # in a mode of somebody else's, in which no task begins

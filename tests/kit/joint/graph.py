@@ -62,7 +62,8 @@ def variants(event: Event, state: State) -> Iterator[State]:
     names = ASKED[event]
     for values in product((False, True), repeat=len(names)):
         asked: dict[str, Any] = dict(zip(names, values, strict=True))
-        yield state._replace(**asked)
+        if asked.get("may_be_armed", True) or not state.armed:
+            yield state._replace(**asked)
 
 
 def after(event: Event, state: State) -> set[State]:
@@ -79,7 +80,9 @@ def plain(state: State) -> Iterator[State]:
 
     Of several each is taken off, and comes true, whatever becomes of the others.
     """
-    state = state._replace(is_idle=True, is_stopping=False, is_late=False, brakes=False)
+    state = state._replace(
+        may_be_armed=False, is_idle=True, is_stopping=False, is_late=False, brakes=False
+    )
     if len(state.waits) < 2:
         yield state
     else:

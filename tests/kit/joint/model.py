@@ -17,7 +17,7 @@ MAKES: dict[str, dict[str, bool]] = {
     "ArduPilot": {"lingers": False, "has_failsafe": False, "heeds_stick": True},
 }
 #: what rows ask for, and the graph leaves open
-FREE = ("is_idle", "is_stopping", "is_late", "brakes")
+FREE = ("may_be_armed", "is_idle", "is_stopping", "is_late", "brakes")
 NO_TASK = (Work.NONE, Work.WAITS)
 
 #: words and events after which nothing moves or arms until a newer word lets it go
@@ -50,7 +50,7 @@ def happens(event: Event, state: State) -> frozenset[State]:
     elif event is E.LATE_ARMING:
         states = {state._replace(armed=True)}
     elif event is E.DISARMED:
-        states = {state, state._replace(armed=False)}  # a client may have armed it since
+        states = {state._replace(armed=False)}
     found: set[State] = set()
     for each in states:
         found |= _follow(event, effects_of(event, each), each)
@@ -152,11 +152,6 @@ def _hold_task(state: State) -> Iterator[State]:
 
 def _restore(state: State) -> Iterator[State]:
     yield state._replace(may_arm=True)
-
-
-def _maybe_disarmed(state: State) -> Iterator[State]:
-    yield state
-    yield state._replace(armed=False)
 
 
 def _hand_over(state: State) -> Iterator[State]:
@@ -355,8 +350,6 @@ RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {
     F.RESTORE_ARMING: _restore,
     F.LINGER: lambda state: iter((state._replace(waits=state.waits | Waits.GO_TO),)),
     F.HAND_OVER: _hand_over,
-    F.OUTDATE_ARMING: _maybe_disarmed,  # of an arming that no heartbeat has shown
-    F.DISARM: _maybe_disarmed,
     F.KEEP_ARMED: _keep_armed,
     F.NOTE_OTHERS: _note_others,
 }
@@ -374,7 +367,7 @@ DO: dict[Event, Callable[[State], Iterator[State]]] = {
     E.ASK_OUR_MODE: _granted,
     E.ASK_OUR_MODE_STREAMING: _granted,
     E.ASK_OTHER_MODE: _same,
-    E.ARM: lambda state: iter((state, state._replace(armed=True))),
+    E.ARM: _same,
     E.REBOOTED: _restarted,
 }
 START = State(waits=NOTHING)
