@@ -141,13 +141,12 @@ class CommandReceiver:
         )
 
     def older_copy(self, command: Command, *, before: float, now: float) -> bool:
-        """Whether an equal command was carried out before ``before``, so lately that this may be
-        a repeat of it whose ack was lost."""
+        """Whether an equal command came before ``before``, so lately that this may be a repeat of
+        it whose ack was lost, or has yet to be sent."""
         return any(
             pending.at < before
             and now - pending.at <= COPIED
-            and pending.answer is not None
-            and pending.answer.result == MavResult.ACCEPTED
+            and (pending.answer is None or pending.answer.result == MavResult.ACCEPTED)
             and _equal(pending.command, command)
             for pending in self._packets.values()
         )

@@ -31,6 +31,8 @@ ASK_REPEAT = 0.25  # s, between requests that the vehicle refuses
 STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
 ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 3.7 s
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
+#: s, the same of one that shows the very mode still which it was to leave: nobody has acted since
+INSISTS = 30.0
 #: s after a request was last sent in which what it asks for may still come true: a copy of it may
 #: be late on the net. Longer, and a person who does the same would be taken for it.
 LATE = 0.3
@@ -107,14 +109,15 @@ class OffboardControl:
         self._ask_until = -inf  # our mode or arming is asked for until then
         self._ask_again_at: float | None = None  # a refused request is repeated then
         self._next_hold_at = 0.0
+        self._left_mode = -1  # which it showed when HOLD was asked for
         self._release_until: float | None = None  # zeros only, until then at the longest
         self._lead_until = 0.0  # zeros only, before our mode is asked for
         self._led_at = 0.0  # the last of them
         self._was_heard_leading_in = False
         self._is_braking = False  # while STOPPING: zeros alone, as long as they slow it down
         self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
-        self._control_at = self._hold_at = self._disarm_at = -inf  # last asked for
-        self.arming_asked_at = -inf  #: s, the last time
+        self._hold_at = self._disarm_at = -inf  # last asked for
+        self.mode_asked_at = self.arming_asked_at = -inf  #: s, the last time, of our mode
         self.phase = Phase.IDLE
         self.refused: Refused | None = None
         self._arm_result: int | None = None  # of the last arm request; None: no answer
@@ -184,14 +187,15 @@ class OffboardControl:
         self._note_requests(now)
         if mode not in (self._persona.hold_mode, self._persona.control_mode):
             return False
-        asked_at = self._hold_at if mode == self._persona.hold_mode else self._control_at
+        asked_at = self._hold_at if mode == self._persona.hold_mode else self.mode_asked_at
         return now - asked_at <= LATE or (self._last_was_awaited and asked_at > -inf)
 
     def may_have_disarmed(self, *, now: float) -> bool:
         """Whether a disarming just seen can be our own doing."""
         self._note_requests(now)
         since = now - self._disarm_at
-        return since <= LATE or (self._last_was_awaited and since <= AWAITED)
+        is_awaited = self._last_was_awaited or self.phase is Phase.STOPPING
+        return since <= LATE or (is_awaited and since <= AWAITED)
 
     def take_messages(self) -> list[Message]:
         """Give the setpoints to send since the last call."""
@@ -387,7 +391,7 @@ class OffboardControl:
             case Phase.RELEASING if self._in_hold:
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self._end_release(disarm=disarm, now=now)
-            case Phase.RELEASING if now >= self._ask_until and not self._in_our_mode:
+            case Phase.RELEASING if self._gives_up_hold(now):
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self.phase = Phase.IDLE
             case Phase.RELEASING:
@@ -408,10 +412,15 @@ class OffboardControl:
         self._withdraw_requests()
         self.phase = Phase.RELEASING
         self.refused = None
-        self._ask_until = now + RELEASE_LIMIT
+        self._ask_until, self._left_mode = now + RELEASE_LIMIT, self._mode
         self._unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
+
+    def _gives_up_hold(self, now: float) -> bool:
+        """Whether it is time to ask a vehicle that does not show HOLD no more."""
+        is_unmoved = self._mode == self._left_mode
+        return not self._in_our_mode and now >= self._ask_until + INSISTS * is_unmoved
 
     def begin_stop(self, *, now: float, brake_for: float = 0.0) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
@@ -482,7 +491,7 @@ class OffboardControl:
         """Remember until when what we ask for was still being asked for."""
         match self.phase:
             case Phase.ASKING_MODE:
-                self._control_at = now
+                self.mode_asked_at = now
             case Phase.ASKING_HOLD | Phase.RELEASING | Phase.STOPPING:
                 self._hold_at = now
             case Phase.DISARMING:
@@ -523,7 +532,7 @@ class OffboardControl:
                 self._ask_mode(now=now)
 
     def _ask_mode(self, *, now: float) -> None:
-        self._control_at = now
+        self.mode_asked_at = now
         self._unsettle(now, mode=self._persona.control_mode)
         self._request(self._orders.our_mode(), until=self._ask_until, now=now)
 

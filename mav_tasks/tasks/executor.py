@@ -209,7 +209,8 @@ class Executor:
                 self._change(S.HELD, R.STOP_UNCONFIRMED, actor=SERVER, now=now)
                 return view.HALT
             case S.HELD if task.reason is R.STOP_UNCONFIRMED and not seen.still:
-                return view.HALT
+                is_led = seen.mode in (ModeKind.MANUAL, ModeKind.OTHER)  # by who has it now
+                return view.HOLD if is_led else view.HALT
         return view.HOLD
 
     def begins_again(self, *, now: float) -> bool:

@@ -23,6 +23,18 @@ _WORDS = {
 }
 
 
+#: what a client, or the server itself, has said
+WORDS = frozenset(
+    {
+        TaskReason.OPERATOR,
+        TaskReason.STOPPED,
+        TaskReason.CANCELLED,
+        TaskReason.CLEARED,
+        TaskReason.DISARMED,
+    }
+)
+
+
 class Halts:
     """The halts of one vehicle: how many there were, and the last."""
 
@@ -51,6 +63,11 @@ class Halts:
     def is_of_restart(self) -> bool:
         """Whether nothing has made it stand since this server has begun, after another one."""
         return self._reason is TaskReason.RESTARTED
+
+    @property
+    def is_by_word(self) -> bool:
+        """Whether the last is somebody's word, and not what was seen of the vehicle."""
+        return self._reason in WORDS
 
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it is the last one again, and is not counted."""

@@ -299,6 +299,10 @@ class VehicleTasks(Lineup):
             self.room.ended(killed, now=now)
         return killed
 
+    def end_halting(self) -> None:
+        """Somebody has the vehicle: what was killed need not be seen to stand."""
+        self.is_halting = False
+
     # time
 
     def setpoint_left(self, *, now: float) -> None:

@@ -13,6 +13,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
 from mav_tasks.services.command_receiver import Answer
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES
@@ -65,11 +66,19 @@ def relay(asked: Asked, *, now: float) -> None:
     )
 
 
+def _disarms(request: Message) -> bool:
+    if not isinstance(request, CommandLong | CommandInt):
+        return False
+    return (request.command, request.param1) == (MavCmd.COMPONENT_ARM_DISARM, 0.0)
+
+
 def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
     """Bring a vehicle's answer, or its silence, to the client that asked."""
     asker = answered.origin
     assert isinstance(asker, _Asker), "only relay gives commands an origin"
     is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
+    if is_accepted and _disarms(answered.request):
+        vehicle.parts.authority.shows_armed(armed=False)
     if is_accepted and answered.command == MavCmd.DO_SET_HOME:
         actor = f"{asker.source.system_id}/{asker.source.component_id}"
         vehicle.home_was_set(answered.request, actor=actor, now=now)

@@ -9,7 +9,7 @@ from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwise
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import wish_of
-from mav_tasks.engine.commands.ordering import why_older
+from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt, why_older
 from mav_tasks.engine.commit_gate import CommitGate, Effect
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -111,6 +111,8 @@ class Submissions:
         if known is not None:
             self._answer_repeat(asked, known, now=now)
             return
+        if has_left_before_halt(asked):
+            raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came since: {AGAIN}")
         self.check_open()
         draft = _allowed(asked.client, vehicle, draft)
         if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven

@@ -148,6 +148,10 @@ class MissionUploads:
             words = f"same plan again: still task {known}"
             self._answers.tell(sender, vehicle, words, now=now)
             return
+        halts = vehicle.tasks.halts
+        if not is_staged and upload.begun_at < halts.at:
+            words = f"{halts.words} came during the upload: upload it again"
+            raise Rejection(R.STALE, words)
         before = self._plans.stored(vehicle.system_id, MISSION)
         client = self._client(sender)
         if is_staged:

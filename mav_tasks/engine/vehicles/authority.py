@@ -13,6 +13,7 @@ from mav_tasks.tasks.view import ModeKind
 STREAM_GAP = 0.5  # s between setpoints that are a stream: the least for OFFBOARD is 2 Hz
 BY_CLIENT = 2.0  # s after a client asked for a mode, in which a change to it is its doing
 LATE = 3.5  # s after a word, in which what had left before it may still come to the vehicle
+ANY_MODE = -1  # that a command may bring about: the vehicle's own affair which
 UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may be from before it
 
 
@@ -33,7 +34,7 @@ class Authority:
         self._arming_allowed = may_arm  # by setting
         self._asked_mode = -1  # by a client, through us
         self._asked_at = -inf
-        self._passed_on = (-1, -inf)  # a mode that a client has asked for, and is not shown yet
+        self._passed_on: dict[int, float] = {}  # when each mode was last asked for by a client
         self._mode_is_ours = False
         self._granted: set[Hashable] = set()
         self._other_at = -inf  # sticks, or a second controller
@@ -41,6 +42,7 @@ class Authority:
         self._client_armed_at = -inf
         self._outdated_at = -inf  # what was to arm it before that counts no more
         self._was_disarmed = False  # then, or since
+        self._is_to_be_disarmed = False  # by a client's word, and it does not show that yet
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
         #: until somebody disarms or changes the mode
         self.may_arm = may_arm
@@ -96,7 +98,7 @@ class Authority:
         Whoever has asked last may drive: of two at once the vehicle would obey neither.
         """
         self._asked_mode, self._asked_at = mode, now
-        self._passed_on = mode, now
+        self._passed_on[mode] = now
         if mode == self._persona.control_mode:
             self._granted = {client}
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
@@ -119,13 +121,27 @@ class Authority:
         if now - max(ours, self._client_armed_at) <= LATE:
             self._outdated_at, self._was_disarmed = now, not armed
 
+    def outdate_our_arming(self, *, ours: float, armed: bool, now: float) -> None:
+        """What we wanted to arm it for is over: the same, of our own arming alone."""
+        if now - ours <= LATE and self._client_armed_at < ours:
+            self._outdated_at, self._was_disarmed = now, not armed
+
+    def is_told_to_disarm(self, *, armed: bool) -> None:
+        """A client's disarming goes to it: until it shows that, it is as good as disarmed."""
+        self._is_to_be_disarmed = armed
+
     def shows_armed(self, *, armed: bool) -> None:
-        """Take note of what a heartbeat shows."""
+        """Take note of what a heartbeat shows, or the answer to a disarming."""
         self._was_disarmed |= not armed
+        self._is_to_be_disarmed &= armed
 
     def may_be_armed_by_older(self, *, now: float) -> bool:
         """Whether what arms it now does not count: it may have left before the disarming."""
         return self._was_disarmed and now <= self._outdated_at + LATE
+
+    def is_as_disarmed(self, *, now: float) -> bool:
+        """Whether that it shows armed means nothing to a task that waits."""
+        return self._is_to_be_disarmed or self.may_be_armed_by_older(now=now)
 
     def is_armed_by_older(self, *, now: float) -> bool:
         """Whether it is, where it shows armed."""
@@ -133,32 +149,40 @@ class Authority:
 
     def end_older_arming(self) -> None:
         """Whatever arms it from here on is meant."""
-        self._outdated_at = -inf
+        self._outdated_at, self._is_to_be_disarmed = -inf, False
 
-    def mode_changed(self, mode: int, *, by_us: bool, now: float) -> bool:
-        """The vehicle shows another mode; gives whether it is our, or our clients', doing."""
+    def mode_changed(self, mode: int, *, by_us: bool, is_late: bool, now: float) -> bool:
+        """The vehicle shows another mode; gives whether it is our, or our clients', doing.
+
+        ``is_late``: it was asked for before a halt, and is nobody's any more.
+        """
         by_client = (
             mode == self._asked_mode == self._persona.control_mode
             and now - self._asked_at <= BY_CLIENT
         )
         self._asked_mode = -1
-        self._mode_is_ours = by_us or by_client
+        self._mode_is_ours = (by_us or by_client) and not is_late
         return self._mode_is_ours
 
-    def note_passed_on(self, mode: int, *, now: float) -> None:
-        """A client's command goes to the vehicle that makes it drive, in this mode of its own."""
-        self._passed_on = mode, now
+    def note_passed_on(self, *, now: float) -> None:
+        """A client's command goes to the vehicle that may make it drive, in a mode of its own."""
+        self._passed_on[ANY_MODE] = now
 
-    def was_asked_before(self, mode: int, *, halt: float) -> bool:
-        """Whether a client asked for a mode that is shown now shortly before a halt.
+    def was_asked_before(self, mode: int, *, ours: float, halt: float) -> bool:
+        """Whether a mode that is shown now was asked for shortly before a halt, and not since.
 
-        It is told once: who sets it again means it.
+        Also where it was shown before the halt: the net may have a copy of the word for it.
+        ``ours`` is when we last asked for our mode.
         """
-        passed_on, at = self._passed_on
-        if mode != passed_on or not at < halt <= at + LATE:
-            return False  # also where it was done before the halt: the net may have a copy of it
-        self._passed_on = (-1, -inf)
-        return True
+        asked = max(self._passed_on.get(mode, -inf), self._passed_on.get(ANY_MODE, -inf))
+        if mode == self._persona.control_mode:
+            asked = max(asked, ours)
+        return asked < halt <= asked + LATE
+
+    def moves_by_older(self, *, halt: float) -> bool:
+        """Whether what a client had sent before a halt may move the vehicle in any mode."""
+        asked = self._passed_on.get(ANY_MODE, -inf)
+        return asked < halt <= asked + LATE
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
         """Return what the present mode means for taking control.

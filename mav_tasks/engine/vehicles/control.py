@@ -101,6 +101,8 @@ class Effect(Enum):
     WITHDRAW_ARMING = auto()
     RESTORE_ARMING = auto()
     OUTDATE_ARMING = auto()  # what left before, ours or a client's
+    OUTDATE_OUR_ARMING = auto()
+    EXPECT_DISARMED = auto()
     DISARM = auto()
     LINGER = auto()  # leave its mode alone, a "go to" may follow
     HAND_OVER = auto()
@@ -141,7 +143,7 @@ def _row(event: Event, *effects: Step, **where: object) -> Row:
 _E, _F = Event, Effect
 ENGAGED = (Grip.TAKING, Grip.DRIVING, Grip.RELEASING)
 HAS_IT = (Work.RUNS, Work.ENDS, Work.LOST, Work.STANDS, Work.TAKEN)  # a task has the vehicle
-MOVES = (Work.RUNS, Work.ENDS)
+GOES_ON = (Work.RUNS, Work.ENDS, Work.LOST)  # by itself
 STANDS = (Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN)  # and goes on standing
 NO_TASK_HAS_IT = (Work.NONE, Work.WAITS)
 IS_LET_RUN = (Queue.RUNS, Queue.PAUSED)
@@ -155,6 +157,7 @@ TAKE_BACK = (
     _F.DROP_WAITING,
 )
 BUT_GO_TO = TAKE_BACK[1:]
+UNARMS = (_F.OUTDATE_ARMING, _F.EXPECT_DISARMED, _F.WITHDRAW_ARMING)
 
 TABLE = (
     # words that let it stand
@@ -195,21 +198,32 @@ TABLE = (
     _row(_E.PAUSE_TASKS, _F.FORGET_GO_TO, _F.FORGET_START, _F.PAUSE, _F.STEP),
     _row(
         _E.DISARM,
-        *(_F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, _F.ZERO_KEPT, _E.TAKEN),
+        *(_F.COUNT, *UNARMS, _F.ZERO_KEPT, _E.TAKEN),
         grip=ENGAGED,
     ),
     # a stream that ends here would leave a velocity behind
     _row(
         _E.DISARM,
-        *(_F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, *TAKE_BACK, _F.ZERO),
+        *(_F.COUNT, *UNARMS, *TAKE_BACK, _F.ZERO),
         driver=Driver.CLIENT,
         has_failsafe=False,
     ),
-    _row(_E.DISARM, _F.COUNT, _F.OUTDATE_ARMING, _F.WITHDRAW_ARMING, *TAKE_BACK),
-    _row(_E.CANCEL, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.REVOKE, _F.STEP),
+    _row(_E.DISARM, _F.COUNT, *UNARMS, *TAKE_BACK),
+    _row(
+        _E.CANCEL,
+        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
+    ),
+    # a set-point of it that comes late would drive it on
     _row(
         _E.CLEAR,
-        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.COUNT, _E.DRIVING_ENDS, *TAKE_BACK, _F.STEP),
+        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.COUNT, *TAKE_BACK, _F.LET_GO),
+        driver=Driver.CLIENT,
+        grip=Grip.FREE,
+    ),
+    _row(
+        _E.CLEAR,
+        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.OUTDATE_OUR_ARMING, _F.DO, _F.COUNT),
+        *(_E.DRIVING_ENDS, *TAKE_BACK, _F.STEP),
     ),
     _row(_E.OPERATOR_LOST, _F.FORGET_RELEASE, _F.FORGET_START, work=Work.NONE),
     _row(
@@ -226,7 +240,19 @@ TABLE = (
     _row(_E.CLOSE, _F.BRAKE),
     # what was seen, and lets it stand
     _row(_E.TAKEN, _F.COUNT, queue=Queue.STOPPED),
-    _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN, work=MOVES),
+    _row(
+        _E.TAKEN,
+        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
+        work=GOES_ON,  # also one that was to run though the queue is paused
+    ),
+    # it was being stopped: what waits does not drive it off from where somebody takes it
+    _row(
+        _E.TAKEN,
+        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
+        work=Work.WAITS,
+        queue=IS_LET_RUN,
+        grip=Grip.STOPPING,
+    ),
     _row(
         _E.TAKEN,
         *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
@@ -239,7 +265,7 @@ TABLE = (
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
     # since then something was let go: it is a person at the vehicle, or as good as one
-    _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.ENDS, Work.LOST)),
+    _row(_E.LATE_MODE, _E.MODE, work=GOES_ON),
     _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, queue=Queue.STOPPED),

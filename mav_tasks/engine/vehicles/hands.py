@@ -118,7 +118,8 @@ def _stay(on: Reach, _word: Word, now: float) -> None:
 
 @_does(Effect.LOSE)
 def _lose(on: Reach, _word: Word, _now: float) -> None:
-    """Send not one thing more."""
+    """Send not one thing more, whatever it was to stand for."""
+    on.parts.tasks.end_halting()
     on.parts.control.lose()
     on.parts.requests.end_performing()
 
@@ -210,10 +211,22 @@ def _outdate_arming(on: Reach, _word: Word, now: float) -> None:
     on.parts.authority.outdate_arming(ours=ours, armed=armed, now=now)
 
 
+@_does(Effect.OUTDATE_OUR_ARMING)
+def _outdate_our_arming(on: Reach, _word: Word, now: float) -> None:
+    """What we wanted to arm it for is over."""
+    ours, armed = on.parts.control.arming_asked_at, on.parts.monitor.armed
+    on.parts.authority.outdate_our_arming(ours=ours, armed=armed, now=now)
+
+
+@_does(Effect.EXPECT_DISARMED)
+def _expect_disarmed(on: Reach, _word: Word, _now: float) -> None:
+    """No task takes it by an arming that it shows until it has shown the disarming."""
+    on.parts.authority.is_told_to_disarm(armed=on.parts.monitor.armed)
+
+
 @_does(Effect.DISARM)
 def _disarm(on: Reach, _word: Word, now: float) -> None:
     """Ask for disarming, whoever armed it, until it is answered."""
-    on.parts.authority.end_older_arming()
     on.parts.control.disarm_now(now=now)
     on.parts.requests.flush(now=now)
 

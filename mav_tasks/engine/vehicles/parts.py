@@ -72,7 +72,7 @@ class Parts:
 
     def is_armed(self, *, now: float) -> bool:
         """Whether it shows armed, by a word that counts."""
-        return self.monitor.armed and not self.authority.may_be_armed_by_older(now=now)
+        return self.monitor.armed and not self.authority.is_as_disarmed(now=now)
 
     def note(self, text: str, *, now: float) -> None:
         """Tell everybody."""

@@ -10,7 +10,6 @@ from mav_tasks.engine.vehicles.hands import BUTTONS, Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.services.offboard import Phase
 from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason
 
@@ -52,6 +51,9 @@ class Takeovers:
         else:
             event = Event.COME_BACK_LED_AWAY
         self._joint.on(event, Word(text=words), now=now)
+        is_parked = mode == persona.hold_mode and parts.monitor.armed
+        if is_parked and not parts.tasks.terms.may_be_armed:  # by whoever had it before
+            self._taken(Event.PARKED, "", now=now)
 
     def look(self, *, was_mode: int, was_armed: bool, before: Before, now: float) -> None:
         """Look at a heartbeat: what it shows anew is somebody's doing; ``before`` it."""
@@ -65,6 +67,9 @@ class Takeovers:
         if armed and parts.authority.is_armed_by_older(now=now):
             words = "is armed by a word from before it was to be disarmed: disarmed again"
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
+        if self._moves_late(now=now):
+            words = "moves in HOLD, by a word from before it was to stand: HOLD again"
+            self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
         by_client = parts.authority.armed_by_client(now=now)
         if armed and by_hand and not by_client and parts.control.is_asking_mode:
@@ -122,8 +127,8 @@ class Takeovers:
     def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
         parts = self._parts
         persona, control = parts.persona, parts.control
-        by_us = control.may_have_set(mode, now=now)
-        ours = parts.authority.mode_changed(mode, by_us=by_us, now=now)
+        by_us, is_late = control.may_have_set(mode, now=now), self._comes_late(mode, now=now)
+        ours = parts.authority.mode_changed(mode, by_us=by_us, is_late=is_late, now=now)
         if parts.tasks.is_stopped:
             if mode != persona.hold_mode:
                 self._taken(Event.MODE_IN_STOP, "", now=now)
@@ -131,7 +136,7 @@ class Takeovers:
             self.rebooted(booted_at=now, now=now)
         elif self._shows_restart:
             pass  # a restart, which its clock has told of before, and nobody's doing
-        elif not ours and self._comes_late(mode, now=now):
+        elif is_late:
             words = f"shows {persona.mode_name(mode)}, asked for before it was to stand: HOLD again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif not ours and was_mode != persona.booting_mode:
@@ -147,13 +152,31 @@ class Takeovers:
             self._look_for_parking(was_mode, mode, now=now)
 
     def _comes_late(self, mode: int, *, now: float) -> bool:
-        """Whether a client's wish for a mode was overtaken by HOLD on its way to the vehicle."""
-        halts = self._parts.tasks.halts
-        if mode == self._parts.persona.hold_mode:
+        """Whether a wish for a mode was overtaken by HOLD on its way to the vehicle.
+
+        A mode for driving by hand is left to who is there.
+        """
+        persona, halts = self._parts.persona, self._parts.tasks.halts
+        if mode == persona.hold_mode or mode in persona.manual_modes:
             return False
-        was_before = self._parts.authority.was_asked_before(mode, halt=halts.at)
-        is_halted = now - halts.at <= LATE and not halts.is_undone
-        return was_before and is_halted
+        is_halted = now - halts.at <= LATE and halts.is_by_word and not halts.is_undone
+        ours = self._parts.control.mode_asked_at
+        return is_halted and self._parts.authority.was_asked_before(mode, ours=ours, halt=halts.at)
+
+    def _moves_late(self, *, now: float) -> bool:
+        """Whether a place that it was sent to before a halt moves it in HOLD."""
+        parts, halts = self._parts, self._parts.tasks.halts
+        is_held = parts.monitor.custom_mode == parts.persona.hold_mode
+        return (
+            parts.persona.drives_in_hold
+            and parts.monitor.armed
+            and is_held
+            and now - halts.at <= LATE
+            and halts.is_by_word
+            and not halts.is_undone
+            and parts.authority.moves_by_older(halt=halts.at)
+            and not parts.where.motion.is_still(now=now)
+        )
 
     def _look_for_parking(self, was_mode: int, mode: int, *, now: float) -> None:
         """Somebody who was driving sets HOLD: what waits does not drive it off from there."""
@@ -166,7 +189,7 @@ class Takeovers:
 
     def _disarmed(self, before: Before, *, now: float) -> None:
         parts = self._parts
-        if parts.control.phase is Phase.STOPPING or parts.control.may_have_disarmed(now=now):
+        if parts.control.may_have_disarmed(now=now):
             return
         if self._shows_restart:  # this heartbeat, or the clock before it, has told of that as well
             was_allowed = before.may_arm or parts.authority.is_withdrawn_by_restart

@@ -8,6 +8,7 @@ from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
@@ -38,8 +39,9 @@ from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
-REORDERED = 64  # packets that a net can put one behind others
-REORDERED_WITHIN = 0.5  # s; after a longer silence a smaller number is a restart
+REORDERED = 127  # packets that a net can put one behind others, as far as numbers tell
+REORDERED_WITHIN = 3.5  # s; after a longer silence a smaller number is a restart
+MOVING = frozenset({Kind.GO, Kind.MOTION, Kind.ACTION})
 
 
 class Vehicle:
@@ -185,6 +187,7 @@ class Vehicle:
         elif isinstance(message, Stamped):
             due = self._clock.next_at  # a setpoint that is late is followed by a zero
             if self.where.receive(message, now=now, not_after=due) is Heard.RESTART:
+                self._last_beat = (0, -inf)
                 booted_at = now - message.time_boot_ms / 1000
                 self._takeovers.rebooted(booted_at=booted_at, now=now)
                 self.where.receive(message, now=now, not_after=due)
@@ -281,8 +284,8 @@ class Vehicle:
             self.joint.disarm(actor=actor, now=now)
         elif command == MavCmd.COMPONENT_ARM_DISARM:
             self.joint.arm(now=now)
-        elif command == MavCmd.NAV_RETURN_TO_LAUNCH:
-            self.parts.authority.note_passed_on(self.persona.return_mode, now=now)
+        elif command != MavCmd.DO_SET_MODE and row_of_command(command).passed_on.kind in MOVING:
+            self.parts.authority.note_passed_on(now=now)  # which mode is the vehicle's own affair
         self.requests.relay(
             packet,
             message,

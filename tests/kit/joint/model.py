@@ -218,7 +218,7 @@ def passes(state: State) -> Iterator[State]:
     if work is Work.LOST:
         yield state._replace(work=Work.STANDS)
         yield from _over(state)
-        if state.queue is Queue.RUNS and is_free(state):
+        if is_free(state):  # also where the queue is paused, and this one runs all the same
             yield state._replace(work=Work.RUNS)
     if state.waits & (Waits.GO_TO | Waits.START):
         yield state._replace(waits=state.waits & ~(Waits.GO_TO | Waits.START))

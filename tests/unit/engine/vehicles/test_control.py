@@ -10,6 +10,10 @@ from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Wo
 from tests.kit.joint.graph import PEOPLE, TIME, Graph, variants
 from tests.kit.joint.model import MAKES
 
+#: the graph takes half a minute, and as much longer as the machine is busy
+pytestmark = pytest.mark.timeout(300)
+
+
 E, F = Event, Effect
 #: words after which nothing moves it, whatever is so
 WORDS = (E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.CLEAR)
