@@ -1,13 +1,10 @@
 """What waits until an event is durable: acknowledgements, each with its time limit."""
 
 from collections import deque
-from typing import NamedTuple, Protocol
+from math import inf
+from typing import NamedTuple
 
-
-class Effect(Protocol):
-    """What is done when it is known."""
-
-    def __call__(self, *, now: float) -> None: ...
+from mav_tasks.engine.timers import Effect, Timers, Turn
 
 
 class _Held(NamedTuple):
@@ -20,8 +17,9 @@ class _Held(NamedTuple):
 class CommitGate:
     """Effects in the order of the events that they wait for."""
 
-    def __init__(self) -> None:
+    def __init__(self, timers: Timers) -> None:
         self._held: deque[_Held] = deque()
+        self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up)
 
     def __len__(self) -> int:
         return len(self._held)
@@ -35,18 +33,21 @@ class CommitGate:
         give_up: Effect,
     ) -> None:
         """Call ``release`` once event ``number`` is durable, or ``give_up`` if too late."""
+        if not self._held:
+            self._timer.set(give_up_at)
         self._held.append(_Held(number, give_up_at, release, give_up))
 
     def committed(self, through: int, *, now: float) -> None:
         """Release all that waited for events up to ``through``."""
         while self._held and self._held[0].number <= through:
             self._held.popleft().release(now=now)
+        self._plan()
 
-    def next_deadline(self) -> float | None:
-        """Give when the oldest has waited too long."""
-        return self._held[0].give_up_at if self._held else None
-
-    def handle_deadline(self, *, now: float) -> None:
+    def _give_up(self, *, now: float) -> None:
         """Give up what has waited too long."""
         while self._held and self._held[0].give_up_at <= now:
             self._held.popleft().give_up(now=now)
+        self._plan()
+
+    def _plan(self) -> None:
+        self._timer.set(self._held[0].give_up_at if self._held else inf)

@@ -50,6 +50,7 @@ from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.reception import Reception
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
+from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.control import Event as ControlEvent
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -81,7 +82,13 @@ class Engine:
         self._fleet = Fleet(self._book, settings)
         if restored is not None:
             self._fleet.restore(restored, now=now)
-        packer = Packer()
+        packer, timers = Packer(), Timers()
+        self._timers = timers
+        self._keeping = timers.timer(Turn.SETTLING, self._settle)  # of signatures' times
+        self._stopping = timers.timer(Turn.SETTLING, self._settle)
+        self._starting = timers.timer(Turn.TASKS, self._fleet.room.handle_deadline)
+        self._starting.set(self._fleet.room.times.next_at)
+        self._telling = timers.timer(Turn.STATUSES, self._tell_statuses)
         seen = Restored() if restored is None else restored
         #: who has signed what comes in, and the signatures of what goes out
         self.signatures = Signatures(
@@ -93,8 +100,8 @@ class Engine:
             queue=self._packets,
             packer=packer,
             signatures=self.signatures,
+            statuses=self._telling,
             settings=settings,
-            now=now,
         )
         self._gates = FloodGates(is_client=self._gcs.has, settings=settings.clients)
         self._vehicles = VehicleSide(
@@ -103,12 +110,13 @@ class Engine:
             signatures=self.signatures,
             book=self._book,
             fleet=self._fleet,
+            timers=timers,
             settings=settings,
         )
         recollection = Recollection(self._book)
         if restored is not None:
             recollection.restore(restored.tasks, now=now)
-        self._submissions = Submissions(self._gcs, self._book, recollection, settings)
+        self._submissions = Submissions(self._gcs, self._book, recollection, timers, settings)
         self._parameters = ParameterDesk(
             self._gcs,
             self._vehicles,
@@ -120,9 +128,11 @@ class Engine:
         stored = {} if restored is None else restored.plans
         self._plans = Plans(self._book, self._fleet, settings, restored=stored)
         self._desks = MissionDesks(
-            self._gcs, self._vehicles, self._book, self._submissions, self._plans, settings
+            self._gcs, self._vehicles, self._book, self._submissions, self._plans, timers, settings
         )
-        self._reports = MissionReports(self._gcs, self._vehicles, self._book, self._plans, settings)
+        self._reports = MissionReports(
+            self._gcs, self._vehicles, self._book, self._plans, timers, settings
+        )
         self._displays = Displays(self._gcs, self._vehicles, self._book)
         refusals = Refusals(self._book)
         self._modes = ModeRequests(
@@ -146,10 +156,12 @@ class Engine:
             self._displays,
             self._submissions,
             TelemetryRates(self._gcs, self._vehicles),
+            timers,
+            now=now,
         )
         self._passing = Passing(self._vehicles, refusals)
         self._door = Door(self._vehicles, refusals)
-        self._operator = OperatorWatch()
+        self._operator = OperatorWatch(timers, self._note_unheard, settings)
         self._setup = SetupSigning(self.signatures, self._vehicles, settings)
         self._reception = Reception(
             gcs=self._gcs,
@@ -176,7 +188,7 @@ class Engine:
         self.last_words: tuple[Outgoing, ...] = ()
 
     def __repr__(self) -> str:
-        return f"Engine({list(self._vehicles)}, {list(self._gcs)}, {self._book!r})"
+        return f"Engine({list(self._vehicles.all)}, {list(self._gcs.clients)}, {self._book!r})"
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -186,7 +198,8 @@ class Engine:
     def handle(self, item: Input, *, now: float) -> None:
         """Take one input in."""
         self.signatures.now = now
-        self._vehicles.check_late(now=now)
+        if self._timers.not_before + self._settings.watch.late_tick < now:
+            self._vehicles.check_late(now=now)
         match item:
             case Packets():
                 self._reception.receive((item,), now=now)
@@ -232,32 +245,24 @@ class Engine:
 
     def next_deadline(self) -> float | None:
         """Give when ``handle_deadline`` has something to do; None: never, as things are."""
-        deadlines = [
-            self._publisher.next_deadline(),
-            self._vehicles.next_deadline(),
-            self._submissions.next_deadline(),
-            self._desks.next_deadline(),
-            self._reports.next_deadline(),
-            self._fleet.room.times.next_deadline(),
-            self._operator.next_deadline(limit=self._settings.watch.operator_lost),
-            self.signatures.next_deadline(),
-            None if self._stopped else self._stop_by,
-        ]
-        due = min((d for d in deadlines if d is not None), default=inf)
+        if self._vehicles.agenda.touched:  # after they were settled: by what is told of them
+            self._vehicles.agenda.plan()
+        due = self._timers.next_deadline()
         return None if due == inf else due
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due by now; may come late, or for nothing."""
         self.signatures.now = now
-        self._vehicles.check_late(now=now)
-        self._vehicles.handle_deadline(now=now)
-        self._submissions.handle_deadline(now=now)
-        self._desks.handle_deadline(now=now)
-        self._fleet.room.handle_deadline(now=now)
-        self._watch_operator(now=now)
+        if self._timers.not_before + self._settings.watch.late_tick < now:
+            self._vehicles.check_late(now=now)
+        due = self._timers.take_due(now=now)
+        for timer in due:
+            if timer.turn < Turn.SETTLING:
+                timer.do(now=now)
         self._settle(now=now)
-        self._publisher.handle_deadline(now=now)
-        self._reports.handle_deadline(now=now)
+        for timer in due:
+            if timer.turn > Turn.SETTLING:
+                timer.do(now=now)
 
     def take_events(self) -> list[Event]:
         """Give what happened since the last call, to be made durable in this order.
@@ -269,7 +274,7 @@ class Engine:
 
     def take_packets(self) -> list[Outgoing]:
         """Give the datagrams to send, in order."""
-        self.last_words = self._vehicles.last_words
+        self.last_words = self._vehicles.agenda.last_words
         packets = self._packets.copy()
         self._packets.clear()  # the list itself is shared with every outlet
         return packets
@@ -288,9 +293,9 @@ class Engine:
                     begun=vehicle.tasks.begun,
                     waiting=tuple(vehicle.tasks.waiting),
                 )
-                for vehicle in self._vehicles
+                for vehicle in self._vehicles.all
             ),
-            clients=tuple(repr(client) for client in self._gcs),
+            clients=tuple(repr(client) for client in self._gcs.clients),
             tasks=self._book.all(),
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
@@ -299,31 +304,34 @@ class Engine:
             ),
         )
 
-    def _watch_operator(self, *, now: float) -> None:
-        is_lost = self._operator.has_lost(limit=self._settings.watch.operator_lost, now=now)
-        if is_lost and self._settings.operator_lost == "pause":
+    def _tell_statuses(self, *, now: float) -> None:
+        self._publisher.send_statuses(now=now)
+
+    def _note_unheard(self, *, now: float) -> None:
+        """No ground station is there any more."""
+        if self._settings.operator_lost == "pause":
             for vehicle in self._vehicles.addressed_by(0):
                 vehicle.joint.on(ControlEvent.OPERATOR_LOST, UNHEARD, now=now)
 
     def _settle(self, *, now: float) -> None:
         """Bring vehicles' answers to clients, and what happened to clients and the journal."""
-        settings = self._parameters.take_change()
-        if settings is not None:
-            self._apply(settings)
-        for system_id in self._fleet.room.take_woken():
+        room, signatures = self._fleet.room, self.signatures
+        if self._parameters.is_changed:
+            self._apply(self._parameters.take_change())
+        for system_id in room.take_woken() if room.woken else ():
             woken = self._vehicles.get(system_id)
             if woken is not None:
                 woken.joint.wake(now=now)
-        for vehicle in self._vehicles.settle():
+        for vehicle in self._vehicles.agenda.settle() if self._vehicles.agenda.touched else ():
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
                 deliver(self._gcs, vehicle, answered, now=now)
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
-        for refused in self.signatures.take_refused():
+        for refused in signatures.take_refused() if signatures.refused else ():
             self._book.record(refused)
-        times = self.signatures.take_times()
+        times = signatures.take_times()
         if times is not None:
             self._book.record(times)
         events = self._book.take_events()
@@ -331,7 +339,12 @@ class Engine:
             self._publisher.publish(events, now=now)
             self._reports.publish(events, now=now)
             self._journal += events
-        self._publisher.send_statuses(now=now)
+        if self._telling.at <= now:
+            self._publisher.send_statuses(now=now)
+        if room.times.next_at != self._starting.at:
+            self._starting.set(room.times.next_at)
+        if signatures.keep_at != self._keeping.at:
+            self._keeping.set(signatures.keep_at)
 
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
@@ -345,18 +358,21 @@ class Engine:
         self._plans.apply(settings)
         self._desks.apply(settings)
         self._reports.apply(settings)
+        self._operator.apply(settings)
 
     def _shut_down(self, *, now: float) -> None:
         self._submissions.close()
         self._stop_by = now + self._settings.watch.shutdown
+        self._stopping.set(self._stop_by)
         for vehicle in self._vehicles.addressed_by(0):
             vehicle.joint.shut_down(now=now)
 
     def _note_stopped(self, *, now: float) -> None:
         assert self._stop_by is not None
-        rolling = tuple(v.system_id for v in self._vehicles if v.control.is_engaged)
+        rolling = tuple(v.system_id for v in self._vehicles.all if v.control.is_engaged)
         if not self._stopped and (not rolling or now >= self._stop_by):
             self._stopped = True
-            for vehicle in self._vehicles:
+            self._stopping.set(inf)
+            for vehicle in self._vehicles.all:
                 vehicle.joint.note_rest(now=now)
             self._book.record(ServerStopped(rolling, now))

@@ -127,7 +127,7 @@ class Reception:
 
     def _kind_of(self, message: m.Message | None) -> Kind:
         target = getattr(message, "target_system", 0)
-        vehicle = self._vehicles.look_at(target) if target else next(iter(self._vehicles), None)
+        vehicle = self._vehicles.look_at(target) if target else next(iter(self._vehicles.all), None)
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:

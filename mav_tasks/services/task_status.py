@@ -4,8 +4,9 @@ Pushed on each state change, and streamed for active tasks at the interval that 
 for. It keeps ids only; what is sent is the state at the time of sending.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf
 
 from mav_tasks.services.message_interval import LONGEST_US
 from mav_tasks.services.token_bucket import TokenBucket
@@ -25,7 +26,9 @@ class _Stream:
 class TaskStatusSender:
     """Which tasks' states one client is still to be told."""
 
-    def __init__(self, *, rate: float, now: float) -> None:
+    def __init__(self, *, rate: float, wake: Callable[[float], None], now: float) -> None:
+        """``wake`` is called with the time at which ``due`` has something to give."""
+        self._wake = wake
         self._limit = TokenBucket(rate=rate, burst=BURST, now=now)
         self._rate = rate
         self._changed: dict[int, None] = {}  # an ordered set
@@ -42,6 +45,7 @@ class TaskStatusSender:
         self._changed[task_id] = None
         if len(self._changed) > MOST:  # the oldest news; a request still shows that task
             del self._changed[next(iter(self._changed))]
+        self._wake(self._retry_at)
 
     def set_interval(self, vehicle: int, interval: float | None, *, now: float) -> None:
         """Stream a vehicle's active task every ``interval`` seconds; None: not at all."""
@@ -49,18 +53,17 @@ class TaskStatusSender:
             self._streams.pop(vehicle, None)
         else:
             self._streams[vehicle] = _Stream(min(max(interval, SHORTEST), LONGEST), now)
+            self._wake(now)
 
     def interval(self, vehicle: int) -> float | None:
         """Give the interval of a vehicle's stream, seconds; None: there is none."""
         stream = self._streams.get(vehicle)
         return None if stream is None else stream.interval
 
-    def next_deadline(self) -> float | None:
-        """Give when ``due`` has something to give."""
-        deadlines = [stream.next_at for stream in self._streams.values()]
-        if self._changed:
-            deadlines.append(self._retry_at)
-        return min(deadlines, default=None)
+    def next_deadline(self) -> float:
+        """Give when ``due`` has something to give; inf: never, as things are."""
+        first = self._retry_at if self._changed else inf
+        return min([first, *(stream.next_at for stream in self._streams.values())])
 
     def due(self, active: Mapping[int, int], *, now: float) -> list[int]:
         """Give the tasks to report now; ``active`` are those that streams report, by vehicle."""

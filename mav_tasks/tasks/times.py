@@ -1,6 +1,6 @@
 """Start times and deadlines of waiting tasks: which come next, by the clock that counts on."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from heapq import heapify, heappop, heappush
 from math import inf
 
@@ -14,6 +14,8 @@ class Times:
         self._starts: list[tuple[float, TaskId]] = []
         self._deadlines: list[tuple[float, TaskId]] = []
         self._wall_offset = 0.0
+        #: when the first of all is due; inf: never, as things are
+        self.next_at = inf
 
     def __repr__(self) -> str:
         return f"Times({len(self._starts)} starts, {len(self._deadlines)} deadlines)"
@@ -32,21 +34,26 @@ class Times:
             heappush(self._starts, (due, task.id))
         if task.terms.deadline is not None:
             heappush(self._deadlines, (task.terms.deadline, task.id))
+        self._look()
 
-    def next_deadline(self) -> float:
-        """Give when the first of all is due; inf: never, as things are."""
+    def _look(self) -> None:
         first_start = self._starts[0][0] if self._starts else inf
-        return min(first_start, self._deadlines[0][0] if self._deadlines else inf)
+        self.next_at = min(first_start, self._deadlines[0][0] if self._deadlines else inf)
 
-    def take_over(self, *, now: float) -> Iterator[tuple[float, TaskId]]:
+    def take_over(self, *, now: float) -> list[tuple[float, TaskId]]:
         """Give the deadlines that have passed, and of what."""
-        while self._deadlines and self._deadlines[0][0] <= now:
-            yield heappop(self._deadlines)
+        return self._take(self._deadlines, now)
 
-    def take_starts(self, *, now: float) -> Iterator[TaskId]:
-        """Give the tasks of which a start time has come."""
-        while self._starts and self._starts[0][0] <= now:
-            yield heappop(self._starts)[1]
+    def take_starts(self, *, now: float) -> list[tuple[float, TaskId]]:
+        """Give the start times that have come, and of what."""
+        return self._take(self._starts, now)
+
+    def _take(self, heap: list[tuple[float, TaskId]], now: float) -> list[tuple[float, TaskId]]:
+        due: list[tuple[float, TaskId]] = []
+        while heap and heap[0][0] <= now:
+            due.append(heappop(heap))
+        self._look()
+        return due
 
     def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
         """UTC = monotonic time + offset from now on, for all that wait."""
@@ -54,6 +61,7 @@ class Times:
         starts = [(self.start(task.terms), task.id) for task in tasks]
         self._starts = [(due, task_id) for due, task_id in starts if due > -inf]
         heapify(self._starts)
+        self._look()
 
 
 def is_too_late(task: Task, *, now: float) -> bool:

@@ -43,7 +43,8 @@ class WaitingRoom:
         self._dependencies = Dependencies(book)
         #: when each may begin, and until when
         self.times = Times()
-        self._woken: set[int] = set()
+        #: the vehicles whose queues have got a task since they were taken
+        self.woken: set[int] = set()
 
     def __repr__(self) -> str:
         return f"WaitingRoom({len(self._waiters)} tasks)"
@@ -92,7 +93,7 @@ class WaitingRoom:
 
     def take_woken(self) -> set[int]:
         """Give the vehicles whose queues have got a task since the last call."""
-        woken, self._woken = self._woken, set()
+        woken, self.woken = self.woken, set()
         return woken
 
     # coming
@@ -161,7 +162,7 @@ class WaitingRoom:
             task = self._book.change(task.id, wanted, reason=R.NONE, actor=SERVER, now=now)
         if wanted is S.QUEUED:
             self._line_up(task)
-            self._woken.add(task.vehicle)
+            self.woken.add(task.vehicle)
         else:
             self.queue(task.vehicle).discard(task.id)
         return task
@@ -185,7 +186,7 @@ class WaitingRoom:
             task = self._waiting(task_id)
             if task is not None and task.terms.deadline == at:  # not modified since
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
-        for task_id in self.times.take_starts(now=now):
+        for _, task_id in self.times.take_starts(now=now):
             task = self._waiting(task_id)
             if task is not None:
                 self._settle(task, now=now)
@@ -229,7 +230,7 @@ class WaitingRoom:
         else:
             del self._of_owner[owner]
         self._part(task.id, task.terms.after)
-        self._woken.add(task.vehicle)
+        self.woken.add(task.vehicle)
 
     def end(
         self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float

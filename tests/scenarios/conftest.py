@@ -6,6 +6,7 @@ from typing import Any, Protocol
 import pytest
 
 from tests.kit.joint.agreement import Agreement
+from tests.kit.needs import Needs
 from tests.kit.world import World
 
 
@@ -13,6 +14,17 @@ class MakeWorld(Protocol):
     """Makes a world (see World) whose observers are asked at the end of the test."""
 
     def __call__(self, **kw: Any) -> World: ...
+
+
+@pytest.fixture(autouse=True)
+def needs(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Hold the timers of every engine against what its parts need."""
+    looked = Needs()
+    looked.look_on(monkeypatch)
+    yield
+    if looked.surprises:
+        told = "\n".join(looked.surprises)
+        pytest.fail(f"the engine's timers do not know of this:\n{told}")
 
 
 @pytest.fixture

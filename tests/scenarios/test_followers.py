@@ -29,7 +29,7 @@ def test_who_has_asked_about_a_task_is_told_of_each_change(world: World) -> None
 def test_those_asked_about_longest_ago_are_forgotten_first(world: World) -> None:
     world.add_client("other", system_id=244)
     world.run(1.5)
-    (served,) = [c for c in world.server.engine._gcs if c.endpoint == "other"]
+    (served,) = [c for c in world.server.engine._gcs.clients if c.endpoint == "other"]
     for task_id in range(MAX_FOLLOWED + 2):
         served.follow(task_id)
     served.follow(2)

@@ -295,7 +295,7 @@ def test_who_signs_has_a_place_however_many_are_there_who_do_not(world: World) -
     world.run(0.3)
     assert sent.result == ACCEPTED
     assert client.heard("LOCAL_POSITION_NED")
-    assert len(list(world.server.engine._gcs)) == 4
+    assert len(list(world.server.engine._gcs.clients)) == 4
 
 
 def test_what_the_server_has_signed_itself_makes_nobody_a_client(world: World) -> None:

@@ -34,7 +34,7 @@ class Broadcasts:
             return [received]
         return [
             self._copy(received, vehicle.system_id)
-            for vehicle in sorted(self._vehicles, key=lambda vehicle: vehicle.system_id)
+            for vehicle in sorted(self._vehicles.all, key=lambda vehicle: vehicle.system_id)
         ]
 
     def _copy(self, received: Received, system_id: int) -> Received:

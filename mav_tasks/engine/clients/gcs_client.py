@@ -1,6 +1,7 @@
 """One client: an endpoint on a client link. What it has been shown, and what it asked for."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, Rights
@@ -43,10 +44,12 @@ class GcsClient:
         outlet: Outlet,
         *,
         settings: Clients,
+        wake: Callable[[float], None],
         is_configured: bool,
         is_connected: bool,
         now: float,
     ) -> None:
+        """``wake`` is called with the time at which it is to be told of a task."""
         self.outlet = outlet
         self.heard_at = now
         #: spoken to before it was heard: gets heartbeats until it answers
@@ -70,7 +73,7 @@ class GcsClient:
         self.uses_dialect = False
         self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
         self.thinner = Thinner(default_interval=settings.stream_interval)
-        self.statuses = TaskStatusSender(rate=settings.status_rate, now=now)
+        self.statuses = TaskStatusSender(rate=settings.status_rate, wake=wake, now=now)
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
         self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it

@@ -4,7 +4,8 @@ Any bytes may come in here; only a packet with a good CRC makes its sender a cli
 wants is given back as a value; the engine sees to it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -12,6 +13,7 @@ from mav_tasks.engine.clients.rights import RightsBook
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
 from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer, target_of
@@ -19,7 +21,6 @@ from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.services.command_receiver import is_stop
-from mav_tasks.services.heartbeat import HeartbeatSender
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 
@@ -51,9 +52,10 @@ class GcsSide:
         queue: list[Outgoing],
         packer: Packer,
         signatures: Signatures,
+        statuses: Timer,
         settings: Settings,
-        now: float,
     ) -> None:
+        """``statuses`` comes when a client is to be told of a task."""
         self._queue = queue
         self._packer = packer
         self._signatures = signatures
@@ -66,10 +68,14 @@ class GcsSide:
         self.turned_away = 0
         self._link_numbers: dict[str, int] = {}  # from 1, in the order in which links came
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
-        self.heartbeat = HeartbeatSender(now=now)
+        #: all that are there
+        self.clients = self._clients.values()
+        self._statuses = statuses
 
-    def __iter__(self) -> Iterator[GcsClient]:
-        return iter(self._clients.values())
+    def plan_statuses(self) -> None:
+        """Have the statuses that are to be told next come when they are due."""
+        due = [client.statuses.next_deadline() for client in self.clients]
+        self._statuses.set(min(due, default=inf))
 
     @property
     def counts(self) -> DecodeCounts:
@@ -81,7 +87,7 @@ class GcsSide:
         if not change.up:
             self._links.discard(change.link)
             for key in [key for key in self._clients if key[0] == change.link]:
-                del self._clients[key]
+                self._remove(key)
             return
         self._links.add(change.link)
         self._link_numbers.setdefault(change.link, len(self._link_numbers) + 1)
@@ -90,7 +96,7 @@ class GcsSide:
 
     def change_peer(self, change: PeerChanged, *, now: float) -> None:
         """Speak to who has come, forget who is gone."""
-        self._clients.pop((change.link, change.peer), None)
+        self._remove((change.link, change.peer))
         self._signatures.forget(change.link, change.peer)
         if change.up and change.link in self._links:
             self._add(change.link, change.peer, is_configured=True, is_connected=True, now=now)
@@ -114,7 +120,7 @@ class GcsSide:
         self._settings = settings
         self._rights = RightsBook(settings.roles)
         self._newcomers = None
-        for client in self._clients.values():
+        for client in self.clients:
             client.apply(settings.clients)
             submitter = client.submitter(client.last_source)
             client.take_rights(self._rights.of(client.signed_by, submitter), now=client.heard_at)
@@ -185,14 +191,14 @@ class GcsSide:
         question for their own.
         """
         if packet.message_id not in m.TARGETED:
-            for client in self._clients.values():
+            for client in self.clients:
                 client.forward(packet, now=now)
             return
         message = self._decoder.decode(packet)
         if message is None:
             return
         target = target_of(message)
-        for client in self._clients.values():
+        for client in self.clients:
             if client.is_reached_by(target):
                 client.forward(packet, now=now)
             else:
@@ -200,12 +206,12 @@ class GcsSide:
 
     def continue_numbers(self, packet: Packet) -> None:
         """Let this packet follow on the last one of its source towards every client."""
-        for client in self._clients.values():
+        for client in self.clients:
             client.outlet.continue_numbers(packet)
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT to every client."""
-        for client in self._clients.values():
+        for client in self.clients:
             client.tell(text, severity, source, now=now)
 
     def forget_silent(self, *, awaits: Callable[[GcsClient], bool], now: float) -> None:
@@ -214,14 +220,15 @@ class GcsSide:
         Who awaits the end of a task is told of it, however long it takes.
         """
         limits = self._settings.clients
-        is_crowded = self._is_crowded
-        for key, client in list(self._clients.items()):
+        clients = list(self._clients.items())
+        for key, client in clients:
             silence = now - client.heard_at
             if client.is_configured and not client.is_connected:
                 if silence > limits.push_lost:
                     client.is_heard = False
                 continue
-            passes = is_crowded and client.is_passing and not client.is_connected
+            is_passing = client.is_passing and not client.is_connected
+            passes = is_passing and self._is_crowd(len(clients))
             if silence > (SILENT if passes else limits.forget_after) and not awaits(client):
                 self._drop(key, client)
 
@@ -229,8 +236,13 @@ class GcsSide:
         if client.is_configured:
             client.is_heard = False
         else:
-            del self._clients[key]
+            self._remove(key)
             self._signatures.forget(*key)
+
+    def _remove(self, key: tuple[str, Peer]) -> None:
+        client = self._clients.pop(key, None)
+        if client is not None and client.statuses.next_deadline() < inf:
+            self.plan_statuses()
 
     def _add(
         self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
@@ -248,6 +260,7 @@ class GcsSide:
         return GcsClient(
             Outlet(link, peer, self._queue, self._packer, self._signatures),
             settings=self._settings.clients,
+            wake=self._statuses.bring_forward,
             is_configured=is_configured,
             is_connected=is_connected,
             now=now,
@@ -266,7 +279,7 @@ class GcsSide:
             self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=now)
         may_come = is_signed or self._newcomers.take(now=now)
         if may_come and self._has_room(is_signed=is_signed, now=now):
-            is_one_of_many = self._is_crowded and not is_signed
+            is_one_of_many = self._is_crowd(len(self._clients)) and not is_signed
             client = self._add(link, peer, is_configured=False, now=now)
             client.is_one_of_many = is_one_of_many
             return client
@@ -275,9 +288,8 @@ class GcsSide:
         self.turned_away += 1
         return None
 
-    @property
-    def _is_crowded(self) -> bool:
-        return len(self._clients) > self._settings.clients.max_clients // CROWDED
+    def _is_crowd(self, clients: int) -> bool:
+        return clients > self._settings.clients.max_clients // CROWDED
 
     def _has_room(self, *, is_signed: bool = False, now: float) -> bool:
         """Whether one more may be remembered; forgets who has been silent the longest for that."""
@@ -285,7 +297,7 @@ class GcsSide:
             return True
         others = [
             client
-            for client in self._clients.values()
+            for client in self.clients
             if not client.is_configured
             and (now - client.heard_at >= SILENT or (is_signed and client.signed_by is UNSIGNED))
         ]

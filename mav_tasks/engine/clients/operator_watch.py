@@ -2,31 +2,36 @@
 
 from math import inf
 
+from mav_tasks.engine.timers import Effect, Timers, Turn
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavType
+from mav_tasks.settings import Settings
 
 
 class OperatorWatch:
     """When a ground station was last heard; a script that sends no heartbeat is none."""
 
-    def __init__(self) -> None:
-        self._heard_at: float | None = None  # None: there is none, or its loss was told
+    def __init__(self, timers: Timers, lost: Effect, settings: Settings) -> None:
+        """``lost`` is called once when the last one has been silent for too long."""
+        self._heard_at = inf  # there is none, or its loss was told
+        self._lost = lost
+        self._timer = timers.timer(Turn.OPERATOR, self._lose)
+        self.apply(settings)
 
     def __repr__(self) -> str:
         return f"OperatorWatch(heard at {self._heard_at})"
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._limit = settings.watch.operator_lost
+        self._timer.set(self._heard_at + self._limit)
 
     def receive(self, heartbeat: m.Heartbeat, *, now: float) -> None:
         """Take a client's heartbeat in."""
         if heartbeat.type == MavType.GCS:
             self._heard_at = now
+            self._timer.set(now + self._limit)
 
-    def next_deadline(self, *, limit: float) -> float:
-        """Give when the last ground station has been silent for ``limit`` seconds; inf: never."""
-        return inf if self._heard_at is None else self._heard_at + limit
-
-    def has_lost(self, *, limit: float, now: float) -> bool:
-        """Whether that is so; said once."""
-        is_lost = now >= self.next_deadline(limit=limit)
-        if is_lost:
-            self._heard_at = None
-        return is_lost
+    def _lose(self, *, now: float) -> None:
+        self._heard_at = inf
+        self._lost(now=now)

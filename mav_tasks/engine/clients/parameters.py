@@ -51,7 +51,8 @@ class ParameterDesk:
         #: the latest wish for each that is not durable yet, and the number of its event
         self._pending: dict[str, tuple[float, int]] = {}
         self._settings, self._why_not = with_all(settings, self._kept)
-        self._is_changed = False
+        #: whether ``take_change`` has something to give
+        self.is_changed = False
 
     @property
     def in_force(self) -> dict[str, float]:
@@ -73,16 +74,18 @@ class ParameterDesk:
                 self._tell(name)
         return self._settings
 
-    def take_change(self) -> Settings | None:
-        """Give the settings once after each change that is in force now."""
-        is_changed, self._is_changed = self._is_changed, False
-        return self._settings if is_changed else None
+    def take_change(self) -> Settings:
+        """Give the settings after a change that is in force now."""
+        self.is_changed = False
+        return self._settings
 
     def receive(
         self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
     ) -> None:
         """Answer what is, or is also, for the task servers inside the vehicles addressed."""
-        vehicles = [v for v in self._vehicles if message.target_system in (BROADCAST, v.system_id)]
+        vehicles = [
+            v for v in self._vehicles.all if message.target_system in (BROADCAST, v.system_id)
+        ]
         for vehicle in vehicles:
             component = message.target_component
             if component in (BROADCAST, vehicle.server_component):
@@ -192,14 +195,14 @@ class ParameterDesk:
     def _take(self, name: str, value: float) -> None:
         self._kept[name] = value
         self._settings, self._why_not = with_all(self._configured, self._kept)
-        self._is_changed = True
+        self.is_changed = True
         self._tell(name)
 
     def _tell(self, name: str) -> None:
         """Tell every client that is there of a value."""
         told = param_receiver.value_of(self._values(), name)
-        for vehicle in self._vehicles:
-            for client in self._gcs:
+        for vehicle in self._vehicles.all:
+            for client in self._gcs.clients:
                 if client.is_heard and client.knows(vehicle.system_id):
                     client.outlet.send(told, vehicle.server_address)
 

@@ -13,11 +13,12 @@ from mav_tasks.engine.clients.summary import summary_of
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink.enums import MavSeverity, MavState
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.heartbeat import component_heartbeat
+from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskWaits
 from mav_tasks.tasks.lifecycle import TERMINAL
@@ -35,6 +36,9 @@ class Publisher:
         displays: Displays,
         submissions: Submissions,
         rates: TelemetryRates,
+        timers: Timers,
+        *,
+        now: float,
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
@@ -43,12 +47,13 @@ class Publisher:
         self._submissions = submissions
         self._rates = rates
         self._ended: set[TaskId] = set()  # not durably yet
+        timers.rhythm(Turn.HEARTBEATS, self._beat, period=INTERVAL, now=now)
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
         """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
         if client.knows_all(len(self._vehicles)):
             return
-        for vehicle in self._vehicles:
+        for vehicle in self._vehicles.all:
             if client.knows(vehicle.system_id) or not vehicle.is_heard(now=now):
                 continue  # a silent one must not look alive
             if vehicle.last_heartbeat is not None:
@@ -57,7 +62,7 @@ class Publisher:
 
     def withhold(self, packet: Packet) -> None:
         """Note for every client that a packet of a vehicle is not passed on."""
-        for client in self._gcs:
+        for client in self._gcs.clients:
             client.outlet.withhold(packet.source)
 
     def publish(self, events: list[Event], *, now: float) -> None:
@@ -100,7 +105,7 @@ class Publisher:
         task = self._book.get(task_id)
         if task is None or self._is_told_later(task_id):
             return
-        for client in self._gcs:
+        for client in self._gcs.clients:
             # a nonce says it for good: after a restart, or a long silence, the client is another
             reads = client.uses_dialect or task.marks.nonce
             if (reads and client.submitted(task)) or client.follows(task.id):
@@ -109,39 +114,28 @@ class Publisher:
     def _awaits(self, client: GcsClient) -> bool:
         return self._book.is_awaited_at(client.outlet.link, client.endpoint)
 
-    def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do."""
-        deadline = self._gcs.heartbeat.next_deadline()
-        for client in self._gcs:
-            due = client.statuses.next_deadline()
-            if due is not None:
-                deadline = min(deadline, due)
-        return deadline
-
-    def handle_deadline(self, *, now: float) -> None:
-        """Send the task servers' heartbeats and the statuses that are due."""
-        if self._gcs.heartbeat.is_due(now=now):
-            self._gcs.forget_silent(awaits=self._awaits, now=now)
-            self._rates.update(now=now)
-            self._send_heartbeats(now=now)
-            for client in self._gcs:
-                client.tell_what_was_left_out(now=now)
-        self.send_statuses(now=now)
+    def _beat(self, *, now: float) -> None:
+        """Each second: the task servers' heartbeats, and what goes by them."""
+        self._gcs.forget_silent(awaits=self._awaits, now=now)
+        self._rates.update(now=now)
+        self._send_heartbeats(now=now)
+        for client in self._gcs.clients:
+            client.tell_what_was_left_out(now=now)
 
     def send_statuses(self, *, now: float) -> None:
         """Send each client the statuses that are due."""
-        for client in self._gcs:
-            due = client.statuses.next_deadline()
-            if due is None or now < due:
+        for client in self._gcs.clients:
+            if now < client.statuses.next_deadline():
                 continue
             active: dict[int, int] = {
                 vehicle.system_id: vehicle.tasks.begun.id
-                for vehicle in self._vehicles
+                for vehicle in self._vehicles.all
                 if vehicle.tasks.begun is not None
             }
             for task_id in client.statuses.due(active, now=now):
                 if not self._is_told_later(task_id):
                     self._displays.push_status(client, task_id, now=now)
+        self._gcs.plan_statuses()
 
     def _send_heartbeats(self, *, now: float) -> None:
         """One from inside each vehicle that is heard, to each client that is.
@@ -152,12 +146,12 @@ class Publisher:
         DEVIATION: the task server's component falls silent with its vehicle; its heartbeats would
         otherwise hide from a ground station that the vehicle is lost.
         """
-        for vehicle in self._vehicles:
+        for vehicle in self._vehicles.all:
             if not vehicle.is_heard(now=now):
                 continue
             begun = vehicle.tasks.begun is not None
             heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
-            for client in self._gcs:
+            for client in self._gcs.clients:
                 if client.is_heard and client.knows(vehicle.system_id):
                     client.outlet.send(heartbeat, vehicle.server_address)
             self._inform(vehicle, now=now)
@@ -167,7 +161,9 @@ class Publisher:
 
         A ground station takes no text of a vehicle that it has only just heard of.
         """
-        new = [client for client in self._gcs if client.is_to_be_informed(vehicle.system_id)]
+        new = [
+            client for client in self._gcs.clients if client.is_to_be_informed(vehicle.system_id)
+        ]
         words = summary_of(vehicle.tasks) if new else ""
         for client in new if words else ():
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)

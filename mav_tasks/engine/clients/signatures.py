@@ -94,13 +94,15 @@ class Signatures:
         self._own: dict[tuple[bool, str, int, int, int], int] = {}
         self._heard: dict[tuple[str, Stream], int] = {}  # and not given to the store yet
         self._gone: set[tuple[str, Stream]] = set()
-        self._keep_at = inf
+        #: when times are to be given to the store
+        self.keep_at = inf
         self._signed_until = signed_until  # as the store has it
         self._highest = 0
         self._from = signed_until  # where own times begin, until the clock is known
         self._known_until = signed_until  # up to where an earlier run has known the time
         self._told: dict[str, float] = {}  # of wrong clocks, by key
-        self._refused: list[SignatureRefused] = []
+        #: whose clocks are wrong, until it is taken
+        self.refused: list[SignatureRefused] = []
         #: seconds: set before anything is signed or looked at
         self.now = 0.0
         self.counts = SignatureCounts()
@@ -226,7 +228,7 @@ class Signatures:
             self._heard.pop((key.fingerprint, gone), None)
             self._gone.add((key.fingerprint, gone))
         self._heard[key.fingerprint, stream] = timestamp
-        self._keep_at = min(self._keep_at, self.now + _kept_within(there, packet))
+        self.keep_at = min(self.keep_at, self.now + _kept_within(there, packet))
         self._signer(link, peer, key).heard(timestamp)
         return key
 
@@ -255,11 +257,11 @@ class Signatures:
         self._told[key.fingerprint] = self.now
         actor = f"{packet.source}@{peer} signed {key.name}"
         seconds = (self._clock() - timestamp) / UNITS
-        self._refused.append(SignatureRefused(actor, seconds, self.now))
+        self.refused.append(SignatureRefused(actor, seconds, self.now))
 
     def take_refused(self) -> list[SignatureRefused]:
         """Return whose clocks are wrong, for the journal and the log, since the last call."""
-        refused, self._refused = self._refused, []
+        refused, self.refused = self.refused, []
         return refused
 
     def _matters(self, link: _Link) -> bool:
@@ -337,14 +339,10 @@ class Signatures:
 
     # kept
 
-    def next_deadline(self) -> float | None:
-        """Give when times are to be given to the store."""
-        return None if self._keep_at == inf else self._keep_at
-
     def take_times(self) -> SignaturesSeen | None:
         """Give what the store has to keep by now, if it is time for that."""
         is_used_up = self._highest > 0 and self._signed_until < self._highest + RESERVE // 2
-        if self.now < self._keep_at and not is_used_up:
+        if self.now < self.keep_at and not is_used_up:
             return None
         if is_used_up:
             self._signed_until = self._highest + RESERVE
@@ -356,7 +354,7 @@ class Signatures:
         )
         self._heard.clear()
         self._gone.clear()
-        self._keep_at = inf
+        self.keep_at = inf
         return seen
 
 

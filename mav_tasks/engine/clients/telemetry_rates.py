@@ -19,11 +19,13 @@ class TelemetryRates:
 
     def update(self, *, now: float) -> None:
         """Have each vehicle asked for what is wished now."""
-        clients = [client for client in self._gcs if client.is_heard and client.thinner.has_wishes]
+        clients = [
+            client for client in self._gcs.clients if client.is_heard and client.thinner.has_wishes
+        ]
         if not clients and not self._had_wishes:
             return
         self._had_wishes = bool(clients)
-        for vehicle in self._vehicles:
+        for vehicle in self._vehicles.all:
             wishes: dict[bool, dict[int, float]] = {True: {}, False: {}}
             for commands, least in wishes.items():
                 for client in clients:

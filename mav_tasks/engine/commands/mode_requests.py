@@ -171,7 +171,7 @@ class ModeRequests:
         vehicle.shown.show(mode, until=now + lasts)
         heartbeat = vehicle.shown.in_message(vehicle.heartbeat, now=now)
         source = Address(vehicle.system_id, AUTOPILOT)
-        for client in self._gcs:
+        for client in self._gcs.clients:
             if client.knows(vehicle.system_id):
                 client.outlet.send(heartbeat, source)
 

@@ -104,7 +104,7 @@ class Passing:
 
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """A client is gone: whatever it was driving is driven by nobody."""
-        for vehicle in self._vehicles:
+        for vehicle in self._vehicles.all:
             if vehicle.motion_rights.has_granted((link, peer)):
                 self._vehicles.touch(vehicle)
                 vehicle.joint.client_is_gone((link, peer), now=now)

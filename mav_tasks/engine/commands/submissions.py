@@ -10,8 +10,9 @@ from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwi
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import wish_of
 from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt, why_older
-from mav_tasks.engine.commit_gate import CommitGate, Effect
+from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import is_task_command
+from mav_tasks.engine.timers import Effect, Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -41,13 +42,18 @@ class Submissions:
     """What becomes a task, and whether it may be said so yet."""
 
     def __init__(
-        self, gcs: GcsSide, book: TaskBook, recollection: Recollection, settings: Settings
+        self,
+        gcs: GcsSide,
+        book: TaskBook,
+        recollection: Recollection,
+        timers: Timers,
+        settings: Settings,
     ) -> None:
         self._gcs = gcs
         self._book = book
         self._recollection = recollection
         self._settings = settings
-        self._gate = CommitGate()
+        self._gate = CommitGate(timers)
         #: taken in, and not durable yet: who is to be told, each client once for a command
         self._undecided: dict[TaskId, list[Asked]] = {}
         self._store_is_away = False
@@ -69,14 +75,6 @@ class Submissions:
     def store_failed(self) -> None:
         """Refuse new submissions until something has been committed again."""
         self._store_is_away = True
-
-    def next_deadline(self) -> float | None:
-        """Give when a submission has waited too long for the store."""
-        return self._gate.next_deadline()
-
-    def handle_deadline(self, *, now: float) -> None:
-        """Withdraw submissions that did not become durable in time."""
-        self._gate.handle_deadline(now=now)
 
     def submit(self, asked: Asked, *, now: float) -> None:
         """Take in the task that a command asks for; Rejection says why not."""
@@ -248,7 +246,7 @@ class Submissions:
             words += describe(task.goal)
         else:
             words = f"Task {task.id} queued: {describe(task.goal)}"
-        for client in self._gcs:
+        for client in self._gcs.clients:
             is_blocked = tasks.urgent != task.id and (paused or tasks.is_held_ahead)
             is_told_otherwise = client is not asked.client or client.uses_dialect
             is_calm = is_told_otherwise or not is_blocked

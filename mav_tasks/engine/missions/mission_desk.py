@@ -3,6 +3,10 @@
 What becomes of uploads is in ``mission_uploads``, clearing in ``mission_clearing``.
 """
 
+from collections.abc import Callable
+from functools import partial
+from math import inf
+
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.submissions import Submissions
@@ -14,6 +18,7 @@ from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadDesk
 from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored, begins_with
 from mav_tasks.engine.missions.write_through import WriteThrough
 from mav_tasks.engine.policy import GO_TO, row_of
+from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -61,9 +66,18 @@ MissionMessage = (
 class _Desk:
     """Uploads to, and downloads from, one address, of plans of one type."""
 
-    def __init__(self, check: ItemCheck, form: RequestForm) -> None:
+    def __init__(
+        self, check: ItemCheck, form: RequestForm, timers: Timers, ask_again: Callable[..., None]
+    ) -> None:
+        """``ask_again`` is called with the desk when an item is to be asked for again."""
         self.uploads = UploadDesk(check, form)
         self.sender = MissionSender()
+        self._timer = timers.timer(Turn.UPLOADS, partial(ask_again, self))
+
+    def plan(self) -> None:
+        """Have the next item asked for again, or the upload given up, when that is due."""
+        due = self.uploads.receiver.next_deadline()
+        self._timer.set(inf if due is None else due)
 
 
 class MissionDesks:
@@ -76,10 +90,12 @@ class MissionDesks:
         book: TaskBook,
         submissions: Submissions,
         plans: Plans,
+        timers: Timers,
         settings: Settings,
     ) -> None:
         self._vehicles = vehicles
         self._plans = plans
+        self._timers = timers
         self._settings = settings
         self._answers = MissionAnswers(gcs, book)
         write_through = WriteThrough(vehicles)
@@ -157,6 +173,7 @@ class MissionDesks:
             case m.MissionRequestPartialList() | m.MissionWritePartialList():
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
         self._uploads.flush(desk.uploads, vehicle, now=now)
+        desk.plan()
         return True
 
     def _is_refused(
@@ -185,19 +202,12 @@ class MissionDesks:
             return True
         return False
 
-    def next_deadline(self) -> float | None:
-        """Give when an item is to be asked for again, or an upload given up."""
-        deadlines = [desk.uploads.receiver.next_deadline() for desk in self._desks.values()]
-        return min((d for d in deadlines if d is not None), default=None)
-
-    def handle_deadline(self, *, now: float) -> None:
-        """Ask again, and give up."""
-        for (system_id, _, _), desk in self._desks.items():
-            due = desk.uploads.receiver.next_deadline()
-            vehicle = self._vehicles.get(system_id) if due is not None and due <= now else None
-            if vehicle is not None:
-                desk.uploads.receiver.handle_deadline(now=now)
-                self._uploads.flush(desk.uploads, vehicle, now=now)
+    def _ask_again(self, vehicle: Vehicle, desk: _Desk, *, now: float) -> None:
+        """Ask again, and give up in the end."""
+        self._vehicles.touch(vehicle)
+        desk.uploads.receiver.handle_deadline(now=now)
+        self._uploads.flush(desk.uploads, vehicle, now=now)
+        desk.plan()
 
     def _desk(self, vehicle: Vehicle, component: int, kind: int) -> _Desk:
         key = vehicle.system_id, component, kind if kind in STORED else MISSION
@@ -206,7 +216,8 @@ class MissionDesks:
             is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
             form = m.MissionRequest if is_plain else m.MissionRequestInt
             check = ItemCheck(vehicle, component, self._settings)
-            desk = self._desks[key] = _Desk(check, form)
+            ask_again = partial(self._ask_again, vehicle)
+            desk = self._desks[key] = _Desk(check, form, self._timers, ask_again)
         return desk
 
     def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:

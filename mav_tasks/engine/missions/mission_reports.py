@@ -6,10 +6,12 @@ other.
 """
 
 from dataclasses import dataclass
+from math import inf
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.missions.plan_items import performed
 from mav_tasks.engine.missions.plans import Plans
+from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
@@ -59,19 +61,28 @@ class MissionReports:
     """What clients are told of missions without asking."""
 
     def __init__(
-        self, gcs: GcsSide, vehicles: VehicleSide, book: TaskBook, plans: Plans, settings: Settings
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        book: TaskBook,
+        plans: Plans,
+        timers: Timers,
+        settings: Settings,
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
         self._plans = plans
         self._claims = settings.claim
+        self._has_vehicles = False
         self._next_at = 0.0
+        self._timer = timers.timer(Turn.REPORTS, self._report)
         self._last: dict[int, _Last] = {}  # by vehicle
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._claims = settings.claim
+        self._plan()
 
     def replaces(self, packet: Packet) -> bool:
         """Whether a vehicle's packet is not shown, because the server speaks of missions."""
@@ -96,24 +107,23 @@ class MissionReports:
             if vehicle is not None:
                 self._tell(vehicle, self._plans.current(vehicle))
 
-    def next_deadline(self) -> float | None:
-        """Give when MISSION_CURRENT is due; None: there is nobody to tell of."""
-        return self._next_at if self._claims and len(self._vehicles) else None
+    def _plan(self) -> None:
+        """Have MISSION_CURRENT sent when that is due, if there is a vehicle to tell of."""
+        self._timer.set(self._next_at if self._claims and self._has_vehicles else inf)
 
-    def handle_deadline(self, *, now: float) -> None:
-        """Send what is due."""
-        if not self._claims or now < self._next_at:
-            return
+    def _report(self, *, now: float) -> None:
         self._next_at = now + INTERVAL
-        for vehicle in self._vehicles:
+        self._timer.set(self._next_at)
+        for vehicle in self._vehicles.all:
             if vehicle.is_heard(now=now):
                 self._tell(vehicle, self._plans.current(vehicle))
-                self._tell_end_again(vehicle)
+                if vehicle.system_id in self._last:
+                    self._tell_end_again(vehicle, self._last[vehicle.system_id])
 
-    def _tell_end_again(self, vehicle: Vehicle) -> None:
+    def _tell_end_again(self, vehicle: Vehicle, last: _Last) -> None:
         """Who has missed the last item would take the mission for unfinished for ever."""
-        task, last = self._plans.shown(vehicle), self._last.get(vehicle.system_id)
-        if task is None or last is None or task.id != last.task_id or last.left == 0:
+        task = self._plans.shown(vehicle)
+        if task is None or task.id != last.task_id or last.left == 0:
             return
         if task.state is TaskState.COMPLETED:
             last.left -= 1
@@ -132,6 +142,9 @@ class MissionReports:
 
     def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
         """Say what the vehicle would not do of what a plan orders; the plan goes on."""
+        if not self._has_vehicles:
+            self._has_vehicles = True
+            self._plan()
         for answered in vehicle.requests.take_unperformed():
             ack, command = answered.ack, answered.command
             what = "no answer" if ack is None else f"refused, result {ack.result}"
@@ -140,6 +153,6 @@ class MissionReports:
 
     def _tell(self, vehicle: Vehicle, message: m.Message) -> None:
         source = Address(vehicle.system_id, AUTOPILOT)
-        for client in self._gcs:
+        for client in self._gcs.clients:
             if client.is_heard and client.knows(vehicle.system_id):
                 client.outlet.send(message, source)

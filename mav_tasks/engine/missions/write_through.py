@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from mav_tasks.engine.commit_gate import Effect
+from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection

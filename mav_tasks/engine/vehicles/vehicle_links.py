@@ -1,18 +1,21 @@
 """The ways to vehicles: links, endpoints on them, which vehicle is where, what a link carries."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
+from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
 from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Place, Router
-from mav_tasks.services.heartbeat import HeartbeatSender
+from mav_tasks.services.heartbeat import INTERVAL
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import VehicleSeen
@@ -27,8 +30,8 @@ class Link:
 
     is_local: bool
     capacity: float | None
-    heartbeat: HeartbeatSender
-    outlets: dict[Peer, Outlet] = field(default_factory=dict)
+    heartbeat: Timer
+    outlets: dict[Peer, Outlet]
 
 
 class VehicleLinks:
@@ -43,9 +46,16 @@ class VehicleLinks:
         signatures: Signatures,
         settings: Settings,
         book: TaskBook,
+        timers: Timers,
+        beat: Callable[..., None],
         note_once: Callable[..., None],
     ) -> None:
-        """``vehicles`` are all that were found, by system id; ``note_once`` tells of one, once."""
+        """``vehicles`` are all that were found, by system id; ``note_once`` tells of one, once.
+
+        ``beat`` is called with the ways out of a link when they are to be sent a heartbeat.
+        """
+        self._timers = timers
+        self._beat = beat
         self._all = vehicles
         self._queue = queue
         self._packer = packer
@@ -78,15 +88,18 @@ class VehicleLinks:
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Take a link into use, or out of it."""
+        old = self._links.pop(change.link, None)
+        if old is not None:
+            old.heartbeat.set(inf)
         if not change.up:
-            self._links.pop(change.link, None)
             return
-        link = Link(change.is_local, change.capacity, HeartbeatSender(now=now))
         self._budgets.clear()
         places = [self.router.place_of(vehicle.system_id) for vehicle in self._all.values()]
         known = [place[1] for place in places if place is not None and place[0] == change.link]
-        for peer in (*change.peers, *known):
-            link.outlets[peer] = self._outlet(change.link, peer)
+        outlets = {peer: self._outlet(change.link, peer) for peer in (*change.peers, *known)}
+        beat = partial(self._beat, outlets)
+        heartbeat = self._timers.rhythm(Turn.LINKS, beat, period=INTERVAL, now=now)
+        link = Link(change.is_local, change.capacity, heartbeat, outlets)
         self._links[change.link] = link
 
     def change_peer(self, change: PeerChanged) -> None:

@@ -5,12 +5,14 @@ changes anything.
 """
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer
+from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.agenda import Agenda
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import Word
@@ -77,20 +79,27 @@ class VehicleSide:
         signatures: Signatures,
         book: TaskBook,
         fleet: Fleet,
+        timers: Timers,
         settings: Settings,
     ) -> None:
         self._signatures = signatures
         self._book = book
         self._fleet = fleet
         self._settings = settings
+        #: as whom the server speaks to vehicles
+        self.our_address = _own_address(settings)
         self._decoder = Decoder()
-        self._agenda = Agenda()
+        #: which of them have something to do
+        self.agenda = Agenda(timers)
         self._old_until = -inf
         self._stood_for = 0.0  # s, that this process stood still before that
         self._noted: set[str] = set()
         self._answer: Packet | None = None  # the last that told the time
         self._asked: deque[int] = deque(maxlen=ASKED)  # what vehicles were asked the time with, ns
+        self._question = m.Timesync(0, 0)  # filled in anew each time
         self._vehicles: dict[int, Vehicle] = {}
+        #: every one of them, to be looked at only
+        self.all = self._vehicles.values()
         #: the ways to them
         self.links = VehicleLinks(
             self._vehicles,
@@ -99,12 +108,10 @@ class VehicleSide:
             signatures=signatures,
             settings=settings,
             book=book,
+            timers=timers,
+            beat=self._beat,
             note_once=self._note_once,
         )
-
-    def __iter__(self) -> Iterator[Vehicle]:
-        """Give every vehicle, to be looked at only."""
-        return iter(self._vehicles.values())
 
     def __len__(self) -> int:
         return len(self._vehicles)
@@ -113,12 +120,12 @@ class VehicleSide:
         """Give a vehicle, to do something to it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None:
-            self._agenda.touch(vehicle)
+            self.agenda.touch(vehicle)
         return vehicle
 
     def touch(self, vehicle: Vehicle) -> None:
         """Note that something is about to be done to a vehicle that was only looked at."""
-        self._agenda.touch(vehicle)
+        self.agenda.touch(vehicle)
 
     def look_at(self, system_id: int) -> Vehicle | None:
         """Give a vehicle to which nothing is done."""
@@ -148,7 +155,7 @@ class VehicleSide:
 
         Whether what that key had asked for is still wanted only an operator can say.
         """
-        for each in self if keys else ():
+        for each in self.all if keys else ():
             each.parts.forget_start_of(keys)
         for tasks in self._fleet if keys else ():
             theirs = [task for task in tasks.unfinished if task.submitter.key in keys]
@@ -167,21 +174,12 @@ class VehicleSide:
             else:
                 vehicle.joint.on(Event.PAUSE_TASKS, Word(), now=now)
 
-    def settle(self) -> list[Vehicle]:
-        """Look at what became of those to which something was done; gives them."""
-        return self._agenda.settle()
-
-    @property
-    def last_words(self) -> tuple[Outgoing, ...]:
-        """Zero and HOLD for every vehicle that is being driven."""
-        return self._agenda.last_words
-
     def commit(self, durable: int, *, now: float) -> None:
         """Let begin what waited for nothing but that events are durable up to this number."""
-        waiting = self._agenda.awaiting_commit()
+        waiting = self.agenda.awaiting_commit()
         self._book.durable = durable
         for vehicle in waiting:
-            self._agenda.touch(vehicle)
+            self.agenda.touch(vehicle)
             vehicle.joint.step(now)
 
     @property
@@ -192,10 +190,11 @@ class VehicleSide:
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
+        self.our_address = _own_address(settings)
         self.links.apply(settings)
-        for vehicle in self:
+        for vehicle in self.all:
             vehicle.apply(settings)
-            self._agenda.touch(vehicle)  # its deadlines may be others
+            self.agenda.touch(vehicle)  # its deadlines may be others
 
     def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
         """Take a packet in; gives the vehicle in whose name it is to be forwarded, if any.
@@ -251,43 +250,25 @@ class VehicleSide:
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
-        due = self.next_deadline()
+        due = min(self.agenda.next_deadline(), *(link.heartbeat.at for link in self.links), inf)
         if due + self._settings.watch.late_tick >= now:
             return
         self._old_until, self._stood_for = now + OLD_NEWS, now - due
-        for vehicle in self:
-            self._agenda.touch(vehicle)
+        for vehicle in self.all:
+            self.agenda.touch(vehicle)
             vehicle.joint.check_late(now=now)
 
     def may_have_waited(self, *, now: float) -> float:
         """Return for how many seconds what is read now may have waited."""
         return self._stood_for if now < self._old_until else 0.0
 
-    def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do; inf: never, as things are."""
-        heartbeats = [link.heartbeat.next_deadline() for link in self.links]
-        return min(self._agenda.next_deadline(), *heartbeats, inf)
-
-    def handle_deadline(self, *, now: float) -> None:
-        """Send heartbeats and let each vehicle do what is due."""
-        source = self.our_address
-        for link in self.links:
-            if link.heartbeat.is_due(now=now):
-                question = round(now * NANO)
-                self._asked.append(question)
-                for outlet in link.outlets.values():
-                    outlet.send(gcs_heartbeat(), source)
-                    outlet.send(m.Timesync(0, question), source)
-        for system_id in self._agenda.take_due(now=now):
-            vehicle = self.get(system_id)
-            if vehicle is not None:
-                vehicle.handle_deadline(now=now)
-
-    @property
-    def our_address(self) -> Address:
-        """As whom the server speaks to vehicles."""
-        identity = self._settings.identity
-        return Address(identity.system_id, identity.component_id)
+    def _beat(self, outlets: Mapping[Peer, Outlet], *, now: float) -> None:
+        """Each second and link: say that we are there, and ask for the time."""
+        self._question.ts1 = round(now * NANO)
+        self._asked.append(self._question.ts1)
+        for outlet in outlets.values():
+            outlet.send(gcs_heartbeat(), self.our_address)
+            outlet.send(self._question, self.our_address)
 
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
@@ -329,7 +310,7 @@ class VehicleSide:
         )
         self._vehicles[packet.system_id] = vehicle
         self.links.learn(packet.system_id, (link_name, peer))
-        self._agenda.touch(vehicle)
+        self.agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
         vehicle.joint.step(now)
@@ -343,10 +324,10 @@ class VehicleSide:
     ) -> None:
         """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
         target = getattr(message, "target_system", 0)
-        for vehicle in self:
+        for vehicle in self.all:
             place = self.links.router.place_of(vehicle.system_id)
             if target in (0, vehicle.system_id) and place is not None and place[0] == link:
-                self._agenda.touch(vehicle)
+                self.agenda.touch(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
@@ -354,3 +335,7 @@ class VehicleSide:
         if key not in self._noted and len(self._noted) < MOST_NOTES:
             self._noted.add(key)
             self._book.record(VehicleNoted(system_id, text, now))
+
+
+def _own_address(settings: Settings) -> Address:
+    return Address(settings.identity.system_id, settings.identity.component_id)

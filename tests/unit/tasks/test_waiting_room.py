@@ -64,7 +64,7 @@ class TestTimes:
         rig = Rig()
         task = rig.submit(start_at=105.0)
         assert rig.state(task)[0] is S.SCHEDULED
-        assert rig.room.times.next_deadline() == 105.0
+        assert rig.room.times.next_at == 105.0
         rig.pass_to(104.9)
         assert rig.state(task)[0] is S.SCHEDULED
         rig.pass_to(105.0)
@@ -96,7 +96,7 @@ class TestTimes:
         rig.pass_to(103.0)
         assert rig.state(task) == (S.EXPIRED, R.DEADLINE)
         assert [rig.state(t) for t in (waiting, last)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
-        assert rig.room.times.next_deadline() == float("inf")
+        assert rig.room.times.next_at == float("inf")
 
     def test_a_deadline_that_was_moved_counts_no_more(self) -> None:
         rig = Rig()

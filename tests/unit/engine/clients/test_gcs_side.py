@@ -3,8 +3,12 @@
 from mav_tasks.engine.clients.gcs_side import MAX_LINK_NUMBER, GcsSide
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, LinkSide
+from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.settings import Settings
+
+
+def do_nothing(*, now: float) -> None: ...
 
 
 def side(*links: str) -> GcsSide:
@@ -12,8 +16,8 @@ def side(*links: str) -> GcsSide:
         queue=[],
         packer=Packer(),
         signatures=Signatures(window=60.0),
+        statuses=Timers().timer(Turn.STATUSES, do_nothing),
         settings=Settings(),
-        now=0.0,
     )
     for link in links:
         made.change_link(LinkChanged(link, LinkSide.CLIENTS, up=True), now=0.0)

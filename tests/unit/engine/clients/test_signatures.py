@@ -1,5 +1,6 @@
 """Whose a packet is, as the engine sees it; and what the store has to keep for that."""
 
+from math import inf
 from typing import Any
 
 import pytest
@@ -131,14 +132,14 @@ def test_a_time_is_kept_as_soon_as_its_packet_could_do_harm_again(kind: str, wit
     it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
     it.take_times()  # of its own times it keeps a reserve, at once
     it.admit(CLIENTS, "p", packet(kind=kind, timestamp=NOW + 1))
-    assert it.next_deadline() == within
+    assert it.keep_at == within
     it.now = within - 0.1
     assert it.take_times() is None
     it.now = within
     seen = it.take_times()
     assert seen is not None
     assert [time.timestamp for time in seen.times] == [NOW + 1]
-    assert it.next_deadline() is None
+    assert it.keep_at == inf
 
 
 def test_an_idle_station_is_written_down_once_a_minute() -> None:
