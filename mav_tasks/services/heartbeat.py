@@ -1,5 +1,7 @@
 """Heartbeats: watching a vehicle's, and our own. MAVLink guide, "Heartbeat/Connection"."""
 
+from functools import cache
+
 from mav_tasks.mavlink.enums import MavAutopilot, MavModeFlag, MavState, MavType
 from mav_tasks.mavlink.messages import Heartbeat
 
@@ -56,11 +58,13 @@ class HeartbeatSender:
         return True
 
 
+@cache
 def gcs_heartbeat() -> Heartbeat:
     """Give what the server says of itself on vehicle links: a ground station."""
     return Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)
 
 
+@cache
 def component_heartbeat(state: MavState) -> Heartbeat:
     """Give what the task server's component inside a vehicle's system says to clients.
 

@@ -75,7 +75,7 @@ class Thinner:
         self._intervals: dict[int, dict[int, float | None]] = {}  # by system and message
         #: whether somebody who may command wished it, by system and message: of what the vehicle
         #: itself is asked for
-        self._asked: dict[int, dict[int, bool]] = {}
+        self.asked: dict[int, dict[int, bool]] = {}
         self._last: dict[tuple[int, int, int], float] = {}
         self.stretch = Stretch()
 
@@ -90,7 +90,7 @@ class Thinner:
         self._ask(system_id, message_id, commands=commands)
 
     def _ask(self, system_id: int, message_id: int, *, commands: bool) -> None:
-        asked = self._asked.setdefault(system_id, {})
+        asked = self.asked.setdefault(system_id, {})
         if message_id in self._intervals[system_id]:
             asked[message_id] = commands
         else:  # back to the default, or one wish too many
@@ -132,14 +132,9 @@ class Thinner:
         wishes = self._intervals.get(system_id, {})
         return {
             number: interval
-            for number, has in self._asked.get(system_id, {}).items()
+            for number, has in self.asked.get(system_id, {}).items()
             if has is commands and (interval := wishes.get(number)) is not None
         }
-
-    @property
-    def has_wishes(self) -> bool:
-        """Whether the client ever asked for an interval."""
-        return bool(self._asked)
 
     def passes(self, system_id: int, component_id: int, message_id: int, *, now: float) -> bool:
         """Whether a message that just came is sent on to the client."""

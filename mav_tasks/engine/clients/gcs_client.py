@@ -77,7 +77,8 @@ class GcsClient:
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
         self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it
-        self._left_out: dict[Address, int] = {}  # texts that were too many, by who said them
+        #: texts that were too many, by who said them
+        self.left_out: dict[Address, int] = {}
         self._introduced: set[int] = set()
         self._informed: set[int] = set()  # of which vehicles' tasks it was told since it came
         self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
@@ -197,8 +198,8 @@ class GcsClient:
         return system_id in self._introduced
 
     def is_to_be_informed(self, system_id: int) -> bool:
-        """Whether it is new, or back, and knows a vehicle; asked once, it is informed."""
-        if not self.is_heard or not self.knows(system_id) or system_id in self._informed:
+        """Whether it is new to a vehicle that it knows, or back; asked once, it is informed."""
+        if system_id in self._informed:
             return False
         self._informed.add(system_id)
         return True
@@ -235,7 +236,7 @@ class GcsClient:
         if not self.is_heard or not self.knows(source.system_id):
             return
         if severity > MavSeverity.WARNING and not self._texts.take(now=now):
-            self._left_out[source] = self._left_out.get(source, 0) + 1
+            self.left_out[source] = self.left_out.get(source, 0) + 1
             return
         self._say(text, severity, source)
 
@@ -254,8 +255,8 @@ class GcsClient:
 
     def tell_what_was_left_out(self, *, now: float) -> None:
         """Say how many texts were too many, in one for each who said them."""
-        while self._left_out and self._texts.take(now=now):
-            source, count = self._left_out.popitem()
+        while self.left_out and self._texts.take(now=now):
+            source, count = self.left_out.popitem()
             self._say(f"{count} more messages: see the queue", MavSeverity.INFO, source)
 
     def _say(self, text: str, severity: MavSeverity, source: Address) -> None:

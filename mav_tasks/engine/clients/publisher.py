@@ -120,7 +120,8 @@ class Publisher:
         self._rates.update(now=now)
         self._send_heartbeats(now=now)
         for client in self._gcs.clients:
-            client.tell_what_was_left_out(now=now)
+            if client.left_out:
+                client.tell_what_was_left_out(now=now)
 
     def send_statuses(self, *, now: float) -> None:
         """Send each client the statuses that are due."""
@@ -151,19 +152,20 @@ class Publisher:
                 continue
             begun = vehicle.tasks.begun is not None
             heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
+            source, new = vehicle.server_address, list[GcsClient]()
             for client in self._gcs.clients:
                 if client.is_heard and client.knows(vehicle.system_id):
-                    client.outlet.send(heartbeat, vehicle.server_address)
-            self._inform(vehicle, now=now)
+                    client.outlet.send(heartbeat, source)
+                    if client.is_to_be_informed(vehicle.system_id):
+                        new.append(client)
+            if new:
+                self._inform(vehicle, new, now=now)
 
-    def _inform(self, vehicle: Vehicle, *, now: float) -> None:
+    def _inform(self, vehicle: Vehicle, new: list[GcsClient], *, now: float) -> None:
         """Tell clients that are new, or back, what is held or paused, up to a second later.
 
         A ground station takes no text of a vehicle that it has only just heard of.
         """
-        new = [
-            client for client in self._gcs.clients if client.is_to_be_informed(vehicle.system_id)
-        ]
-        words = summary_of(vehicle.tasks) if new else ""
+        words = summary_of(vehicle.tasks)
         for client in new if words else ():
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)

@@ -4,6 +4,7 @@ Worked out anew each second, and nothing else is remembered: a client that is go
 that it is shown no telemetry any more, has taken its wishes with it.
 """
 
+from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.services.rate_budget import granted
@@ -19,9 +20,10 @@ class TelemetryRates:
 
     def update(self, *, now: float) -> None:
         """Have each vehicle asked for what is wished now."""
-        clients = [
-            client for client in self._gcs.clients if client.is_heard and client.thinner.has_wishes
-        ]
+        clients: list[GcsClient] = []
+        for client in self._gcs.clients:
+            if client.is_heard and client.thinner.asked:
+                clients.append(client)  # noqa: PERF401  # each second: a comprehension costs more
         if not clients and not self._had_wishes:
             return
         self._had_wishes = bool(clients)

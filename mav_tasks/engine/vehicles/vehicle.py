@@ -143,7 +143,7 @@ class Vehicle:
 
     def is_heard(self, *, now: float) -> bool:
         """Whether its heartbeats are coming."""
-        return self._monitor.is_heard(now=now)
+        return now - self._monitor.heard_at <= self._monitor.lost_after
 
     def count(self, seq: int) -> None:
         """Take note of the number of a packet of its autopilot."""
