@@ -1,6 +1,5 @@
 """From what links give to packets: a datagram stands alone, a stream goes on where it stopped."""
 
-from collections.abc import Iterator
 from itertools import repeat
 
 from mav_tasks.engine.inputs import LinkChanged, Packets, Peer, PeerChanged
@@ -33,12 +32,13 @@ class Intake:
 
     def packets(
         self, item: Packets, counts: DecodeCounts, *, now: float
-    ) -> Iterator[tuple[Peer, Packet, float | None]]:
+    ) -> list[tuple[Peer, Packet, float | None]]:
         """Give the packets in order, each with its sender; counts what belongs to none.
 
         And for how long each has waited, in seconds; None: that was not measured.
         """
         streams = self._streams.get(item.link)
+        taken: list[tuple[Peer, Packet, float | None]] = []
         for (peer, data), waited in zip(item.datagrams, item.waited or repeat(None), strict=False):
             if streams is None:
                 packets = split_datagram(data)
@@ -49,8 +49,8 @@ class Intake:
                 before = splitter.noise
                 packets = splitter.feed(data, now=now)
                 counts.noise += splitter.noise - before
-            for packet in packets:
-                yield peer, packet, waited
+            taken += [(peer, packet, waited) for packet in packets]
+        return taken
 
 
 def _splitter(streams: dict[Peer, StreamSplitter], peer: Peer) -> StreamSplitter:

@@ -64,7 +64,8 @@ class Packer:
         """Give one MAVLink 2 packet."""
         message_id = type(message).id  # in some messages "id" is a field as well
         layout = _LAYOUTS[message_id]
-        payload = layout.payload(message)
+        whole = layout.struct.pack(*layout.values(message))
+        payload = whole.rstrip(b"\0") or whole[:1]  # MAVLink 2 keeps the first byte at least
         body = _HEADER.pack(
             len(payload),
             0,

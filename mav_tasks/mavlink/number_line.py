@@ -33,7 +33,7 @@ class NumberLine:
         was_at_0, self._is_at_0 = self._is_at_0, seq == 0 and silence >= SILENT
         if self.last < 0:
             return self._move_on(seq, 256, now)
-        ahead = self.number_of(seq) - self.last
+        ahead = (seq - self.last + BEHIND & 0xFF) - BEHIND
         if ahead > 0:
             return self._move_on(self.last + ahead, ahead, now)
         is_second = was_at_0 and 0 < seq <= FIRST
@@ -58,7 +58,8 @@ class NumberLine:
         return self._passed[number & 0xFF if came_before else (number + 1) & 0xFF]
 
     def _move_on(self, number: int, by: int, now: float) -> int:
-        for each in range(number, number - min(by, 256), -1):
+        self._passed[number & 0xFF] = now
+        for each in range(number - min(by, 256) + 1, number):
             self._passed[each & 0xFF] = now
         self._came[number & 0xFF] = number
         self._behind.clear()

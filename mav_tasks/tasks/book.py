@@ -4,9 +4,10 @@ All state changes of tasks go through here, so that the journal and the tasks ca
 Events are numbered from 1; the store reports back up to which number they are durable.
 """
 
-from collections import Counter, deque
-from collections.abc import Sequence
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import cast
 
 from mav_tasks.tasks.events import (
     Event,
@@ -22,6 +23,7 @@ from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_tra
 from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, following
 from mav_tasks.tasks.timing import Timing
 
+STATES = len(TaskState)
 KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
 
 
@@ -34,7 +36,10 @@ class TaskBook:
         self._last_event: dict[TaskId, int] = {}
         self._finished: deque[TaskId] = deque()
         self._live: dict[tuple[Submitter, int, int], dict[TaskId, None]] = {}
-        self._counts: dict[int, list[int]] = {}  # by vehicle, then by state
+        #: by vehicle, then by state
+        self._counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
+        #: give a task, or None if there is none of that id (any more)
+        self.get: Callable[[int], Task | None] = cast("dict[int, Task]", self._tasks).get
         self._events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
         self.durable = 0  # number of the last event known to be durable
@@ -48,17 +53,13 @@ class TaskBook:
     def __getitem__(self, task_id: TaskId) -> Task:
         return self._tasks[task_id]
 
-    def get(self, task_id: int) -> Task | None:
-        """Give a task, or None if there is none of that id (any more)."""
-        return self._tasks.get(TaskId(task_id))
-
     def all(self) -> tuple[Task, ...]:
         """Give every task that is kept, oldest first."""
         return tuple(self._tasks.values())
 
     def counts(self, vehicle: int) -> list[int]:
         """Give how many tasks of a vehicle are in each state; the index is the TaskState."""
-        return list(self._counts.get(vehicle, [0] * len(TaskState)))
+        return list(self._counts.get(vehicle, [0] * STATES))
 
     def restore(self, tasks: Sequence[Task], *, next_id: int) -> None:
         """Take over the tasks of an earlier run, all of them durable."""
@@ -67,7 +68,7 @@ class TaskBook:
         self._last_event.update(dict.fromkeys(self._tasks, 0))
         counts = Counter((task.vehicle, task.state) for task in tasks)
         for (vehicle, state), count in counts.items():
-            self._counts.setdefault(vehicle, [0] * len(TaskState))[state] += count
+            self._counts[vehicle][state] += count
         for task in tasks:
             if task.state in TERMINAL:
                 self._finished.append(task.id)
@@ -96,7 +97,7 @@ class TaskBook:
         )
         self._next_id = following(task_id)
         self._tasks[task.id] = task
-        self._count(task, 1)
+        self._counts[task.vehicle][state] += 1
         self._note_live(task)
         self.record(TaskSubmitted(task, now))
         self._last_event[task.id] = self.recorded
@@ -130,8 +131,9 @@ class TaskBook:
             changed_at=now,
         )
         self._tasks[task_id] = task
-        self._count(old, -1)
-        self._count(task, 1)
+        counts = self._counts[task.vehicle]
+        counts[old.state] -= 1
+        counts[new] += 1
         self.record(
             TaskChanged(
                 task_id=task_id,
@@ -184,7 +186,7 @@ class TaskBook:
     def withdraw(self, task_id: TaskId, *, now: float) -> None:
         """Take back a submission that did not become durable in time."""
         task = self._tasks.pop(task_id)
-        self._count(task, -1)
+        self._counts[task.vehicle][task.state] -= 1
         self._forget_live(task)
         del self._last_event[task_id]
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
@@ -216,7 +218,8 @@ class TaskBook:
         self._finished.append(task_id)
         if len(self._finished) > KEPT_FINISHED:
             oldest = self._finished.popleft()
-            self._count(self._tasks.pop(oldest), -1)
+            task = self._tasks.pop(oldest)
+            self._counts[task.vehicle][task.state] -= 1
             del self._last_event[oldest]
 
     def _note_live(self, task: Task) -> None:
@@ -229,6 +232,3 @@ class TaskBook:
         del live[task.id]
         if not live:
             del self._live[key]
-
-    def _count(self, task: Task, change: int) -> None:
-        self._counts.setdefault(task.vehicle, [0] * len(TaskState))[task.state] += change

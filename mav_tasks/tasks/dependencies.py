@@ -26,9 +26,8 @@ class Dependencies:
         return tuple(self._dependents.get(task_id, ()))
 
     def add(self, task_id: TaskId, after: int) -> None:
-        """A task runs after another one; 0: after none."""
-        if after:
-            self._dependents.setdefault(TaskId(after), {})[task_id] = None
+        """A task runs after another one."""
+        self._dependents.setdefault(TaskId(after), {})[task_id] = None
 
     def take(self, task_id: TaskId) -> tuple[TaskId, ...]:
         """Give the tasks that run after this one, which is over, and forget that they do."""
@@ -46,8 +45,6 @@ class Dependencies:
 
     def check(self, after: int) -> None:
         """Raise Rejection if a task could never run after this one."""
-        if not after:
-            return
         task = self._book.get(after)
         if task is None:
             raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
@@ -66,7 +63,7 @@ class Dependencies:
 
     def is_waited_for(self, after: int) -> bool:
         """Whether a task that others run after is still to complete."""
-        task = self._book.get(after) if after else None
+        task = self._book.get(after)
         return task is not None and task.state not in TERMINAL
 
     def have_failed(self, task: Task) -> bool:

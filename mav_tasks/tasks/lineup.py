@@ -18,7 +18,7 @@ from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.queue import TaskQueue
 from mav_tasks.tasks.scheduler import start_blocker
-from mav_tasks.tasks.task import Submitter, Task, TaskId, same_frame
+from mav_tasks.tasks.task import Task, TaskId, same_frame
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_terms import VehicleTerms
 from mav_tasks.tasks.view import VehicleView
@@ -61,6 +61,10 @@ class Lineup:
         self.executor = Executor(book, settings, self.bounds)
         #: what its tasks go by beside their own terms
         self.terms = VehicleTerms(vehicle, book, self.executor, self.bounds, settings)
+        #: how many tasks of a submitter wait, on any vehicle
+        self.count_of = room.count_of
+        #: takes a task in; Rejection when too many wait
+        self.submit = room.submit
         self.aside_ids: dict[TaskId, None] = {}
         self.of_earlier_run: set[TaskId] = set()
         self.led_away = LedAway()
@@ -83,7 +87,7 @@ class Lineup:
     def begun(self) -> Task | None:
         """The task that has the vehicle: begun, not over and not set aside."""
         task_id = self.executor.task_id
-        return None if task_id is None else self.book[task_id]
+        return None if task_id is None else self.book.get(task_id)
 
     @property
     def aside(self) -> list[Task]:
@@ -168,10 +172,6 @@ class Lineup:
     def resumes_by_itself(self) -> bool:
         """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
         return self.executor.resumes_by_itself
-
-    def count_of(self, submitter: Submitter) -> int:
-        """Give how many tasks of a submitter wait, on any vehicle."""
-        return self.room.count_of(submitter)
 
     def waits(self, task: Task) -> bool:
         """Whether a task has not begun."""

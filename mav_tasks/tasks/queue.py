@@ -6,10 +6,9 @@ how long each has waited so far but when each came. 10 is a class of its own, wh
 into.
 """
 
+from bisect import bisect_left, insort
 from collections.abc import Iterable
-from typing import NamedTuple
-
-from sortedcontainers import SortedList
+from typing import Any, NamedTuple
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -48,25 +47,16 @@ _InOrder = tuple[Rank, TaskId]
 _ByPriority = tuple[int, Rank, TaskId]
 
 
-def _in_order(entry: Entry) -> _InOrder:
-    return entry.rank, entry.task_id
-
-
-def _by_priority(entry: Entry) -> _ByPriority:
-    return -entry.priority, entry.rank, entry.task_id
-
-
-def _falling_priority(entry: Entry) -> int:
-    return -entry.priority
-
-
 class TaskQueue:
-    """The tasks of one vehicle that are ready, in the order in which they will run."""
+    """The tasks of one vehicle that are ready, in the order in which they will run.
+
+    In plain sorted lists: nearly all come at the end, and to move 100,000 on takes some 20 µs.
+    """
 
     def __init__(self) -> None:
-        self._order = SortedList()
-        self._by_priority = SortedList()
-        self._preemptive = SortedList()
+        self._order: list[_InOrder] = []
+        self._by_priority: list[_ByPriority] = []
+        self._preemptive: list[_ByPriority] = []
         self._entries: dict[TaskId, Entry] = {}
 
     def __repr__(self) -> str:
@@ -80,33 +70,40 @@ class TaskQueue:
 
     def put(self, entry: Entry) -> None:
         """Put a task in its place, or in its new place."""
-        self.discard(entry.task_id)
-        self._entries[entry.task_id] = entry
-        self._order.add(_in_order(entry))
-        self._by_priority.add(_by_priority(entry))
-        if entry.is_preemptive:
-            self._preemptive.add(_by_priority(entry))
+        task_id, rank, priority, is_preemptive = entry
+        if task_id in self._entries:
+            self.discard(task_id)
+        self._entries[task_id] = entry
+        insort(self._order, (rank, task_id))
+        by_priority = (-priority, rank, task_id)
+        insort(self._by_priority, by_priority)
+        if is_preemptive:
+            insort(self._preemptive, by_priority)
 
     def put_all(self, entries: Iterable[Entry]) -> None:
         """Put many tasks in, of which none is here yet."""
-        in_order = sorted(entries, key=_in_order)
-        by_priority = sorted(in_order, key=_falling_priority)  # stable: in order within each
-        self._entries.update((entry.task_id, entry) for entry in in_order)
-        self._order.update(map(_in_order, in_order))  # sorted already, which is soon seen
-        self._by_priority.update(map(_by_priority, by_priority))
-        self._preemptive.update(_by_priority(e) for e in by_priority if e.is_preemptive)
+        for task_id, rank, priority, is_preemptive in (several := list(entries)):
+            self._order.append((rank, task_id))
+            self._by_priority.append((-priority, rank, task_id))
+            if is_preemptive:
+                self._preemptive.append((-priority, rank, task_id))
+        self._entries.update((entry.task_id, entry) for entry in several)
+        for each in (self._order, self._by_priority, self._preemptive):
+            each.sort()
 
     def discard(self, task_id: TaskId) -> None:
         """Take a task out, if it is here."""
         entry = self._entries.pop(task_id, None)
         if entry is not None:
-            self._order.remove(_in_order(entry))
-            self._by_priority.remove(_by_priority(entry))
-            self._preemptive.discard(_by_priority(entry))
+            by_priority = (-entry.priority, entry.rank, task_id)
+            _remove(self._order, (entry.rank, task_id))
+            _remove(self._by_priority, by_priority)
+            if entry.is_preemptive:
+                _remove(self._preemptive, by_priority)
 
     def first(self) -> TaskId | None:
         """Give the task that runs next."""
-        return TaskId(self._order[0][1]) if self._order else None
+        return self._order[0][1] if self._order else None
 
     def interrupters(self) -> list[TaskId]:
         """Give the tasks that may interrupt if any here may: the first marked so, the first of all.
@@ -115,7 +112,7 @@ class TaskQueue:
         others makes a task interrupt.
         """
         firsts = (self._preemptive[:1], self._by_priority[:1])
-        return [TaskId(first[0][2]) for first in firsts if first]
+        return [first[0][2] for first in firsts if first]
 
     def rank(self, task_id: TaskId) -> Rank:
         """Give the rank by which a task waits here."""
@@ -124,15 +121,20 @@ class TaskQueue:
     def position(self, task_id: TaskId) -> int | None:
         """Give how many tasks here run before this one, or None if it is not here."""
         entry = self._entries.get(task_id)
-        return None if entry is None else int(self._order.index(_in_order(entry)))
+        return None if entry is None else bisect_left(self._order, (entry.rank, task_id))
 
     def page(self, first: int, count: int) -> list[TaskId]:
         """Give up to ``count`` tasks from the position ``first`` on."""
-        return [TaskId(task_id) for _, task_id in self._order[first : first + count]]
+        return [task_id for _, task_id in self._order[first : first + count]]
 
     def in_order(self) -> list[TaskId]:
         """Give all tasks, next one first."""
         return self.page(0, len(self))
+
+
+def _remove(ordered: list[Any], item: tuple[Any, ...]) -> None:
+    """Take out of a sorted list what is in it."""
+    del ordered[bisect_left(ordered, item)]
 
 
 def full(capacity: int) -> Rejection:

@@ -29,11 +29,11 @@ class Times:
 
     def note(self, task: Task) -> None:
         """Keep when a waiting task may begin, and until when."""
-        due = self.start(task.terms)
-        if due > -inf:
-            heappush(self._starts, (due, task.id))
-        if task.terms.deadline is not None:
-            heappush(self._deadlines, (task.terms.deadline, task.id))
+        terms = task.terms
+        if terms.start_utc is not None or terms.start_at is not None:
+            heappush(self._starts, (self.start(terms), task.id))
+        if terms.deadline is not None:
+            heappush(self._deadlines, (terms.deadline, task.id))
         self._look()
 
     def _look(self) -> None:

@@ -85,10 +85,6 @@ class VehicleTasks(Lineup):
             self.executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
 
-    def submit(self, draft: Draft, *, now: float) -> Task:
-        """Take a task in; Rejection when too many wait."""
-        return self.room.submit(draft, now=now)
-
     def withdraw(self, task: Task, *, now: float) -> None:
         """Take back a submission that did not become durable; it cannot have begun."""
         self.room.withdraw(task, now=now)

@@ -101,11 +101,12 @@ class WaitingRoom:
     def submit(self, draft: Draft, *, now: float) -> Task:
         """Take a new task in; Rejection when there is no room, or nothing to run after."""
         queueing = self._settings.queueing
-        if self.count(draft.vehicle) >= queueing.capacity:
+        if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
             raise full(queueing.capacity)
         if self.count_of(draft.submitter) >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: {queueing.quota} tasks of this client wait")
-        self._dependencies.check(draft.terms.after)
+        if draft.terms.after:
+            self._dependencies.check(draft.terms.after)
         state = self._state_by(draft.terms, now=now)
         task = self._book.submit(draft, state=state, now=now)
         self._enter(task, now=now)
@@ -144,9 +145,11 @@ class WaitingRoom:
         self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
         owner = task.submitter.owner
         self._of_owner[owner] = self._of_owner.get(owner, 0) + 1
+        terms = task.terms
         self.times.note(task)
-        self._dependencies.add(task.id, task.terms.after)
-        if task.terms.after or task.id in self._dependencies:  # after a modification, in any order
+        if terms.after:
+            self._dependencies.add(task.id, terms.after)
+        if terms.after or task.id in self._dependencies:  # after a modification, in any order
             self._lift(task.id)
 
     # going on
@@ -172,13 +175,15 @@ class WaitingRoom:
 
     def _entry(self, task: Task) -> Entry:
         rank = self._waiters[task.id].rank
-        return Entry(task.id, rank, task.priority, task.terms.is_preemptive)
+        return Entry(task.id, rank, task.terms.priority, task.terms.is_preemptive)
 
     def _state_by(self, terms: Terms, *, now: float) -> TaskState:
-        if self.times.start(terms) > now:
+        has_start = terms.start_at is not None or terms.start_utc is not None
+        if has_start and self.times.start(terms) > now:
             return S.SCHEDULED
-        is_blocked = terms.is_staged or self._dependencies.is_waited_for(terms.after)
-        return S.BLOCKED if is_blocked else S.QUEUED
+        if terms.is_staged or (terms.after and self._dependencies.is_waited_for(terms.after)):
+            return S.BLOCKED
+        return S.QUEUED
 
     def handle_deadline(self, *, now: float) -> None:
         """Let go on whose time has come, and end whose time is over."""
@@ -201,7 +206,7 @@ class WaitingRoom:
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change the terms of a waiting task; Rejection when it would wait for itself."""
-        if terms.after != task.terms.after:
+        if terms.after and terms.after != task.terms.after:
             self._dependencies.check(terms.after)
             self._dependencies.check_cycle(task, terms.after)
         before = task.terms.after
@@ -211,7 +216,8 @@ class WaitingRoom:
         self.times.note(task)
         if before != terms.after:
             self._part(task.id, before)
-            self._dependencies.add(task.id, terms.after)
+            if terms.after:
+                self._dependencies.add(task.id, terms.after)
         self._rerank(task)
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
@@ -320,4 +326,4 @@ class WaitingRoom:
 def _own_rank(settings: Settings, task: Task, came_at: float) -> Rank:
     """Give a task's own rank, if it has competed with others since ``came_at``."""
     aging = settings.queueing.aging
-    return rank_of(task.priority, came_at=came_at, task_id=task.id, aging=aging)
+    return rank_of(task.terms.priority, came_at=came_at, task_id=task.id, aging=aging)

@@ -65,13 +65,14 @@ class FloodGates:
         if gate is None:
             return item
         if not item.waited:
-            return Packets(item.link, gate.let_in(item.datagrams, now=now))
-        kept = [
+            kept = gate.let_in(item.datagrams, now=now)
+            return item if kept is item.datagrams else Packets(item.link, kept)
+        waiting = [
             (each, waited)
             for datagram, waited in zip(item.datagrams, item.waited, strict=True)
             for each in gate.let_in([datagram], now=now)
         ]
-        return Packets(item.link, [each for each, _ in kept], [waited for _, waited in kept])
+        return Packets(item.link, [each for each, _ in waiting], [waited for _, waited in waiting])
 
 
 def stops_in(data: bytes) -> bytes:
@@ -108,9 +109,10 @@ class FloodGate:
         self._buckets.clear()
 
     def let_in(self, datagrams: Datagrams, *, now: float) -> Datagrams:
-        """Give those that are looked at."""
+        """Give those that are looked at: the very same, where all are."""
         buckets = self._buckets
-        let_in = []
+        let_in: list[tuple[Peer, bytes]] = []
+        left_out = 0
         for each in datagrams:
             bucket = buckets.get(each[0])
             if bucket is None:
@@ -118,10 +120,12 @@ class FloodGate:
             peer, data = each
             if bucket.take(tokens=1 + len(data) // SIZE, now=now):
                 let_in.append(each)
-            elif stops := stops_in(data):
+                continue
+            left_out += 1
+            if stops := stops_in(data):
                 let_in.append((peer, stops))
         self.left_out += len(datagrams) - len(let_in)
-        return let_in
+        return let_in if left_out else datagrams
 
     def _bucket_of(self, peer: Peer, *, now: float) -> TokenBucket:
         if not self._is_known(peer):

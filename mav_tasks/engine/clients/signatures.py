@@ -202,7 +202,9 @@ class Signatures:
         there = self._links.get(link)
         if there is None:
             return UNSIGNED
-        if not packet.is_signed or not self._matters(there):
+        # whether there is a key that a signature could be of
+        matters = there.key if there.is_of_vehicles else self._has_ring
+        if not matters or not packet.is_signed:
             # a client's radio tells of a way that is none of a rover's, and signs for nobody
             is_of_radio = packet.message_id in FROM_RADIOS and there.is_of_vehicles
             if there.takes_unsigned or is_of_radio:
@@ -263,10 +265,6 @@ class Signatures:
         """Return whose clocks are wrong, for the journal and the log, since the last call."""
         refused, self.refused = self.refused, []
         return refused
-
-    def _matters(self, link: _Link) -> bool:
-        """Whether there is a key that a signature could be of."""
-        return bool(link.key) if link.is_of_vehicles else self._has_ring
 
     def _signed_with(self, there: _Link, link: str, peer: Peer, packet: Packet) -> Key | None:
         if there.is_of_vehicles:
