@@ -1,52 +1,72 @@
-"""What waits until an event is durable: acknowledgements, each with its time limit."""
+"""What waits until all that was recorded is durable, each with its time limit: values, no code.
+
+Whoever makes a kind of them says once, at the start, how such a value is carried out, and how it is
+given up; here each is, in the order in which they came.
+"""
 
 from collections import deque
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
-from mav_tasks.engine.timers import Effect, Timers, Turn
+from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.tasks.book import TaskBook
+
+Kind = TypeVar("Kind")
+Kind_contra = TypeVar("Kind_contra", contravariant=True)
+
+
+class Step(Protocol[Kind_contra]):
+    """What is done about a value when it is known."""
+
+    def __call__(self, held: Kind_contra, /, *, now: float) -> None: ...
 
 
 class _Held(NamedTuple):
     number: int  # of the event that must be durable first
     give_up_at: float
-    release: Effect
-    give_up: Effect
+    what: Any
 
 
 class CommitGate:
-    """Effects in the order of the events that they wait for."""
+    """Values in the order of the events that they wait for."""
 
-    def __init__(self, timers: Timers) -> None:
+    def __init__(self, book: TaskBook, timers: Timers, *, within: float) -> None:
+        """``within``: so many seconds each waits at the most."""
+        self._book = book
+        self.within = within
         self._held: deque[_Held] = deque()
-        self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up)
+        self._accept: dict[type, Step[Any]] = {}
+        self._give_up: dict[type, Step[Any]] = {}
+        self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up_late)
 
     def __len__(self) -> int:
         return len(self._held)
 
-    def hold(
-        self,
-        number: int,
-        *,
-        give_up_at: float,
-        release: Effect,
-        give_up: Effect,
-    ) -> None:
-        """Call ``release`` once event ``number`` is durable, or ``give_up`` if too late."""
+    def knows(self, kind: type[Kind], accept: Step[Kind], give_up: Step[Kind]) -> None:
+        """From here on values of this kind are carried out, and given up, in this way."""
+        self._accept[kind], self._give_up[kind] = accept, give_up
+
+    def hold(self, what: object, *, now: float) -> None:
+        """Carry a value out when all that is recorded by now is durable, or give it up if late."""
+        if self._book.recorded <= self._book.durable:
+            self._accept[type(what)](what, now=now)
+            return
         if not self._held:
-            self._timer.set(give_up_at)
-        self._held.append(_Held(number, give_up_at, release, give_up))
+            self._timer.set(now + self.within)
+        self._held.append(_Held(self._book.recorded, now + self.within, what))
 
     def committed(self, through: int, *, now: float) -> None:
-        """Release all that waited for events up to ``through``."""
+        """Carry out all that waited for events up to ``through``."""
         while self._held and self._held[0].number <= through:
-            self._held.popleft().release(now=now)
+            what = self._held.popleft().what
+            self._accept[type(what)](what, now=now)
         self._plan()
 
-    def _give_up(self, *, now: float) -> None:
+    def _give_up_late(self, *, now: float) -> None:
         """Give up what has waited too long."""
         while self._held and self._held[0].give_up_at <= now:
-            self._held.popleft().give_up(now=now)
+            what = self._held.popleft().what
+            self._give_up[type(what)](what, now=now)
         self._plan()
 
     def _plan(self) -> None:

@@ -220,7 +220,7 @@ class Engine:
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
                 self._vehicles.links.change_peer(item)
-                if self._gcs.owns(item.link):
+                if item.link in self._gcs.links:
                     self._passing.end(item.link, item.peer, now=now)
             case Congestion():
                 self._gcs.note_congestion(item, now=now)

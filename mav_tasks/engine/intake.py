@@ -49,7 +49,7 @@ class Intake:
                 before = splitter.noise
                 packets = splitter.feed(data, now=now)
                 counts.noise += splitter.noise - before
-            taken += [(peer, packet, waited) for packet in packets]
+            taken += zip(repeat(peer), packets, repeat(waited), strict=False)
         return taken
 
 

@@ -62,6 +62,6 @@ class Outlet:
         self._sequence.continued(packet.source, packet.seq)
 
     def _put(self, raw: bytes, *, first: bool = False, until: float = inf) -> None:
-        if self._signatures is not None:
+        if self._signatures is not None and self._signatures.may_sign:
             raw = self._signatures.sealed(self.link, self.peer, raw)
         self._queue.append(Outgoing(self.link, self.peer, raw, first, until))

@@ -1,8 +1,8 @@
 """What comes in, in the order in which it counts, to whoever sees to it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from mav_tasks.engine.clients.broadcasts import Broadcasts
+from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
@@ -17,8 +17,8 @@ from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.commands.asked import AskedByMessage
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.ordering import kind_of_message
 from mav_tasks.engine.commands.passing import Passing
+from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.inputs import Packets
 from mav_tasks.engine.intake import Intake
 from mav_tasks.engine.missions.mission_desk import MESSAGES, MissionDesks
@@ -76,25 +76,33 @@ class Reception:
     def receive(self, items: Sequence[Packets], *, now: float) -> None:
         """Take in what came at one moment: what makes a rover stand comes first."""
         received: list[Received] = []
+        others: list[Packets] = []
         for item in items:
-            if self._gcs.owns(item.link):
+            if item.link in self._gcs.links:
                 received += self._received(item, now=now)
+            else:
+                others.append(item)
         if len(received) > 1:
-            received = self._halts_first(received)
-        for each in received:
-            self._gcs.hear_out(each, now=now)
-            self._receive_from_client(each, now=now)
-        for item in items:
+            for each in self._halts_first(received):
+                self._gcs.hear_out(each, now=now)
+                self._receive_from_client(each, now=now)
+        elif received:
+            self._receive_from_client(received[0], now=now)
+        for item in others:
             if self._vehicles.links.owns(item.link):
                 self._receive_from_vehicles(item, now=now)
 
-    def _received(self, item: Packets, *, now: float) -> Iterator[Received]:
+    def _received(self, item: Packets, *, now: float) -> list[Received]:
         let_in = self._gates.let_in(item, now=now)
-        for peer, packet, measured in self._intake.packets(let_in, self._gcs.counts, now=now):
-            waited = self._vehicles.may_have_waited(now=now) if measured is None else measured
-            received = self._gcs.receive(item.link, peer, packet, waited=waited, now=now)
-            if received is not None:
-                yield received
+        taken = self._intake.packets(let_in, self._gcs.counts, now=now)
+        may_have_waited = self._vehicles.may_have_waited(now=now)
+        received: list[Received] = []
+        for peer, packet, measured in taken:
+            waited = may_have_waited if measured is None else measured
+            each = self._gcs.receive(item.link, peer, packet, waited=waited, now=now)
+            if each is not None:
+                received.append(each)
+        return received
 
     def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
         for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
@@ -114,8 +122,6 @@ class Reception:
 
         All else keeps its order.
         """
-        if len(received) < 2:
-            return received
         kinds = [self._kind_of(each.message) for each in received]
         if Kind.HALT not in kinds or (Kind.GO not in kinds and Kind.MOTION not in kinds):
             return received
@@ -134,9 +140,13 @@ class Reception:
         client, packet, message = received.client, received.packet, received.message
         if not self._door.may_pass(client, packet, message, now=now):
             return
-        self._publisher.welcome(client, now=now)
-        for each in self._broadcasts.addressed(received):
-            self._see_to(each, now=now)
+        if len(client.introduced) < len(self._vehicles.by_id):
+            self._publisher.welcome(client, now=now)
+        if getattr(message, "target_system", None) == EVERYBODY:
+            for each in self._broadcasts.addressed(received):
+                self._see_to(each, now=now)
+        else:
+            self._see_to(received, now=now)
 
     def _see_to(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message

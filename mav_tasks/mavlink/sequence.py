@@ -36,10 +36,11 @@ class SequenceKeeper:
 
     def injected(self, source: Address) -> int:
         """Give the number of a packet of our own, put into the source's stream."""
-        for numbers in (self._next, self._offset):
-            if source not in numbers and len(numbers) >= MOST:
+        number, offset = self._next.get(source), self._offset.get(source)
+        for value, numbers in ((number, self._next), (offset, self._offset)):
+            if value is None and len(numbers) >= MOST:
                 del numbers[next(iter(numbers))]  # that one begins anew, which looks like a gap
-        number = self._next.get(source, 0)
+        number = number or 0
         self._next[source] = (number + 1) & 0xFF
-        self._offset[source] = (self._offset.get(source, 0) + 1) & 0xFF
+        self._offset[source] = ((offset or 0) + 1) & 0xFF
         return number

@@ -1,7 +1,5 @@
 """STATUSTEXT for people at ground stations. MAVLink common: STATUSTEXT, chunked by id."""
 
-from collections.abc import Iterator
-
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Statustext
 
@@ -9,7 +7,7 @@ CHUNK = 50  # bytes of text a message
 BURST = 10  # texts, before the rate counts
 
 
-def chunks(severity: MavSeverity, text: str, *, text_id: int) -> Iterator[Statustext]:
+def chunks(severity: MavSeverity, text: str, *, text_id: int) -> list[Statustext]:
     """Give the messages that carry a text of any length.
 
     ``text_id`` 1–65535 ties the chunks of a long text together; a short one is sent with id 0. A
@@ -17,9 +15,9 @@ def chunks(severity: MavSeverity, text: str, *, text_id: int) -> Iterator[Status
     """
     data = text.rstrip().encode("ascii", errors="replace")
     if len(data) <= CHUNK:
-        yield Statustext(severity, data)
-        return
-    for number, start in enumerate(range(0, len(data), CHUNK)):
-        yield Statustext(severity, data[start : start + CHUNK], text_id, number)
-    if len(data) % CHUNK == 0:  # a text ends with a chunk that is not full
-        yield Statustext(severity, b"", text_id, len(data) // CHUNK)
+        return [Statustext(severity, data)]
+    ends = len(data) // CHUNK + 1  # a text ends with a chunk that is not full, if need be an empty
+    return [
+        Statustext(severity, data[number * CHUNK : (number + 1) * CHUNK], text_id, number)
+        for number in range(ends)
+    ]

@@ -112,8 +112,9 @@ TAKEN = frozenset({TaskReason.TAKEOVER, TaskReason.FAILSAFE})
 #: a task goes on by itself when that is over
 LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST})
 
-#: where the name of a reason is not what people say
 _WORDS = {
+    **{reason: reason.name.lower().replace("_", " ") for reason in TaskReason},
+    # where the name of a reason is not what people say
     TaskReason.FRAME_RESET: "position reference changed",
     TaskReason.OFF_LINE: "off track",
     TaskReason.FAILSAFE: "failsafe of the rover",
@@ -123,7 +124,7 @@ _WORDS = {
 
 def words_of(reason: TaskReason) -> str:
     """Return a reason as people read it."""
-    return _WORDS.get(reason) or reason.name.lower().replace("_", " ")
+    return _WORDS[reason]
 
 
 _S = TaskState

@@ -67,6 +67,6 @@ def _why_queued(tasks: VehicleTasks, task: Task) -> TaskReason:
         return R.RESTARTED if tasks.paused is R.RESTARTED else R.QUEUE_PAUSED
     if tasks.is_halting:
         return R.STOP_UNCONFIRMED
-    if tasks.begun is not None or tasks.queue.position(task.id):
+    if tasks.executor.task_id is not None or tasks.queue.position(task.id):
         return R.BEHIND_OTHERS
     return tasks.turns.blocker_of(task.id)

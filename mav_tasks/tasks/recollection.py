@@ -122,7 +122,9 @@ class Recollection:
         """Keep a submission that became a task."""
         submitter, marks = task.submitter, task.marks
         if marks.nonce:
-            self._keep_nonce(_key(submitter, marks.nonce), task.id)
+            self._nonces[_key(submitter, marks.nonce)] = task.id
+            if len(self._nonces) > SPARE:
+                self._forget_nonces()
         if now - at > LONGEST:
             return
         client = self._clients.get(submitter)
@@ -182,8 +184,7 @@ class Recollection:
             raise Rejection(TaskReason.NONCE_REUSED, words)
         return Known(task_id, Rule.NONCE)
 
-    def _keep_nonce(self, key: tuple[str, int, int, int], task_id: TaskId) -> None:
-        self._nonces[key] = task_id
+    def _forget_nonces(self) -> None:
         if len(self._nonces) > 2 * len(self._book) + SPARE:  # most are of tasks not kept any more
             kept = {k: t for k, t in self._nonces.items() if self._book.get(t) is not None}
             self._nonces = kept

@@ -27,7 +27,7 @@ class Turns:
     @property
     def awaits_commit(self) -> bool:
         """Whether the next task waits for nothing but its submission being durable."""
-        first = None if self._lineup.begun is not None else self._next()
+        first = None if self._lineup.executor.task_id is not None else self._next()
         return first is not None and not self._lineup.book.is_durable(first)
 
     def blocker_of(self, task_id: TaskId) -> TaskReason:
@@ -41,10 +41,8 @@ class Turns:
 
     def words_of_blocker(self, task_id: TaskId) -> str:
         """Return what the vehicle itself says of what keeps a task from beginning, or ""."""
-        begun = self._lineup.begun
-        return (
-            self._lineup.executor.waits_for[1] if begun is not None and begun.id == task_id else ""
-        )
+        executor = self._lineup.executor
+        return executor.waits_for[1] if executor.task_id == task_id else ""
 
     def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Set the running task aside if a waiting one may interrupt it, and could begin."""

@@ -5,6 +5,7 @@ another vehicle. What is ready is in its vehicle's queue. A task that others wai
 as the most urgent of them, directly or through others again.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -37,7 +38,7 @@ class WaitingRoom:
         self._book = book
         self._settings = settings
         self._waiters: dict[TaskId, _Waiter] = {}
-        self._queues: dict[int, TaskQueue] = {}
+        self._queues: dict[int, TaskQueue] = defaultdict(TaskQueue)
         self._of_vehicle: dict[int, int] = {}  # how many wait
         self._of_owner: dict[str, int] = {}
         self._dependencies = Dependencies(book)
@@ -55,10 +56,7 @@ class WaitingRoom:
 
     def queue(self, vehicle: int) -> TaskQueue:
         """Give the queue of a vehicle's ready tasks."""
-        queue = self._queues.get(vehicle)
-        if queue is None:
-            queue = self._queues[vehicle] = TaskQueue()
-        return queue
+        return self._queues[vehicle]
 
     def count(self, vehicle: int) -> int:
         """Give how many tasks of a vehicle wait, ready or not."""
@@ -171,7 +169,7 @@ class WaitingRoom:
         return task
 
     def _line_up(self, task: Task) -> None:
-        self.queue(task.vehicle).put(self._entry(task))
+        self._queues[task.vehicle].put(self._entry(task))
 
     def _entry(self, task: Task) -> Entry:
         rank = self._waiters[task.id].rank

@@ -28,9 +28,8 @@ class Broadcasts:
         self._packer = packer
 
     def addressed(self, received: Received) -> list[Received]:
-        """Return a client's packet as it is; or, if it is for every rover, a copy for each."""
-        message = received.message
-        if not _is_to_everybody(message):
+        """Return a copy of a client's packet for each rover; it alone, if none is to answer it."""
+        if not _is_to_be_answered(received.message):
             return [received]
         return [
             self._copy(received, vehicle.system_id)
@@ -48,10 +47,8 @@ class Broadcasts:
         return received._replace(packet=packet._replace(raw=raw), message=message)
 
 
-def _is_to_everybody(message: m.Message | None) -> bool:
-    """Whether a message is for all rovers, and of a kind that a rover is to answer."""
-    if getattr(message, "target_system", None) != EVERYBODY:
-        return False
+def _is_to_be_answered(message: m.Message | None) -> bool:
+    """Whether a message is of a kind that each rover is to answer."""
     if isinstance(message, m.CommandLong | m.CommandInt):
         return not is_task_command(message.command)
     return isinstance(message, (m.SetMode, *MISSION_MESSAGES))

@@ -14,6 +14,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import Task
 
 R = TaskReason
 
@@ -100,21 +101,20 @@ class Displays:
         if task is not None:
             to = task.submitter.system_id, task.submitter.component_id
             reader = Address(*to) if client.submitted(task) else EVERYBODY
-            self._send_status(client, task_id, reader=reader, with_position=False, now=now)
+            self._send_status(client, task, reader=reader, with_position=False, now=now)
 
     def _send_status(
         self,
         client: GcsClient,
-        task_id: int,
+        task: Task,
         *,
         reader: Address,
         with_position: bool,
         now: float,
     ) -> None:
         """Send a task's TASK_STATUS, from the task server of its vehicle."""
-        task = self._book.get(task_id)
-        vehicle = None if task is None else self._vehicles.get(task.vehicle)
-        if task is None or vehicle is None:
+        vehicle = self._vehicles.look_at(task.vehicle)
+        if vehicle is None:
             return
         status = translate.task_status(
             task,
@@ -135,12 +135,13 @@ class Displays:
         if task_id == 0:
             first = max(0, translate.first_index_of(asked.command))
             for waiting in asked.vehicle.tasks.page(first, PAGE):
-                send(waiting)
-        elif self._book.get(task_id) is None:
+                send(self._book[waiting])
+            return
+        task = self._book.get(task_id)
+        if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
-        else:
-            asked.client.follow(task_id)
-            send(task_id)
+        asked.client.follow(task_id)
+        send(task)
 
     def _show_timing(self, asked: Asked, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)

@@ -42,7 +42,9 @@ class Door:
         if self._is_ours(packet.source):
             self._turn_away(client, packet, message, now=now)
             return False
-        if _is_uncounted(client, packet, message) or client.may_ask(now=now):
+        row = row_of(packet.message_id, message)
+        is_counted = row.is_counted or (row.role == OBSERVER and not client.rights.reach(OPERATOR))
+        if not is_counted or client.requests.take(now=now):
             return True
         self.left_out += 1
         if isinstance(message, m.CommandLong | m.CommandInt) and client.may_be_refused(now=now):
@@ -54,7 +56,7 @@ class Door:
         vehicle = self._vehicles.look_at(source.system_id)
         return source == self._vehicles.our_address or (
             vehicle is not None
-            and source in (vehicle.server_address, Address(vehicle.system_id, AUTOPILOT))
+            and (source == vehicle.server_address or source.component_id == AUTOPILOT)
         )
 
     def _turn_away(
@@ -102,8 +104,3 @@ class Door:
         source = Address(vehicle.system_id, component)
         client.answer(Answer(message.command, result, refusal.reason, source), packet.source)
         client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
-
-
-def _is_uncounted(client: GcsClient, packet: Packet, message: m.Message | None) -> bool:
-    row = row_of(packet.message_id, message)
-    return not row.is_counted and (row.role != OBSERVER or client.rights.reach(OPERATOR))

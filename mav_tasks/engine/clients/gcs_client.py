@@ -7,7 +7,6 @@ from math import inf
 from mav_tasks.engine.clients.rights import NOTHING, Rights
 from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
-from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.outlet import Outlet
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -51,6 +50,11 @@ class GcsClient:
     ) -> None:
         """``wake`` is called with the time at which it is to be told of a task."""
         self.outlet = outlet
+        link, peer = outlet.link, outlet.peer
+        #: what tells clients apart: link and endpoint
+        self.key = (link, peer)
+        #: the endpoint in words
+        self.endpoint = ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
         self.heard_at = now
         #: spoken to before it was heard: gets heartbeats until it answers
         self.is_configured = is_configured
@@ -65,8 +69,10 @@ class GcsClient:
         self.signed_by = UNSIGNED
         #: s, for which the packet in hand may have lain here before it was read
         self.waited = 0.0
-        self.last_source = Address(0, 0)
-        #: of who sent that packet
+        #: the address that the packet in hand names as its own
+        self.source: Address | None = None
+        #: who sent it, and what he may do
+        self.who = Submitter(link, self.endpoint, 0, 0)
         self.rights = NOTHING
         self._addresses: dict[Address, None] = {}  # seen here, the latest last
         #: has used our dialect: gets TASK_STATUS
@@ -79,14 +85,15 @@ class GcsClient:
         self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it
         #: texts that were too many, by who said them
         self.left_out: dict[Address, int] = {}
-        self._introduced: set[int] = set()
+        #: the vehicles of whose autopilots it has seen a heartbeat
+        self.introduced: set[int] = set()
         self._informed: set[int] = set()  # of which vehicles' tasks it was told since it came
         self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
         self._submitters: dict[
             tuple[Address, str], Submitter
         ] = {}  # made once: each command asks for it
         #: what of its requests is taken in, and what of its refusals is told
-        self._requests = TokenBucket(rate=0.0, burst=0.0, now=now)
+        self.requests = TokenBucket(rate=0.0, burst=0.0, now=now)
         self._requests_of: dict[str, TokenBucket] = {}  # by role: who signs otherwise has another
         self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS, now=now)
         self._senders: dict[Address, Sender] = {}
@@ -100,17 +107,6 @@ class GcsClient:
         self.thinner.default_interval = settings.stream_interval
         self.statuses.apply(rate=settings.status_rate)
         self._texts.apply(rate=settings.text_rate)
-
-    @property
-    def key(self) -> tuple[str, Peer]:
-        """What tells clients apart: link and endpoint."""
-        return (self.outlet.link, self.outlet.peer)
-
-    @property
-    def endpoint(self) -> str:
-        """The endpoint in words."""
-        peer = self.outlet.peer
-        return ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
 
     @property
     def is_late(self) -> bool:
@@ -134,11 +130,7 @@ class GcsClient:
         if bucket is None or bucket.rate != rate:
             bucket = TokenBucket(rate=rate, burst=rate * AT_ONCE, now=now)
             self._requests_of[rights.role] = bucket
-        self._requests = bucket
-
-    def may_ask(self, *, now: float) -> bool:
-        """Whether one more request of it is taken in now."""
-        return self._requests.take(now=now)
+        self.requests = bucket
 
     def may_be_refused(self, *, now: float) -> bool:
         """Whether one more refusal is told to it, and kept, now: a flood of them is not."""
@@ -172,13 +164,13 @@ class GcsClient:
     def heard(self, packet: Packet, *, now: float) -> None:
         """Note that a packet came from here."""
         source = packet.source
-        self.sender(source).line.place(packet.seq, now=now)
+        sender = self._senders.get(source) or self.sender(source)
+        sender.line.place(packet.seq, now=now)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
             self._informed.clear()
         self.is_one_of_many = self.is_one_of_many and self.is_passing
         self.heard_at = now
-        self.last_source = source
         self.is_heard = True
         if source not in self._addresses:
             if len(self._addresses) >= MAX_ADDRESSES:
@@ -193,10 +185,6 @@ class GcsClient:
         """Send the COMMAND_ACK of a command that ``to`` at this endpoint sent."""
         self.outlet.send(answer.ack(to), answer.source)
 
-    def knows(self, system_id: int) -> bool:
-        """Whether the client has seen a heartbeat of this vehicle's autopilot."""
-        return system_id in self._introduced
-
     def is_to_be_informed(self, system_id: int) -> bool:
         """Whether it is new to a vehicle that it knows, or back; asked once, it is informed."""
         if system_id in self._informed:
@@ -204,25 +192,21 @@ class GcsClient:
         self._informed.add(system_id)
         return True
 
-    def knows_all(self, count: int) -> bool:
-        """Whether the client has seen as many vehicles as there are."""
-        return len(self._introduced) >= count
-
     def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
         """Show a vehicle by its latest heartbeat, before anything else of its system.
 
         ``last_seq`` is the number of the autopilot's last packet: the one after it follows on.
         """
-        self._introduced.add(heartbeat.system_id)
+        self.introduced.add(heartbeat.system_id)
         self.outlet.forward(heartbeat._replace(seq=last_seq))
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Pass a vehicle's packet on, unless it is one too many of its stream."""
         system_id = packet.system_id
-        if system_id not in self._introduced:
+        if system_id not in self.introduced:
             if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
                 return
-            self._introduced.add(system_id)
+            self.introduced.add(system_id)
         is_silent = not self.is_heard or self.is_one_of_many
         if is_silent and packet.message_id != m.Heartbeat.id:
             self.outlet.withhold(packet.source)
@@ -233,7 +217,7 @@ class GcsClient:
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT of a vehicle's task server, unless there were too many."""
-        if not self.is_heard or not self.knows(source.system_id):
+        if not self.is_heard or source.system_id not in self.introduced:
             return
         if severity > MavSeverity.WARNING and not self._texts.take(now=now):
             self.left_out[source] = self.left_out.get(source, 0) + 1

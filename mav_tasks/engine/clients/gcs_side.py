@@ -16,7 +16,7 @@ from mav_tasks.engine.outlet import Outlet
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer, target_of
+from mav_tasks.mavlink.codec import Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.signing import Key
@@ -62,7 +62,8 @@ class GcsSide:
         self._settings = settings
         self._rights = RightsBook(settings.roles)
         self._decoder = Decoder()
-        self._links: set[str] = set()
+        #: the client links, by name
+        self.links: set[str] = set()
         self._newcomers: TokenBucket | None = None
         #: packets of strangers for whom there was no room
         self.turned_away = 0
@@ -70,6 +71,10 @@ class GcsSide:
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
         #: all that are there
         self.clients = self._clients.values()
+        #: gives a client by its key, if it is still there
+        self.client = self._clients.get
+        #: what came in on these links
+        self.counts = self._decoder.counts
         self._statuses = statuses
 
     def plan_statuses(self) -> None:
@@ -77,19 +82,14 @@ class GcsSide:
         due = [client.statuses.next_deadline() for client in self.clients]
         self._statuses.set(min(due, default=inf))
 
-    @property
-    def counts(self) -> DecodeCounts:
-        """What came in on these links."""
-        return self._decoder.counts
-
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Take a link into use, or out of it."""
         if not change.up:
-            self._links.discard(change.link)
+            self.links.discard(change.link)
             for key in [key for key in self._clients if key[0] == change.link]:
                 self._remove(key)
             return
-        self._links.add(change.link)
+        self.links.add(change.link)
         self._link_numbers.setdefault(change.link, len(self._link_numbers) + 1)
         for peer in change.peers:
             self._add(change.link, peer, is_configured=True, now=now)
@@ -98,7 +98,7 @@ class GcsSide:
         """Speak to who has come, forget who is gone."""
         self._remove((change.link, change.peer))
         self._signatures.forget(change.link, change.peer)
-        if change.up and change.link in self._links:
+        if change.up and change.link in self.links:
             self._add(change.link, change.peer, is_configured=True, is_connected=True, now=now)
 
     def note_congestion(self, change: Congestion, *, now: float) -> None:
@@ -111,10 +111,6 @@ class GcsSide:
         """Give a client link's number, from 1; 0 for one that is not there in this run."""
         return min(self._link_numbers.get(link, 0), MAX_LINK_NUMBER)
 
-    def owns(self, link: str) -> bool:
-        """Whether a link of this name is a client link."""
-        return link in self._links
-
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
@@ -122,8 +118,8 @@ class GcsSide:
         self._newcomers = None
         for client in self.clients:
             client.apply(settings.clients)
-            submitter = client.submitter(client.last_source)
-            client.take_rights(self._rights.of(client.signed_by, submitter), now=client.heard_at)
+            rights = self._rights.of(client.signed_by, client.who)
+            client.take_rights(rights, now=client.heard_at)
 
     def forget_unknown(self) -> list[tuple[str, Peer]]:
         """Forget who has signed with a key that counts no more; who is spoken to is unheard.
@@ -142,10 +138,6 @@ class GcsSide:
     def has(self, link: str, peer: Peer) -> bool:
         """Whether an endpoint is a client's."""
         return (link, peer) in self._clients
-
-    def client(self, key: tuple[str, Peer]) -> GcsClient | None:
-        """Give a client by its key, if it is still there."""
-        return self._clients.get(key)
 
     def receive(
         self, link: str, peer: Peer, packet: Packet, *, waited: float = 0.0, now: float
@@ -169,20 +161,23 @@ class GcsSide:
             client = self._admit(link, peer, message, is_signed=is_signed, now=now)
             if client is None:
                 return None
-        client.signed_by = key
-        client.take_rights(self._rights.of(key, client.submitter(packet.source)), now=now)
+        client.waited = waited
+        if packet.source != client.source or key is not client.signed_by:
+            self._know(client, packet.source, key, now=now)
         if message is not None:
             client.heard(packet, now=now)
         return Received(client, packet, message, key, waited)
 
     def hear_out(self, received: Received, *, now: float) -> None:
         """Have a client be again who it was when it sent this packet, of several at one moment."""
-        client, key = received.client, received.key
-        client.waited = received.waited
-        if client.signed_by is not key:
-            client.signed_by = key
-            rights = self._rights.of(key, client.submitter(received.packet.source))
-            client.take_rights(rights, now=now)
+        received.client.waited = received.waited
+        self._know(received.client, received.packet.source, received.key, now=now)
+
+    def _know(self, client: GcsClient, source: Address, key: Key, *, now: float) -> None:
+        """Let it count for a client who sends from this address of its, and signs with this key."""
+        client.source, client.signed_by = source, key
+        client.who = client.submitter(source)
+        client.take_rights(self._rights.of(key, client.who), now=now)
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Show a vehicle's packet to every client that is to have it.

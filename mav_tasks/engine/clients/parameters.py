@@ -5,6 +5,7 @@ parameters are its affair: messages about those go on to it.
 """
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -14,7 +15,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection, SettingError
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import param_receiver
@@ -23,10 +24,23 @@ from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, wit
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.server_events import ParameterSet
+from mav_tasks.tasks.task import Submitter
 
 MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
 LIST_EACH = 0.2  # s: one packet asks for many, and no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
+
+
+class _Wish(NamedTuple):
+    """A parameter that a client wants set; it has effect, and is told, once that is durable."""
+
+    client: GcsClient
+    vehicle: Vehicle
+    asker: Address
+    message: m.ParamSet
+    who: Submitter
+    name: str
+    value: float
 
 
 class ParameterDesk:
@@ -48,8 +62,9 @@ class ParameterDesk:
         self._submissions = submissions
         self._configured = settings
         self._kept = dict(kept)
-        #: the latest wish for each that is not durable yet, and the number of its event
-        self._pending: dict[str, tuple[float, int]] = {}
+        #: the latest wish for each that is not durable yet
+        self._pending: dict[str, _Wish] = {}
+        submissions.gate.knows(_Wish, self._accept, self._give_up)
         self._settings, self._why_not = with_all(settings, self._kept)
         #: whether ``take_change`` has something to give
         self.is_changed = False
@@ -136,61 +151,63 @@ class ParameterDesk:
     ) -> None:
         """It has effect, and is told to everybody, once it is durable."""
         name, value = name_in(message), as_sent(message.param_value)
-        actor = str(client.submitter(packet.source))
-
-        def refuse(text: str, why: int, *, now: float) -> None:
-            error = param_receiver.error(message, why, to=packet.source)
-            client.outlet.send(error, vehicle.server_address)
-            if name in PARAMETERS:  # to clients that do not know the error, the old value says it
-                told = param_receiver.value_of(self._values(), name)
-                client.outlet.send(told, vehicle.server_address)
-            client.tell(text, MavSeverity.WARNING, vehicle.server_address, now=now)
-
+        wish = _Wish(client, vehicle, packet.source, message, client.who, name, value)
         if name not in PARAMETERS:
-            refuse(f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
+            words = f"{name}: no such parameter"
+            self._refuse(wish, words, MavParamError.DOES_NOT_EXIST, now=now)
             return
         try:
             if message.param_type != MavParamType.REAL32:
                 raise SettingError(f"{name}: its type is REAL32")
-            pending = {each: wish for each, (wish, _) in self._pending.items()}
+            pending = {each.name: each.value for each in self._pending.values()}
             expected, _ = with_all(self._configured, self._kept | pending)
             changed(expected, name, value)
             client.rights.require(row_of_message(m.ParamSet.id).role, "set parameters")
             self._submissions.check_open()
         except SettingError as error:
-            refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            self._refuse(wish, str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
             return
         except Rejection as refusal:
-            refuse(refusal.text, MavParamError.PERMISSION_DENIED, now=now)
+            self._refuse(wish, refusal.text, MavParamError.PERMISSION_DENIED, now=now)
             return
+        self._book.record(ParameterSet(name, value, str(wish.who), now))
+        self._pending[name] = wish
+        self._submissions.gate.hold(wish, now=now)
 
-        def accept(*, now: float) -> None:
-            is_latest = self._settled(name, mine)
-            try:
-                changed(self._settings, name, value)
-            except SettingError as error:  # what it was checked against was not stored
-                if is_latest:
-                    self._book.record(ParameterSet(name, self._kept.get(name), actor, now))
-                refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
-            else:
-                self._take(name, value)
+    def _accept(self, wish: _Wish, *, now: float) -> None:
+        is_latest = self._settled(wish)
+        try:
+            changed(self._settings, wish.name, wish.value)
+        except SettingError as error:  # what it was checked against was not stored
+            if is_latest:
+                self._record_kept(wish, now=now)
+            self._refuse(wish, str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+        else:
+            self._take(wish.name, wish.value)
 
-        def give_up(*, now: float) -> None:
-            if self._settled(name, mine):  # or else a later wish is on its way to the store
-                self._book.record(ParameterSet(name, self._kept.get(name), actor, now))
-            words = f"{name} was not stored in time: not set"
-            refuse(words, MavParamError.PERMISSION_DENIED, now=now)
+    def _give_up(self, wish: _Wish, *, now: float) -> None:
+        if self._settled(wish):  # or else a later wish is on its way to the store
+            self._record_kept(wish, now=now)
+        words = f"{wish.name} was not stored in time: not set"
+        self._refuse(wish, words, MavParamError.PERMISSION_DENIED, now=now)
 
-        self._book.record(ParameterSet(name, value, actor, now))
-        mine = self._pending[name] = value, self._book.recorded
-        self._submissions.when_durable(accept, give_up, now=now)
-
-    def _settled(self, name: str, wish: tuple[float, int]) -> bool:
+    def _settled(self, wish: _Wish) -> bool:
         """Whether a wish that waits no more was the latest for this parameter."""
-        is_latest = self._pending.get(name) == wish
+        is_latest = self._pending.get(wish.name) is wish
         if is_latest:
-            del self._pending[name]
+            del self._pending[wish.name]
         return is_latest
+
+    def _record_kept(self, wish: _Wish, *, now: float) -> None:
+        kept = self._kept.get(wish.name)
+        self._book.record(ParameterSet(wish.name, kept, str(wish.who), now))
+
+    def _refuse(self, wish: _Wish, text: str, why: int, *, now: float) -> None:
+        client, source = wish.client, wish.vehicle.server_address
+        client.outlet.send(param_receiver.error(wish.message, why, to=wish.asker), source)
+        if wish.name in PARAMETERS:  # to clients that do not know the error, the old value says it
+            client.outlet.send(param_receiver.value_of(self._values(), wish.name), source)
+        client.tell(text, MavSeverity.WARNING, source, now=now)
 
     def _take(self, name: str, value: float) -> None:
         self._kept[name] = value
@@ -203,7 +220,7 @@ class ParameterDesk:
         told = param_receiver.value_of(self._values(), name)
         for vehicle in self._vehicles.all:
             for client in self._gcs.clients:
-                if client.is_heard and client.knows(vehicle.system_id):
+                if client.is_heard and vehicle.system_id in client.introduced:
                     client.outlet.send(told, vehicle.server_address)
 
 

@@ -4,7 +4,7 @@ A TASK_STATUS that a task is over waits until that is durable: it is never taken
 store is too slow it is told all the same; a state that is shown on request waits for nothing.
 """
 
-from functools import partial
+from typing import NamedTuple
 
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -20,9 +20,22 @@ from mav_tasks.mavlink.enums import MavSeverity, MavState
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.events import Event, TaskAdvanced, TaskChanged, TaskModified, TaskWaits
+from mav_tasks.tasks.events import (
+    Event,
+    TaskAdvanced,
+    TaskChanged,
+    TaskModified,
+    TaskSubmitted,
+    TaskWaits,
+)
 from mav_tasks.tasks.lifecycle import TERMINAL
 from mav_tasks.tasks.task import TaskId
+
+
+class _Ended(NamedTuple):
+    """What is over, and told when that is durable; or all the same, where that takes too long."""
+
+    tasks: frozenset[TaskId]
 
 
 class Publisher:
@@ -46,15 +59,14 @@ class Publisher:
         self._displays = displays
         self._submissions = submissions
         self._rates = rates
-        self._ended: set[TaskId] = set()  # not durably yet
+        self._ended: set[int] = set()  # tasks that are over, not durably yet
+        submissions.gate.knows(_Ended, self._tell_ends, self._tell_ends)
         timers.rhythm(Turn.HEARTBEATS, self._beat, period=INTERVAL, now=now)
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
         """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
-        if client.knows_all(len(self._vehicles)):
-            return
         for vehicle in self._vehicles.all:
-            if client.knows(vehicle.system_id) or not vehicle.is_heard(now=now):
+            if vehicle.system_id in client.introduced or not vehicle.is_heard(now=now):
                 continue  # a silent one must not look alive
             if vehicle.last_heartbeat is not None:
                 heartbeat = vehicle.shown.applied(vehicle.last_heartbeat, now=now)
@@ -67,12 +79,16 @@ class Publisher:
 
     def publish(self, events: list[Event], *, now: float) -> None:
         """Tell of events: in words to all who listen, as TASK_STATUS to who submitted."""
-        ended = {e.task_id for e in events if isinstance(e, TaskChanged) and e.new in TERMINAL}
+        ended: set[TaskId] = set()
+        for event in events:
+            if isinstance(event, TaskChanged) and event.new in TERMINAL:
+                ended.add(event.task_id)
         if ended:
             self._ended |= ended
-            tell = partial(self._tell_ends, ended)
-            self._submissions.when_durable(tell, tell, now=now)
+            self._submissions.gate.hold(_Ended(frozenset(ended)), now=now)
         for event in events:
+            if isinstance(event, TaskSubmitted):
+                continue  # who has asked for it is told of it, and so is everybody
             spoken = translate.text_of(event)
             if spoken is not None:
                 system_id, severity, text = spoken
@@ -90,20 +106,16 @@ class Publisher:
             text = f"{what} in force, but not kept: a restart loses it. See the server's log"
             self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
 
-    def _tell_ends(self, ended: set[TaskId], *, now: float) -> None:
-        self._ended -= ended
-        for task_id in sorted(ended):
+    def _tell_ends(self, ended: _Ended, *, now: float) -> None:
+        self._ended -= ended.tasks
+        for task_id in sorted(ended.tasks):
             self.note_change(task_id)
         self.send_statuses(now=now)
-
-    def _is_told_later(self, task_id: int) -> bool:
-        """Whether a task is over, and that is not durable yet."""
-        return task_id in self._ended
 
     def note_change(self, task_id: TaskId) -> None:
         """Have the submitter of a task told of its state, and who has asked about it."""
         task = self._book.get(task_id)
-        if task is None or self._is_told_later(task_id):
+        if task is None or task_id in self._ended:
             return
         for client in self._gcs.clients:
             # a nonce says it for good: after a restart, or a long silence, the client is another
@@ -129,12 +141,12 @@ class Publisher:
             if now < client.statuses.next_deadline():
                 continue
             active: dict[int, int] = {
-                vehicle.system_id: vehicle.tasks.begun.id
+                vehicle.system_id: begun
                 for vehicle in self._vehicles.all
-                if vehicle.tasks.begun is not None
+                if (begun := vehicle.tasks.executor.task_id) is not None
             }
             for task_id in client.statuses.due(active, now=now):
-                if not self._is_told_later(task_id):
+                if task_id not in self._ended:
                     self._displays.push_status(client, task_id, now=now)
         self._gcs.plan_statuses()
 
@@ -154,7 +166,7 @@ class Publisher:
             heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
             source, new = vehicle.server_address, list[GcsClient]()
             for client in self._gcs.clients:
-                if client.is_heard and client.knows(vehicle.system_id):
+                if client.is_heard and vehicle.system_id in client.introduced:
                     client.outlet.send(heartbeat, source)
                     if client.is_to_be_informed(vehicle.system_id):
                         new.append(client)

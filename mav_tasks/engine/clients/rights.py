@@ -25,6 +25,7 @@ from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
 R = TaskReason
 
 OBSERVER, SUBMITTER, OPERATOR, SAFETY = ROLES
+RANKS = {role: rank for rank, role in enumerate(ROLES)}
 NO_LIMIT = Limits()
 SAME = 1 + 1e-6  # a float32 of a limit is that limit
 
@@ -38,15 +39,15 @@ class Rights(NamedTuple):
     @property
     def rank(self) -> int:
         """The place of the role among all roles: the higher, the more it may do."""
-        return ROLES.index(self.role)
+        return RANKS[self.role]
 
     def reach(self, role: str) -> bool:
         """Whether they are at least those of a role."""
-        return self.rank >= ROLES.index(role)
+        return RANKS[self.role] >= RANKS[role]
 
     def require(self, role: str, what: str) -> None:
         """Raise Rejection unless they are at least those of a role."""
-        if not self.reach(role):
+        if RANKS[self.role] < RANKS[role]:
             raise self.refusal(f"may not {what}, {role} may")
 
     def require_own(self, task: Task, submitter: Submitter, what: str) -> None:
@@ -74,10 +75,11 @@ class Rights(NamedTuple):
         """Give a task as it may be submitted by somebody of whom so many wait; Rejection."""
         self.require(SUBMITTER, "submit tasks")
         self.check_priority(draft.terms.priority)
-        for kind in _kinds_of(draft.goal):
+        kinds = () if self.limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
+        for kind in kinds:
             if kind not in self.limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(self.limits.tasks)}")
-        if not self.reach(OPERATOR) and _performs(draft.goal):
+        if RANKS[self.role] < RANKS[OPERATOR] and _performs(draft.goal):
             raise self.refusal("may not send a plan with commands to the rover")
         if draft.terms.is_preemptive:
             self.check_preemptive()

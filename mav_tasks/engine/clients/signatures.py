@@ -88,6 +88,8 @@ class Signatures:
         self._numbers: dict[str, int] = {}
         self._times: dict[str, StreamTimes] = {}  # by fingerprint
         self._signers: dict[tuple[str, Peer], Signer] = {}
+        #: there is somebody to sign for, or a key to begin with
+        self.may_sign = False
         self._offset: float | None = None  # UTC less ``now``
         self._highest_offset = -inf  # in this run: a clock that is set back shuts nobody out
         #: times of what we have signed, by side, key, link id and source
@@ -137,6 +139,7 @@ class Signatures:
         for way, signer in list(self._signers.items()):
             if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
                 del self._signers[way]  # its role may be another one, too
+        self.may_sign = bool(self._keys or self._signers)
         return gone
 
     def _has_secret_of(self, key: Key) -> bool:

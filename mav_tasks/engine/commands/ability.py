@@ -49,6 +49,14 @@ class Ability(NamedTuple):
         return f"{self.rover} does not reverse"
 
 
+def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[SingleGoal, str]:
+    """Return a goal as this vehicle drives it, and in words if that is otherwise. Rejection."""
+    if persona.honours_yaw_rate and persona.turning is Turning.ON_SPOT:
+        return goal, ""  # it drives everything
+    ability = Ability.of(persona, rover=f"rover {system_id}")
+    return as_driven(goal, ability), driven_otherwise(goal, ability)
+
+
 def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     """Return a goal as such a vehicle drives it. Raise Rejection if it cannot.
 

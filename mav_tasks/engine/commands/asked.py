@@ -1,14 +1,12 @@
 """A command on its way through the server: who asked what of which vehicle, and the way back."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field
 from typing import Self
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
-from mav_tasks.engine.clients.rights import Rights
-from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
+from mav_tasks.engine.commands.words import kind_of, row_said
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -26,33 +24,34 @@ from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Marks, Submitter
 
 
-@dataclass(frozen=True, slots=True)
 class Asked:
     """One command of one client to one vehicle; to be answered exactly once."""
 
-    client: GcsClient
-    vehicle: Vehicle
-    packet: Packet
-    pending: Pending
-    #: who asks, and what he may do: later the endpoint may have signed with another key
-    submitter: Submitter = field(init=False)
-    rights: Rights = field(init=False)
-    command: Command = field(init=False)  #: what is asked for
+    def __init__(
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, pending: Pending
+    ) -> None:
+        self.client = client
+        self.vehicle = vehicle
+        self.packet = packet
+        self.pending = pending
+        #: who asks, and what he may do: later the endpoint may have signed with another key
+        self.submitter: Submitter = client.who
+        self.rights = client.rights
+        #: what is remembered of who asks
+        self.sender = client.sender(packet.source)
+        #: what is asked for
+        self.command = command = pending.command
+        #: what that is by the policy table
+        self.row = row_said(command)
+        self.kind = kind_of(command, self.row, vehicle.parts.persona)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "submitter", self.client.submitter(self.packet.source))
-        object.__setattr__(self, "rights", self.client.rights)
-        object.__setattr__(self, "command", self.pending.command)
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.command}, by {self.submitter})"
 
     @property
     def actor(self) -> str:
         """Who asks, in words."""
         return str(self.submitter)
-
-    @property
-    def sender(self) -> Sender:
-        """What is remembered of who asks."""
-        return self.client.sender(self.packet.source)
 
     @property
     def receiver(self) -> CommandReceiver:
@@ -62,8 +61,10 @@ class Asked:
     @property
     def answering(self) -> Address:
         """The component that answers: the one addressed; where that is all, our own."""
-        component = self.command.target.component_id or self.vehicle.server_component
-        return Address(self.vehicle.system_id, component)
+        target, ours = self.command.target, self.vehicle.server_address
+        if target.component_id in (0, ours.component_id):
+            return ours
+        return Address(ours.system_id, target.component_id)
 
     @property
     def answers_to(self) -> Hashable:
@@ -111,7 +112,6 @@ class Asked:
         self.client.tell(text, severity, self.vehicle.server_address, now=now)
 
 
-@dataclass(frozen=True, slots=True)
 class AskedByMessage(Asked):
     """The same as asked by the message SET_MODE, which nothing acknowledges."""
 

@@ -4,6 +4,8 @@ Every command is answered exactly once, from the component that was addressed, t
 asked. What is not ours is forwarded to the vehicle, whose answer comes back through ``deliver``.
 """
 
+from typing import NamedTuple
+
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -17,20 +19,15 @@ from mav_tasks.engine.commands.goals import (
     whole,
 )
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.ordering import (
-    halts_again,
-    has_left_before_halt,
-    kind_of,
-    note_halt,
-    require_newer,
-    row_said,
-)
+from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans, begins_with
 from mav_tasks.engine.policy import Kind, is_task_command
+from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -46,6 +43,14 @@ from mav_tasks.tasks.task import TaskId
 R = TaskReason
 
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
+
+
+class _UndoesHold(NamedTuple):
+    """A "go to" that came after a HOLD of which it says that nobody has wished for it."""
+
+    vehicle: Vehicle
+    number: int  # of that HOLD
+    actor: str
 
 
 class Commands:
@@ -72,6 +77,7 @@ class Commands:
         self._modes = modes
         self._control = control
         self._displays = displays
+        submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -85,21 +91,20 @@ class Commands:
         if command.command == MavCmd.TASK_STOP:
             self._stop(client, packet, command, now=now)
             return
-        addressed = self._vehicles.addressed_by(command.target.system_id)
-        if not addressed:
+        system_id = command.target.system_id
+        vehicle = self._vehicles.get(system_id or min(self._vehicles.by_id, default=0))
+        if vehicle is None:
             return  # clients send everything to everyone: it is for somebody else
-        vehicle = addressed[0]
         receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona):
             if known.answer is not None:
                 client.answer(known.answer, packet.source)
             return
-        pending = receiver.remember(command, packet.raw, now=now)
-        asked = Asked(client, vehicle, packet, pending)
+        asked = Asked(client, vehicle, packet, receiver.remember(command, packet.raw, now=now))
         epoch = vehicle.tasks.halts.epoch
         try:
-            if kind_of(command, vehicle.persona) is Kind.GO:
+            if asked.kind is Kind.GO:
                 require_newer(asked, now=now)
             self._dispatch(asked, now=now)
         except Rejection as refusal:
@@ -125,20 +130,19 @@ class Commands:
         if asked.command.target.system_id == EVERYBODY:  # what is not ours came once for each rover
             number = asked.command.command
             raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
-        component = asked.command.target.component_id
-        at_server = component == asked.vehicle.server_component
-        row = row_said(asked.command)
-        # an autopilot answers for components that are not there: also about what it sends
-        is_interval = asked.command.command in (
-            MavCmd.SET_MESSAGE_INTERVAL,
-            MavCmd.GET_MESSAGE_INTERVAL,
-        )
-        at_nobody = is_interval and component not in asked.vehicle.components
-        if row.is_claimed and (component in (0, AUTOPILOT) or at_server or at_nobody):
+        command, row = asked.command, asked.row
+        component = command.target.component_id
+        at_server = component == asked.vehicle.server_address.component_id
+        if row.is_claimed and (
+            at_server or component in (0, AUTOPILOT) or _is_of_what_nobody_sends(asked)
+        ):
             asked.rights.require(row.role, f"send {row.name}")
-            match asked.command.command:
+            match command.command:
                 case number if becomes_task(number) and (at_server or self._claims(number)):
-                    self._take_in(asked, now=now)
+                    if number == MavCmd.DO_REPOSITION:
+                        self._reposition(asked, now=now)
+                    else:
+                        self._submissions.submit(asked, now=now)
                     return
                 case (
                     MavCmd.TASK_CANCEL
@@ -204,8 +208,7 @@ class Commands:
 
     def _check_question(self, asked: Asked, *, now: float) -> None:
         """Refuse an observer's question that is too much for the link to the rover."""
-        is_question = row_said(asked.command).kind is Kind.QUESTION
-        if is_question and not asked.rights.reach(SUBMITTER):
+        if asked.row.kind is Kind.QUESTION and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
             why_not = self._vehicles.links.why_not_asked(
                 asked.vehicle, asked.client.key, asked.packet, message, now=now
@@ -222,35 +225,24 @@ class Commands:
         """Whether a command to the autopilot itself is ours to see to."""
         return is_task_command(command) or self._settings.claim
 
-    def _take_in(self, asked: Asked, *, now: float) -> None:
-        """A command that asks for a task; or, without a place, for a pause."""
-        is_reposition = asked.command.command == MavCmd.DO_REPOSITION
-        if is_reposition and not has_place(asked.command):
+    def _reposition(self, asked: Asked, *, now: float) -> None:
+        """A "go to"; or, without a place, a pause."""
+        if not has_place(asked.command):
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
-        elif is_reposition:
-            held_at = asked.vehicle.hold_before.since
-            # a "go to" from before a HOLD, or a copy of one, says nothing about that
-            is_older = has_left_before_halt(asked)
-            is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
-            self._submissions.submit(asked, now=now)
-            if not is_older:
-                self._undo_hold_before(asked, now=now)
-        else:
-            self._submissions.submit(asked, now=now)
+            return
+        held_at = asked.vehicle.hold_before.since
+        # one from before a HOLD, or a copy of one, says nothing about that
+        is_older = has_left_before_halt(asked)
+        is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
+        self._submissions.submit(asked, now=now)
+        if not is_older:
+            self._undo_hold_before(asked, now=now)
 
     def _undo_hold_before(self, asked: Asked, *, now: float) -> None:
-        vehicle = asked.vehicle
-        number = vehicle.hold_before.undoing(asked.sender, now=now)
-        if number is None or not asked.rights.reach(OPERATOR):
-            return
-
-        def undo(*, now: float) -> None:
-            vehicle.joint.go_to_follows(number, actor=asked.actor, now=now)
-
-        def leave(*, now: float) -> None:
-            """It was not stored in time."""
-
-        self._submissions.when_durable(undo, leave, now=now)
+        number = asked.vehicle.hold_before.undoing(asked.sender, now=now)
+        if number is not None and asked.rights.reach(OPERATOR):
+            undoes = _UndoesHold(asked.vehicle, number, asked.actor)
+            self._submissions.gate.hold(undoes, now=now)
 
     def cancel_latest(
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
@@ -323,6 +315,24 @@ class Commands:
             words = f"paused, but vehicle {vehicle.system_id} is silent"
             raise Rejection(R.VEHICLE_SILENT, words)
         return paused
+
+
+def _undo_hold(undoes: _UndoesHold, *, now: float) -> None:
+    undoes.vehicle.joint.go_to_follows(undoes.number, actor=undoes.actor, now=now)
+
+
+def _leave_hold(undoes: _UndoesHold, *, now: float) -> None:
+    """It was not stored in time."""
+
+
+def _is_of_what_nobody_sends(asked: Asked) -> bool:
+    """Whether it is about the messages of a component that is not there.
+
+    An autopilot answers for those: also about what it sends.
+    """
+    intervals = MavCmd.SET_MESSAGE_INTERVAL, MavCmd.GET_MESSAGE_INTERVAL
+    component = asked.command.target.component_id
+    return asked.command.command in intervals and component not in asked.vehicle.components
 
 
 def _check_last_item(asked: Asked) -> None:

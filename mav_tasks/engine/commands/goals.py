@@ -4,12 +4,13 @@ Our own commands, and the standard ones that a stock client sends without knowin
 """
 
 from collections.abc import Callable
+from functools import cache
 from hashlib import blake2b
 from math import degrees, inf, isinf, isnan, nan, radians, tau
 from struct import Struct
 from typing import NamedTuple
 
-from mav_tasks.engine.policy import is_task_command
+from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import EXACT, large_number
@@ -75,23 +76,32 @@ def wish_of(
     *,
     now: float,
     priority: int = DEFAULT_PRIORITY,
+    is_cruising: bool = False,
 ) -> Wish:
     """Give what a command that becomes a task asks for; Rejection names a bad parameter.
 
-    ``priority`` is that of a standard command, which cannot name one.
+    ``priority`` and ``is_cruising`` are those of a standard command, which cannot name them.
     """
     if command.frame is not None and command.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
-    goal = goal_of(command, driving)
-    if not is_task_command(command.command):
+    goal = _GOALS[command.command](command, driving)
+    if command.command not in TASK_COMMANDS:
         refuse_infinite(command)
-        return Wish(goal, Terms(priority=priority), marks_of(command, packet))
+        terms = _terms(priority, is_cruising=is_cruising)
+        return Wish(goal, terms, marks_of(command, packet))
     marks = marks_of(command, packet, nonce=identifier(command, 4, "nonce"))
     after = identifier(command, 5, "run after")
     delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
     named = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
     start_at = now + delay if delay > 0 else None
-    return Wish(goal, Terms(priority=named, after=after, start_at=start_at), marks)
+    if after or start_at is not None:
+        return Wish(goal, Terms(priority=named, after=after, start_at=start_at), marks)
+    return Wish(goal, _terms(named), marks)
+
+
+@cache  # nearly all are alike, and to make them anew takes its time
+def _terms(priority: int, *, is_cruising: bool = False) -> Terms:
+    return Terms(priority=priority, is_cruising=is_cruising)
 
 
 def goal_of(command: Command, driving: Driving) -> SingleGoal:
@@ -158,6 +168,9 @@ def whole(
 
     ``default`` None: it must be given.
     """
+    value = command.params[index - 1]
+    if low <= value <= high and value == int(value):
+        return int(value)
     fallback = None if default is None else float(default)
     value = number(command, index, name, low=low, high=high, default=fallback)
     if value != int(value):
@@ -170,8 +183,11 @@ def identifier(
     command: Command, index: int, name: str, *, low: int = 0, default: int | None = 0
 ) -> int:
     """Return a task id or a nonce: a whole number that may be larger than a float32 holds."""
+    value = command.params[index - 1]
+    if low <= value <= EXACT and value == int(value):
+        return int(value)
     is_integer = command.frame is not None and index in INTEGERS
-    large = None if is_integer else large_number(command.params[index - 1])
+    large = None if is_integer else large_number(value)
     if large is not None:
         return large
     high = MAX_TASK_ID if is_integer else EXACT

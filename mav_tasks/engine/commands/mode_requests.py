@@ -4,11 +4,13 @@ It comes as a command, which is answered, or as the old message SET_MODE, which 
 acknowledges: who sent that waits until a heartbeat shows the mode.
 """
 
+from typing import NamedTuple
+
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.commands.asked import Asked, AskedByMessage
-from mav_tasks.engine.commands.ordering import kind_of, note_halt, require_newer
+from mav_tasks.engine.commands.ordering import note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.policy import Kind, row_of_command
@@ -21,13 +23,20 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Submitter, Terms
+from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
 
 R = TaskReason
 
 SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
 CRUISING = Terms(is_cruising=True)
 STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
+
+
+class _Started(NamedTuple):
+    """A mission that was started, or goes on, for whoever has asked for that."""
+
+    asked: Asked
+    task: Task
 
 
 class ModeRequests:
@@ -48,6 +57,7 @@ class ModeRequests:
         self._submissions = submissions
         self._plans = plans
         self._claims = settings.claim
+        submissions.gate.knows(_Started, self._accept, self._give_up)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -92,7 +102,7 @@ class ModeRequests:
         vehicle = asked.vehicle
         epoch = vehicle.tasks.halts.epoch
         try:
-            if kind_of(asked.command, vehicle.persona) is Kind.GO:
+            if asked.kind is Kind.GO:
                 require_newer(asked, now=now)
             if not self.asked(asked, now=now):
                 vehicle.requests.forward(asked.packet)
@@ -116,20 +126,21 @@ class ModeRequests:
             self._plans.restarted(vehicle, task, now=now)
             return
 
-        def accept(*, now: float) -> None:
-            del now
-            asked.answer(MavResult.ACCEPTED, started.id)
+        self._submissions.gate.hold(_Started(asked, started), now=now)
 
-        def give_up(*, now: float) -> None:
-            self._plans.stage_again(vehicle, started, now=now)
-            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
-            self._book.record(asked.refuse(refusal, now=now))
+    def _accept(self, started: _Started, *, now: float) -> None:
+        del now
+        started.asked.answer(MavResult.ACCEPTED, started.task.id)
 
-        self._submissions.when_durable(accept, give_up, now=now)
+    def _give_up(self, started: _Started, *, now: float) -> None:
+        self._plans.stage_again(started.asked.vehicle, started.task, now=now)
+        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
+        self._book.record(started.asked.refuse(refusal, now=now))
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Begin the mission of a vehicle that was to be armed first, if it has just been."""
-        if not vehicle.start_mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
+        mark = vehicle.start_mark
+        if mark.marker is None or not mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
             return
         if vehicle.control.is_engaged or vehicle.control.we_armed:
             return  # armed by ourselves, for a task
@@ -151,8 +162,7 @@ class ModeRequests:
         self._submissions.check_open()
         started = self._plans.start(vehicle, submitter, first=0, now=now)
         if isinstance(started, Draft):
-            allowed = rights.checked(started, waiting=vehicle.tasks.count_of(submitter))
-            task = vehicle.tasks.submit(allowed, now=now)
+            task = self._submissions.take_in(rights, vehicle, started, now=now)
             self._plans.restarted(vehicle, task, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
@@ -172,7 +182,7 @@ class ModeRequests:
         heartbeat = vehicle.shown.in_message(vehicle.heartbeat, now=now)
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs.clients:
-            if client.knows(vehicle.system_id):
+            if vehicle.system_id in client.introduced:
                 client.outlet.send(heartbeat, source)
 
     def _is_to_be_armed_first(self, vehicle: Vehicle) -> bool:

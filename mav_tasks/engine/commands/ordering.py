@@ -9,21 +9,10 @@ from math import isfinite
 
 from mav_tasks.engine.clients.sender import COPIED, DOUBLED
 from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import has_place
-from mav_tasks.engine.policy import (
-    DISARM,
-    PAUSE,
-    PAUSE_HERE,
-    Kind,
-    Row,
-    row_of_command,
-    row_of_message,
-)
+from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
-from mav_tasks.services.command_receiver import Command, command_of
-from mav_tasks.services.persona import Persona
+from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: where a word names the epoch that its sender was shown: which of the parameters, from 0
@@ -35,36 +24,6 @@ EPOCH_IN: dict[int, int] = {
 REPEATED = 2.0  # s, within which MAVSDK sends again, unmarked, what it has no answer to: 1.5
 EPOCHS = 1 << 24  # that a float32 tells apart
 AGAIN = "if you still mean it, send it again in 4 s"
-
-
-def row_said(command: Command) -> Row:
-    """Return the row of a command by what it says; of a mode ``ModeRequests`` knows more."""
-    match command.command, command.params[0]:
-        case MavCmd.COMPONENT_ARM_DISARM, 0.0:
-            return DISARM
-        case MavCmd.DO_PAUSE_CONTINUE, 0.0:
-            return PAUSE
-        case MavCmd.DO_REPOSITION, _ if not has_place(command):
-            return PAUSE_HERE
-        case number, _:
-            return row_of_command(number)
-
-
-def kind_of(command: Command, persona: Persona) -> Kind:
-    """Return what a command does."""
-    if command.command == MavCmd.DO_SET_MODE:
-        is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
-        return Kind.HALT if is_hold else Kind.GO
-    return row_said(command).kind
-
-
-def kind_of_message(message: Message | None, persona: Persona) -> Kind:
-    """Return what a client's message does, as far as its order within a moment matters."""
-    if isinstance(message, SetMode):
-        return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
-    if isinstance(message, CommandLong | CommandInt):
-        return kind_of(command_of(message), persona)
-    return Kind.WISH if message is None else row_of_message(message.id).kind
 
 
 def require_newer(asked: Asked, *, now: float) -> None:
@@ -124,17 +83,6 @@ def why_older(asked: Asked, *, now: float) -> str:
     return f"{halts.words} came since: {AGAIN}"
 
 
-def halts_again(command: Command, persona: Persona) -> bool:
-    """Whether each copy of a word makes a rover stand, also the very same packet.
-
-    Some senders do not count their packets: it may be another word, and is acknowledged. Who calls
-    a task off means that one task.
-    """
-    if command.command in (MavCmd.TASK_CANCEL, MavCmd.TASK_CLEAR):
-        return False
-    return kind_of(command, persona) is Kind.HALT
-
-
 def has_left_before_halt(asked: Asked) -> bool:
     """Return whether the last halt is the same sender's, and this word had left before it."""
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
@@ -144,9 +92,7 @@ def has_left_before_halt(asked: Asked) -> bool:
 def note_halt(asked: Asked, *, before: int) -> None:
     """Note whose word the last halt was, if there was one since the epoch ``before``."""
     halts = asked.vehicle.tasks.halts
-    is_repeated = (
-        halts.by is asked.sender and kind_of(asked.command, asked.vehicle.persona) is Kind.HALT
-    )
+    is_repeated = halts.by is asked.sender and asked.kind is Kind.HALT
     if halts.epoch != before or is_repeated:
         number = asked.sender.line.number_of(asked.packet.seq)
         halts.was_said_by(asked.sender, number, command=asked.command.command)

@@ -1,25 +1,24 @@
 """Submissions of tasks: recognised if they come again, queued, and acknowledged once durable."""
 
-from dataclasses import replace
-from functools import partial
+from collections.abc import Hashable
+from typing import NamedTuple
 
-from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.clients.rights import OPERATOR
-from mav_tasks.engine.commands.ability import Ability, as_driven, driven_otherwise
+from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.commands.ability import driven
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import wish_of
 from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt, why_older
 from mav_tasks.engine.commit_gate import CommitGate
-from mav_tasks.engine.policy import is_task_command
-from mav_tasks.engine.timers import Effect, Timers
+from mav_tasks.engine.policy import TASK_COMMANDS
+from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.goal import Goal, GoTo, describe
+from mav_tasks.tasks.goal import GoTo, describe
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 from mav_tasks.tasks.recollection import Known, Recollection, Rule
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
@@ -38,6 +37,13 @@ GIVEN_UP = 3.5  # s, after which a client waits for no answer any more
 NONCE = 3  # where it is among the parameters
 
 
+class Submitted(NamedTuple):
+    """A task that was taken in; whoever has asked for it is told when that is durable."""
+
+    asked: Asked
+    task: Task
+
+
 class Submissions:
     """What becomes a task, and whether it may be said so yet."""
 
@@ -53,7 +59,9 @@ class Submissions:
         self._book = book
         self._recollection = recollection
         self._settings = settings
-        self._gate = CommitGate(timers)
+        #: what waits for the store, whosever it is
+        self.gate = CommitGate(book, timers, within=settings.watch.commit)
+        self.gate.knows(Submitted, self._accept, self._withdraw)
         #: taken in, and not durable yet: who is to be told, each client once for a command
         self._undecided: dict[TaskId, list[Asked]] = {}
         self._store_is_away = False
@@ -66,11 +74,12 @@ class Submissions:
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
+        self.gate.within = settings.watch.commit
 
     def committed(self, through: int, *, now: float) -> None:
         """Let go what waited for the store."""
         self._store_is_away = False
-        self._gate.committed(through, now=now)
+        self.gate.committed(through, now=now)
 
     def store_failed(self) -> None:
         """Refuse new submissions until something has been committed again."""
@@ -78,77 +87,93 @@ class Submissions:
 
     def submit(self, asked: Asked, *, now: float) -> None:
         """Take in the task that a command asks for; Rejection says why not."""
-        if asked.client.waited > GIVEN_UP:
+        client, vehicle, command = asked.client, asked.vehicle, asked.command
+        if client.waited > GIVEN_UP:
             words = "it waited while the server stood still: send it again"
             raise Rejection(R.STALE, words)
-        command, vehicle = asked.command, asked.vehicle
-        submitter = asked.client.submitter(asked.packet.source)
+        is_ours = command.command in TASK_COMMANDS
         wish = wish_of(
             command,
             asked.packet.raw,
             self._settings.driving,
             now=now,
-            priority=self._priority_of(submitter),
+            priority=DEFAULT_PRIORITY if is_ours else self._priority_of(asked.submitter),
+            is_cruising=command.target.component_id in (0, AUTOPILOT),
         )
         # A stock client cannot read TASK_STATUS, and counts it as a packet lost; it fills up with
         # zeros. A nonce, or NaN for none, comes from somebody who knows these commands.
-        is_ours = is_task_command(command.command)
-        asked.client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
-        rover = f"rover {vehicle.system_id}"
-        ability = Ability.of(vehicle.persona, rover=rover)
-        goal = as_driven(wish.goal, ability)
-        self._check_reach(vehicle, goal)
-        is_at_autopilot = command.target.component_id in (0, AUTOPILOT)
-        terms = replace(wish.terms, is_cruising=is_at_autopilot and not is_ours)
-        draft = Draft(vehicle.system_id, command.command, goal, submitter, terms, wish.marks)
+        client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
+        goal, words = driven(wish.goal, vehicle.parts.persona, system_id=vehicle.system_id)
+        if isinstance(goal, GoTo):
+            self._check_reach(vehicle, goal)
+        draft = Draft(
+            vehicle.system_id, command.command, goal, asked.submitter, wish.terms, wish.marks
+        )
         runs_now = self._settings.guided == "now" and asked.is_go_to
         why_not = why_older(asked, now=now) if runs_now else ""
-        known = self._recollection.known(
-            draft, confirmation=command.confirmation, origin=vehicle.where.origin, now=now
-        )
-        if known is not None:
-            self._answer_repeat(asked, known, now=now)
+        if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
         if has_left_before_halt(asked):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came since: {AGAIN}")
-        self.check_open()
-        draft = _allowed(asked.client, vehicle, draft)
-        if not is_ours:  # as on an autopilot; a task of ours waits until its client has driven
-            vehicle.joint.end_driving_of(asked.client.key, now=now)
-        if runs_now:
-            asked.rights.require(OPERATOR, "interrupt what a rover does")
-            if why_not:
-                raise Rejection(R.STALE, why_not)
-            task = vehicle.joint.run_now(draft, actor=asked.actor, now=now)
-        else:
-            task = vehicle.tasks.submit(draft, now=now)
+        task = self.take_in(
+            asked.rights,
+            vehicle,
+            draft,
+            runs_now=runs_now,
+            why_not=why_not,
+            # as on an autopilot; a task of ours waits until its client has driven
+            ends_driving_of=None if is_ours else client.key,
+            now=now,
+        )
         self._await_commit(asked, task, now=now)
-        words = driven_otherwise(wish.goal, ability)
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
 
     def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
         """Take in a task that runs at once; Rejection says why not."""
         asked.vehicle.joint.end_driving_of(asked.client.key, now=now)
-        known = self._recollection.known(
-            draft, confirmation=0, origin=asked.vehicle.where.origin, now=now
-        )
-        if known is not None:
-            self._answer_repeat(asked, known, now=now)
-            return
-        self.check_open()
-        asked.rights.require(OPERATOR, "interrupt what a rover does")
-        draft = _allowed(asked.client, asked.vehicle, draft)
-        task = asked.vehicle.joint.run_now(draft, actor=asked.actor, now=now)
-        self._await_commit(asked, task, now=now)
+        if not self._is_repeat(asked, draft, confirmation=0, now=now):
+            task = self.take_in(asked.rights, asked.vehicle, draft, runs_now=True, now=now)
+            self._await_commit(asked, task, now=now)
 
     def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
         """Take in a task that a command means without naming it; Rejection says why not."""
-        self.check_open()
-        draft = _allowed(asked.client, asked.vehicle, draft)
-        task = asked.vehicle.tasks.submit(draft, now=now)
+        task = self.take_in(asked.rights, asked.vehicle, draft, now=now)
         self._await_commit(asked, task, now=now)
         return task
+
+    def submit_plan(self, rights: Rights, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
+        """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
+        task = self.take_in(rights, vehicle, draft, now=now)
+        self._recollection.remember(task, at=now, now=now)
+        return task
+
+    def take_in(
+        self,
+        rights: Rights,
+        vehicle: Vehicle,
+        draft: Draft,
+        *,
+        runs_now: bool = False,
+        why_not: str = "",
+        ends_driving_of: Hashable | None = None,
+        now: float,
+    ) -> Task:
+        """Take a new task in, of whatever origin. Rejection says why not.
+
+        ``why_not``: in words, why it does not count though it could run now.
+        """
+        self.check_open()
+        if runs_now:
+            rights.require(OPERATOR, "interrupt what a rover does")
+        draft = rights.checked(draft, waiting=vehicle.tasks.count_of(draft.submitter))
+        if ends_driving_of is not None:
+            vehicle.joint.end_driving_of(ends_driving_of, now=now)
+        if why_not:
+            raise Rejection(R.STALE, why_not)
+        if runs_now:
+            return vehicle.joint.run_now(draft, actor=str(draft.submitter), now=now)
+        return vehicle.tasks.submit(draft, now=now)
 
     def known_plan(self, draft: Draft, *, begun_at: float, now: float) -> TaskId | None:
         """Give the task that a plan is already, uploaded a moment before: its ack may be lost.
@@ -161,24 +186,6 @@ class Submissions:
             return None
         self._recollection.remember(task, at=now, now=now)
         return task.id
-
-    def submit_plan(self, client: GcsClient, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
-        """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
-        self.check_open()
-        draft = _allowed(client, vehicle, draft)
-        task = vehicle.tasks.submit(draft, now=now)
-        self._recollection.remember(task, at=now, now=now)
-        return task
-
-    def when_durable(self, release: Effect, give_up: Effect, *, now: float) -> None:
-        """Call ``release`` when all that is recorded by now is durable, or ``give_up``."""
-        if self._book.recorded <= self._book.durable:
-            release(now=now)
-            return
-        give_up_at = now + self._settings.watch.commit
-        self._gate.hold(
-            self._book.recorded, give_up_at=give_up_at, release=release, give_up=give_up
-        )
 
     def take_back(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """A submission was not stored in time: it is none."""
@@ -199,10 +206,8 @@ class Submissions:
         by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
         return priorities.get(submitter.place, by_address)
 
-    def _check_reach(self, vehicle: Vehicle, goal: Goal) -> None:
+    def _check_reach(self, vehicle: Vehicle, goal: GoTo) -> None:
         """A slip of a digit in a place is a drive that nobody meant."""
-        if not isinstance(goal, GoTo):
-            return
         far = vehicle.where.distance_to(goal)
         longest = self._settings.driving.max_distance
         if far is not None and far > longest:
@@ -221,12 +226,11 @@ class Submissions:
     def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
         self._recollection.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
-        self.when_durable(
-            partial(self._accept, asked, task), partial(self._withdraw, asked, task), now=now
-        )
+        self.gate.hold(Submitted(asked, task), now=now)
 
-    def _accept(self, asked: Asked, task: Task, *, now: float) -> None:
+    def _accept(self, submitted: Submitted, *, now: float) -> None:
         """The submission is durable: acknowledge it with the task's id, and tell of it."""
+        asked, task = submitted
         for each in self._undecided.pop(task.id):
             each.answer(MavResult.ACCEPTED, task.id)
             _note(each, task.id)
@@ -234,26 +238,25 @@ class Submissions:
 
     def _tell_queued(self, asked: Asked, task: Task, *, now: float) -> None:
         """Tell everybody of a task; a station that has it wait for a button, as a warning."""
-        tasks, source = asked.vehicle.tasks, asked.vehicle.server_address
-        paused = tasks.paused
+        tasks, source, goal = asked.vehicle.tasks, asked.vehicle.server_address, describe(task.goal)
+        paused, is_blocked = tasks.paused, True
         if tasks.urgent == task.id:
-            words = f"Task {task.id} begins now: {describe(task.goal)}"
+            words, is_blocked = f"Task {task.id} begins now: {goal}", False
         elif paused:  # who queued it may not be who paused
             words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
-            words += f". {describe(task.goal)}"
+            words += f". {goal}"
         elif tasks.is_held_ahead:
-            words = f"Task {task.id} waits, press a Held button: a task is held. "
-            words += describe(task.goal)
+            words = f"Task {task.id} waits, press a Held button: a task is held. {goal}"
         else:
-            words = f"Task {task.id} queued: {describe(task.goal)}"
+            words, is_blocked = f"Task {task.id} queued: {goal}", False
         for client in self._gcs.clients:
-            is_blocked = tasks.urgent != task.id and (paused or tasks.is_held_ahead)
             is_told_otherwise = client is not asked.client or client.uses_dialect
             is_calm = is_told_otherwise or not is_blocked
             severity = MavSeverity.INFO if is_calm else MavSeverity.WARNING
             client.tell(words, severity, source, now=now)
 
-    def _withdraw(self, asked: Asked, task: Task, *, now: float) -> None:
+    def _withdraw(self, submitted: Submitted, *, now: float) -> None:
+        asked, task = submitted
         askers = self._undecided.pop(task.id)
         was_for_now = asked.vehicle.tasks.urgent == task.id
         self.take_back(asked.vehicle, task, now=now)
@@ -263,6 +266,15 @@ class Submissions:
         refusal = Rejection(R.STORE_UNAVAILABLE, words)
         for each in askers:
             self._book.record(each.refuse(refusal, now=now))
+
+    def _is_repeat(self, asked: Asked, draft: Draft, *, confirmation: int, now: float) -> bool:
+        """Whether a submission came before; it is answered then."""
+        # of places only, to compare them
+        origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
+        known = self._recollection.known(draft, confirmation=confirmation, origin=origin, now=now)
+        if known is not None:
+            self._answer_repeat(asked, known, now=now)
+        return known is not None
 
     def _answer_repeat(self, asked: Asked, known: Known, *, now: float) -> None:
         """The same submission again: the same answer, or none yet if it has none yet."""
@@ -281,11 +293,6 @@ class Submissions:
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"same {what} again: still task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
-
-
-def _allowed(client: GcsClient, vehicle: Vehicle, draft: Draft) -> Draft:
-    """Give a task as its client may submit it; Rejection."""
-    return client.rights.checked(draft, waiting=vehicle.tasks.count_of(draft.submitter))
 
 
 def _note(asked: Asked, task_id: TaskId) -> None:

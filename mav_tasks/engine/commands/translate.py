@@ -13,7 +13,7 @@ from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.guidance import Leg
-from mav_tasks.tasks.driving.itinerary import goal_of
+from mav_tasks.tasks.driving.itinerary import present_goal
 from mav_tasks.tasks.driving.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.events import (
@@ -29,7 +29,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
-from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
@@ -83,6 +83,8 @@ CALM = frozenset(
     }
 )
 
+STATES = tuple(state.name.lower() for state in TaskState)  # in words, by number
+
 UNIT_NONE = 0  # TASK_UNIT
 UNIT_METRES = 1
 UNIT_RADIANS = 2
@@ -114,31 +116,34 @@ def task_status(
     is_costly = task.state is TaskState.QUEUED  # it depends on all that are ahead
     to_start, to_finish = nan, nan
     if with_position or not is_costly:
-        to_start, to_finish = estimate(tasks, task, book, now=now)
+        to_start, to_finish = map(_float32, estimate(tasks, task, book, now=now))
+    progress, submitter = task.progress, task.submitter
     leg = _leg(task)
+    unit, length = _size_of(leg)
+    step, step_count = _steps(task.goal, progress)
     return m.TaskStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
         task_id=task.id,
         version=task.version,
-        nonce=task.nonce,
+        nonce=task.marks.nonce,
         after_task_id=task.terms.after,
-        remaining=_remaining(task, leg),
-        time_to_start=_float32(to_start),
-        time_to_finish=_float32(to_finish),
-        execution_time=nan if task.progress.anchor is None else task.progress.execution_time,
+        remaining=nan if leg is None else max(0.0, length - progress.done),
+        time_to_start=to_start,
+        time_to_finish=to_finish,
+        execution_time=nan if progress.anchor is None else progress.execution_time,
         command=task.command,
         queue_position=UNKNOWN_POSITION if ahead is None else min(ahead, LAST_POSITION),
-        step=_step(task),
-        step_count=_step_count(task.goal),
+        step=step,
+        step_count=step_count,
         target_system=reader.system_id,
         target_component=reader.component_id,
         state=task.state,
         reason=reason,
-        priority=task.priority,
-        progress=_progress(task, leg),
-        remaining_unit=_unit(leg),
-        submitter_system=task.submitter.system_id,
-        submitter_component=task.submitter.component_id,
+        priority=task.terms.priority,
+        progress=_percentage(task, step, step_count, length),
+        remaining_unit=unit,
+        submitter_system=submitter.system_id,
+        submitter_component=submitter.component_id,
         submitter_link=link_number,
         text=_words(task, reason, tasks.turns.words_of_blocker(task.id)).encode()[:50],
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
@@ -259,47 +264,43 @@ def _whole(value: float) -> int:
 
 def _leg(task: Task) -> Leg | None:
     """The leg that is being driven; before the start the first one, if it can be known by then."""
-    goal = goal_of(task)
+    goal = present_goal(task.goal, task.progress)
     return first_leg(goal) if task.progress.anchor is None else leg_of(goal, task.progress)
 
 
-def _remaining(task: Task, leg: Leg | None) -> float:
-    return nan if leg is None else max(0.0, length_of(leg) - task.progress.done)
-
-
-def _unit(leg: Leg | None) -> int:
+def _size_of(leg: Leg | None) -> tuple[int, float]:
+    """Give the whole of a leg, and in which TASK_UNIT that is."""
     match leg:
         case None:
-            return UNIT_NONE
+            return UNIT_NONE, 0.0
         case Move() | Follow():
-            return UNIT_METRES
+            return UNIT_METRES, length_of(leg)
         case Rotate():
-            return UNIT_RADIANS
+            return UNIT_RADIANS, length_of(leg)
         case _:
-            return UNIT_SECONDS
+            return UNIT_SECONDS, length_of(leg)
 
 
-def _progress(task: Task, leg: Leg | None) -> int:
+def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
+    """Give how much of a task is done, if so much of the leg is that is ``length`` as a whole."""
     if task.state is TaskState.COMPLETED:
         return 100
-    if leg is None or task.progress.anchor is None:
+    if task.progress.anchor is None:
         return 0
-    length = length_of(leg)
     share = min(1.0, max(0.0, task.progress.done / length)) if length else 0.0
-    return round(100 * (_step(task) + share) / max(_step_count(task.goal), 1))
+    return round(100 * (step + share) / max(step_count, 1))
 
 
-def _step(task: Task) -> int:
-    """Give the item of a plan that is being driven, of other tasks the leg."""
-    return max(task.progress.step, 0) if isinstance(task.goal, Plan) else task.progress.leg
-
-
-def _step_count(goal: Goal) -> int:
-    return len(goal.steps) if isinstance(goal, Plan) else leg_count(goal)
+def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
+    """Give the item of a plan that is being driven, of other tasks the leg; and of how many."""
+    if isinstance(goal, Plan):
+        return max(progress.step, 0), len(goal.steps)
+    return progress.leg, leg_count(goal)
 
 
 def _words(task: Task, reason: TaskReason, says: str) -> str:
     """Give a task, its state and the reason in words; ``says``: the vehicle's own about that."""
-    state = task.state.name.lower()
-    why = words_of(reason) + (f": {says}" if says else "")
-    return f"{describe(task.goal)}: {state}" + (f" ({why})" if reason else "")
+    words = f"{describe(task.goal)}: {STATES[task.state]}"
+    if not reason:
+        return words
+    return f"{words} ({words_of(reason)}: {says})" if says else f"{words} ({words_of(reason)})"

@@ -4,7 +4,6 @@ QGroundControl sends it beside DO_REPOSITION as long as it does not know whether
 that; both are one task. It is answered by a MISSION_ACK.
 """
 
-from dataclasses import dataclass
 from math import inf
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -26,7 +25,6 @@ from mav_tasks.tasks.lifecycle import TaskReason
 GO_THERE, ONLY_HIGHER = 2, 3  # MISSION_ITEM.current
 
 
-@dataclass(frozen=True, slots=True)
 class AskedByItem(Asked):
     """The same as asked by a command, but for the answer."""
 

@@ -1,6 +1,7 @@
 """Clearing plans: a mission that has not begun, and what the vehicle keeps as well."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
@@ -23,6 +24,16 @@ R = TaskReason
 AT_REST = frozenset({TaskState.PAUSED, TaskState.HELD})
 
 
+class _Cleared(NamedTuple):
+    """Plans that a vehicle has no more, as asked for by a client."""
+
+    vehicle: Vehicle
+    sender: Sender
+    asked: int  # the kind, or all of them
+    before: tuple[tuple[int, Stored], ...]  # by kind
+    task: Task | None
+
+
 class MissionClearing:
     """Sees to MISSION_CLEAR_ALL."""
 
@@ -41,6 +52,7 @@ class MissionClearing:
         self._plans = plans
         self._answers = answers
         self._write_through = write_through
+        submissions.gate.knows(_Cleared, self._accept, self._undo)
 
     def clear(
         self, vehicle: Vehicle, sender: Sender, kind: int, *, is_late: bool, now: float
@@ -82,19 +94,8 @@ class MissionClearing:
         actor = str(sender.address)
         if not kinds:
             task = self._book.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
-
-            def accept(*, now: float) -> None:
-                self._vehicles.get(vehicle.system_id)
-                self._call_off(vehicle, task, actor=actor, now=now)
-                self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
-                self._answers.ack(sender, asked, MavMissionResult.ACCEPTED)
-
-            def give_up(*, now: float) -> None:
-                for kind, stored in before.items():
-                    self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
-                self._answers.ack(sender, asked, MavMissionResult.ERROR)
-
-            self._submissions.when_durable(accept, give_up, now=now)
+            cleared = _Cleared(vehicle, sender, asked, tuple(before.items()), task)
+            self._submissions.gate.hold(cleared, now=now)
             return
         first, rest = kinds[0], kinds[1:]
 
@@ -111,6 +112,19 @@ class MissionClearing:
             go_on(now=now)
         else:
             self._write_through.write(vehicle, first, (), go_on, refuse, now=now)
+
+    def _accept(self, cleared: _Cleared, *, now: float) -> None:
+        vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)
+        self._vehicles.touch(vehicle)
+        self._call_off(vehicle, task, actor=actor, now=now)
+        self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+        self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ACCEPTED)
+
+    def _undo(self, cleared: _Cleared, *, now: float) -> None:
+        actor = str(cleared.sender.address)
+        for kind, stored in cleared.before:
+            self._plans.keep(cleared.vehicle, kind, stored, actor=actor, now=now)
+        self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ERROR)
 
     def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
         """End a mission that was interrupted: without its plan nobody could have it go on."""

@@ -154,5 +154,5 @@ class MissionReports:
     def _tell(self, vehicle: Vehicle, message: m.Message) -> None:
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs.clients:
-            if client.is_heard and client.knows(vehicle.system_id):
+            if client.is_heard and vehicle.system_id in client.introduced:
                 client.outlet.send(message, source)

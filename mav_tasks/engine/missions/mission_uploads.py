@@ -8,6 +8,7 @@ vehicle's, whichever address they were sent to.
 from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
+from typing import NamedTuple
 from zlib import crc32
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -61,6 +62,28 @@ class UploadDesk:
         self.receiver = MissionReceiver(check=check, form=form)
 
 
+class _Mission(NamedTuple):
+    """A mission that was taken in as a task, in the place of another plan if it is staged."""
+
+    desk: UploadDesk
+    vehicle: Vehicle
+    sender: Sender
+    task: Task
+    before: Stored
+
+
+class _Kept(NamedTuple):
+    """Fence or rally points, or no mission, in the place of what was stored ``before``."""
+
+    desk: UploadDesk
+    vehicle: Vehicle
+    kind: int
+    plan_id: int
+    before: Stored
+    task: Task | None  # of the mission until now
+    actor: str
+
+
 class MissionUploads:
     """Decides about whole uploads, and tells their clients."""
 
@@ -81,6 +104,8 @@ class MissionUploads:
         self._plans = plans
         self._answers = answers
         self._write_through = write_through
+        submissions.gate.knows(_Mission, self._accept, self._withdraw)
+        submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
 
     def flush(
         self,
@@ -156,27 +181,15 @@ class MissionUploads:
         client = self._client(sender)
         if is_staged:
             self._check_replaced(client, vehicle, draft.submitter)
-        task = self._submissions.submit_plan(client, vehicle, draft, now=now)
+        task = self._submissions.submit_plan(client.rights, vehicle, draft, now=now)
         if is_staged:
             self._plans.keep(
                 vehicle, MISSION, Stored(task.id, upload.items), actor=str(sender.address), now=now
             )
-        self._submissions.when_durable(
-            partial(self._accept, desk, vehicle, sender, task, before),
-            partial(self._withdraw, desk, vehicle, sender, task, before),
-            now=now,
-        )
+        self._submissions.gate.hold(_Mission(desk, vehicle, sender, task, before), now=now)
 
-    def _accept(
-        self,
-        desk: UploadDesk,
-        vehicle: Vehicle,
-        sender: Sender,
-        task: Task,
-        before: Stored,
-        *,
-        now: float,
-    ) -> None:
+    def _accept(self, mission: _Mission, *, now: float) -> None:
+        desk, vehicle, sender, task, before = mission
         self._vehicles.get(vehicle.system_id)  # something may begin there
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
         self.flush(desk, vehicle, now=now)
@@ -189,16 +202,8 @@ class MissionUploads:
         words = f"Task {task.id} {what}: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
-    def _withdraw(
-        self,
-        desk: UploadDesk,
-        vehicle: Vehicle,
-        sender: Sender,
-        task: Task,
-        before: Stored,
-        *,
-        now: float,
-    ) -> None:
+    def _withdraw(self, mission: _Mission, *, now: float) -> None:
+        desk, vehicle, sender, task, before = mission
         self._vehicles.touch(vehicle)
         self._submissions.take_back(vehicle, task, now=now)
         if task.terms.is_staged:
@@ -225,20 +230,21 @@ class MissionUploads:
         plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
         actor, stored = str(sender.address), Stored(plan_id, upload.items)
         self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
+        kept = _Kept(desk, vehicle, kind, plan_id, before, task, actor)
+        self._submissions.gate.hold(kept, now=now)
 
-        def accept(*, now: float) -> None:
-            if kind == MISSION:
-                self._vehicles.touch(vehicle)
-                self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
-            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
-            self.flush(desk, vehicle, now=now)
+    def _accept_kept(self, kept: _Kept, *, now: float) -> None:
+        desk, vehicle = kept.desk, kept.vehicle
+        if kept.kind == MISSION:
+            self._vehicles.touch(vehicle)
+            self._plans.let_go(vehicle, kept.task, R.CLEARED, actor=kept.actor, now=now)
+        desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=kept.plan_id, now=now)
+        self.flush(desk, vehicle, now=now)
 
-        def give_up(*, now: float) -> None:
-            self._plans.keep(vehicle, kind, before, actor=actor, now=now)
-            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: as it was before")
-            self._refuse(desk, vehicle, refusal, now=now)
-
-        self._submissions.when_durable(accept, give_up, now=now)
+    def _undo_kept(self, kept: _Kept, *, now: float) -> None:
+        self._plans.keep(kept.vehicle, kept.kind, kept.before, actor=kept.actor, now=now)
+        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: as it was before")
+        self._refuse(kept.desk, kept.vehicle, refusal, now=now)
 
     def _refuse(
         self, desk: UploadDesk, vehicle: Vehicle, refusal: Rejection, *, now: float

@@ -2,7 +2,6 @@
 
 from typing import Protocol
 
-from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -11,6 +10,12 @@ from mav_tasks.services.mission_item import Item
 from mav_tasks.tasks.lifecycle import TaskReason
 
 R = TaskReason
+
+
+class GoOn(Protocol):
+    """What is done when the vehicle has it."""
+
+    def __call__(self, *, now: float) -> None: ...
 
 
 class Refuse(Protocol):
@@ -30,7 +35,7 @@ class WriteThrough:
         vehicle: Vehicle,
         kind: int,
         items: tuple[Item, ...],
-        go_on: Effect,
+        go_on: GoOn,
         refuse: Refuse,
         *,
         now: float,

@@ -23,6 +23,7 @@ __all__ = [
     "GO_TO",
     "PAUSE",
     "PAUSE_HERE",
+    "TASK_COMMANDS",
     "Kind",
     "Row",
     "is_task_command",
@@ -43,7 +44,8 @@ def is_task_command(number: int) -> bool:
 
 def row_of_command(number: int) -> Row:
     """Return the row of a command by its number: of the most that it can be."""
-    return COMMANDS.get(number, _NOT_THERE_YET if is_task_command(number) else UNKNOWN)
+    row = COMMANDS.get(number)
+    return row or (_NOT_THERE_YET if is_task_command(number) else UNKNOWN)
 
 
 def row_of_message(message_id: int) -> Row:
@@ -57,6 +59,6 @@ def row_of(message_id: int, message: m.Message | None) -> Row:
         return READ_FILE
     if isinstance(message, m.MissionItem | m.MissionItemInt) and message.current in GO_TO:
         return GO_TO_ITEM
-    row = row_of_message(message_id)
+    row = MESSAGES.get(message_id, UNKNOWN)
     is_written = row.kind is Kind.WISH and getattr(message, "mission_type", 0) != 0
     return BOUNDING_PLAN if is_written else row

@@ -97,6 +97,8 @@ class Vehicle:
         self._was_heard = True
         self._says = SelfDescription(parts)
         self.components = Components(system_id, first=settings.identity.component_id)
+        #: the task server's address inside this vehicle's system
+        self.server_address = self.components.server
         self.control.heard(armed=monitor.armed, mode=monitor.custom_mode, now=now)
 
     def __repr__(self) -> str:
@@ -119,12 +121,7 @@ class Vehicle:
     @property
     def server_component(self) -> int:
         """The component id under which the task server appears inside this vehicle's system."""
-        return self.components.server.component_id
-
-    @property
-    def server_address(self) -> Address:
-        """The task server's address inside this vehicle's system."""
-        return self.components.server
+        return self.server_address.component_id
 
     @property
     def armed(self) -> bool:
@@ -261,6 +258,7 @@ class Vehicle:
     def _note_component(self, component_id: int, *, now: float) -> None:
         before = self.server_component
         if component_id not in self.components and self.components.note(component_id):
+            self.server_address = self.components.server
             words = f"component {before} is its own; tasks are at {self.server_component}"
             self.parts.note(words, now=now)
 

@@ -100,6 +100,10 @@ class VehicleSide:
         self._vehicles: dict[int, Vehicle] = {}
         #: every one of them, to be looked at only
         self.all = self._vehicles.values()
+        #: all of them by system id, to be looked at only
+        self.by_id: Mapping[int, Vehicle] = self._vehicles
+        #: gives one to which nothing is done
+        self.look_at = self._vehicles.get
         #: the ways to them
         self.links = VehicleLinks(
             self._vehicles,
@@ -127,14 +131,12 @@ class VehicleSide:
         """Note that something is about to be done to a vehicle that was only looked at."""
         self.agenda.touch(vehicle)
 
-    def look_at(self, system_id: int) -> Vehicle | None:
-        """Give a vehicle to which nothing is done."""
-        return self._vehicles.get(system_id)
-
     def addressed_by(self, system_id: int) -> list[Vehicle]:
         """Give the vehicles that a target_system means, 0 all of them, to do something to them."""
-        wanted = sorted(self._vehicles) if system_id == 0 else [system_id]
-        return [vehicle for vehicle in map(self.get, wanted) if vehicle is not None]
+        if system_id:
+            vehicle = self.get(system_id)
+            return [] if vehicle is None else [vehicle]
+        return [vehicle for vehicle in map(self.get, sorted(self._vehicles)) if vehicle is not None]
 
     def stop_unheard(self, system_id: int, *, clear: bool, actor: str, now: float) -> list[int]:
         """Latch STOP for vehicles of an earlier run that were not heard yet; gives them.

@@ -1,8 +1,17 @@
-from functools import partial
 from math import inf
+from typing import NamedTuple
 
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.timers import Timers
+from mav_tasks.tasks.book import TaskBook
+
+WITHIN = 0.4  # s
+
+
+class Ack(NamedTuple):
+    """What waits here."""
+
+    name: str
 
 
 class Rig:
@@ -10,28 +19,29 @@ class Rig:
 
     def __init__(self) -> None:
         self.timers = Timers()
-        self.gate = CommitGate(self.timers)
+        self.book = TaskBook()
+        self.gate = CommitGate(self.book, self.timers, within=WITHIN)
+        self.gate.knows(Ack, self.accept, self.give_up)
         self.log: list[tuple[str, str, float]] = []
 
-    def hold(self, name: str, number: int, *, give_up_at: float) -> None:
-        self.gate.hold(
-            number,
-            give_up_at=give_up_at,
-            release=partial(self.note, name, "released"),
-            give_up=partial(self.note, name, "given up"),
-        )
+    def hold(self, name: str, number: int, *, now: float = 0.0) -> None:
+        self.book.recorded = number
+        self.gate.hold(Ack(name), now=now)
 
     def handle_deadline(self, *, now: float) -> None:
         for timer in self.timers.take_due(now=now):
             timer.do(now=now)
 
-    def note(self, name: str, what: str, *, now: float) -> None:
-        self.log.append((name, what, now))
+    def accept(self, ack: Ack, *, now: float) -> None:
+        self.log.append((ack.name, "released", now))
+
+    def give_up(self, ack: Ack, *, now: float) -> None:
+        self.log.append((ack.name, "given up", now))
 
 
-def test_an_effect_waits_for_its_event() -> None:
+def test_a_value_waits_for_its_event() -> None:
     rig = Rig()
-    rig.hold("ack 1", 3, give_up_at=0.4)
+    rig.hold("ack 1", 3)
     rig.gate.committed(2, now=0.1)
     assert rig.log == []
     rig.gate.committed(3, now=0.2)
@@ -39,10 +49,17 @@ def test_an_effect_waits_for_its_event() -> None:
     assert (len(rig.gate), rig.timers.next_deadline()) == (0, inf)
 
 
+def test_what_waits_for_nothing_is_carried_out_at_once() -> None:
+    rig = Rig()
+    rig.book.durable = 3
+    rig.hold("ack 1", 3, now=0.1)
+    assert rig.log == [("ack 1", "released", 0.1)]
+
+
 def test_one_commit_releases_many_in_order() -> None:
     rig = Rig()
     for number in (1, 2, 5):
-        rig.hold(f"ack {number}", number, give_up_at=0.4)
+        rig.hold(f"ack {number}", number)
     rig.gate.committed(4, now=0.1)
     assert rig.log == [("ack 1", "released", 0.1), ("ack 2", "released", 0.1)]
     assert len(rig.gate) == 1
@@ -50,9 +67,9 @@ def test_one_commit_releases_many_in_order() -> None:
 
 def test_what_waits_too_long_is_given_up_and_never_released() -> None:
     rig = Rig()
-    rig.hold("ack 1", 1, give_up_at=0.4)
-    rig.hold("ack 2", 2, give_up_at=0.6)
-    assert rig.timers.next_deadline() == 0.4
+    rig.hold("ack 1", 1)
+    rig.hold("ack 2", 2, now=0.2)
+    assert rig.timers.next_deadline() == WITHIN
     rig.handle_deadline(now=0.39)
     rig.handle_deadline(now=0.4)
     rig.gate.committed(2, now=0.5)
