@@ -6,7 +6,7 @@ given up; here each is, in the order in which they came.
 
 from collections import deque
 from math import inf
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.tasks.book import TaskBook
@@ -21,12 +21,6 @@ class Step(Protocol[Kind_contra]):
     def __call__(self, held: Kind_contra, /, *, now: float) -> None: ...
 
 
-class _Held(NamedTuple):
-    number: int  # of the event that must be durable first
-    give_up_at: float
-    what: Any
-
-
 class CommitGate:
     """Values in the order of the events that they wait for."""
 
@@ -34,7 +28,8 @@ class CommitGate:
         """``within``: so many seconds each waits at the most."""
         self._book = book
         self.within = within
-        self._held: deque[_Held] = deque()
+        #: number of the event that must be durable first, when it is given up, what it is
+        self._held: deque[tuple[int, float, Any]] = deque()
         self._accept: dict[type, Step[Any]] = {}
         self._give_up: dict[type, Step[Any]] = {}
         self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up_late)
@@ -53,21 +48,21 @@ class CommitGate:
             return
         if not self._held:
             self._timer.set(now + self.within)
-        self._held.append(_Held(self._book.recorded, now + self.within, what))
+        self._held.append((self._book.recorded, now + self.within, what))
 
     def committed(self, through: int, *, now: float) -> None:
         """Carry out all that waited for events up to ``through``."""
-        while self._held and self._held[0].number <= through:
-            what = self._held.popleft().what
+        while self._held and self._held[0][0] <= through:
+            _, _, what = self._held.popleft()
             self._accept[type(what)](what, now=now)
         self._plan()
 
     def _give_up_late(self, *, now: float) -> None:
         """Give up what has waited too long."""
-        while self._held and self._held[0].give_up_at <= now:
-            what = self._held.popleft().what
+        while self._held and self._held[0][1] <= now:
+            _, _, what = self._held.popleft()
             self._give_up[type(what)](what, now=now)
         self._plan()
 
     def _plan(self) -> None:
-        self._timer.set(self._held[0].give_up_at if self._held else inf)
+        self._timer.set(self._held[0][1] if self._held else inf)

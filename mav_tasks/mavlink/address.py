@@ -3,6 +3,7 @@
 MAVLink guide, "Routing": a target of 0 is a broadcast to all systems, or to all components of one.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 BROADCAST = 0
@@ -24,3 +25,9 @@ class Address(NamedTuple):
             BROADCAST,
             other.component_id,
         )
+
+
+@cache  # there are 65,536, and each packet asks for some
+def address_of(system_id: int, component_id: int) -> Address:
+    """Give an address as it comes from the wire."""
+    return Address(system_id, component_id)

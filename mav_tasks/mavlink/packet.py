@@ -7,7 +7,7 @@ bad. Nothing here raises on bytes from outside. MAVLink guide, "Packet Serializa
 from functools import cache
 from typing import NamedTuple
 
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import Address, address_of
 
 MAGIC_V1 = 0xFE
 MAGIC_V2 = 0xFD
@@ -74,7 +74,7 @@ def split_datagram(data: bytes) -> list[Packet]:
                     Packet(
                         data[start:stop],
                         data[start + 4],
-                        Address(data[start + 5], data[start + 6]),
+                        address_of(data[start + 5], data[start + 6]),
                         data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16,
                     )
                 )
@@ -87,7 +87,7 @@ def split_datagram(data: bytes) -> list[Packet]:
                     Packet(
                         data[start:stop],
                         data[start + 2],
-                        Address(data[start + 3], data[start + 4]),
+                        address_of(data[start + 3], data[start + 4]),
                         data[start + 5],
                     )
                 )

@@ -7,7 +7,7 @@ submissions are the same task is the task domain's to say (``tasks/recollection.
 from collections import OrderedDict
 from typing import NamedTuple
 
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Message
 
@@ -38,7 +38,7 @@ NO_MESSAGE = CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 
 def command_of(message: CommandLong | CommandInt) -> Command:
     """Give the command that a message carries."""
-    target = Address(message.target_system, message.target_component)
+    target = address_of(message.target_system, message.target_component)
     first = (message.param1, message.param2, message.param3, message.param4)
     if isinstance(message, CommandInt):
         last = (float(message.x), float(message.y), message.z)

@@ -11,7 +11,7 @@ from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Task
@@ -100,7 +100,7 @@ class Displays:
         task = self._book.get(task_id)
         if task is not None:
             to = task.submitter.system_id, task.submitter.component_id
-            reader = Address(*to) if client.submitted(task) else EVERYBODY
+            reader = address_of(*to) if client.submitted(task) else EVERYBODY
             self._send_status(client, task, reader=reader, with_position=False, now=now)
 
     def _send_status(

@@ -232,8 +232,7 @@ class Submissions:
         """The submission is durable: acknowledge it with the task's id, and tell of it."""
         asked, task = submitted
         for each in self._undecided.pop(task.id):
-            each.answer(MavResult.ACCEPTED, task.id)
-            _note(each, task.id)
+            _acknowledge(each, task.id)
         self._tell_queued(asked, task, now=now)
 
     def _tell_queued(self, asked: Asked, task: Task, *, now: float) -> None:
@@ -283,8 +282,7 @@ class Submissions:
             if asked.answers_to not in {each.answers_to for each in askers}:
                 askers.append(asked)
             return
-        asked.answer(MavResult.ACCEPTED, known.task_id)
-        _note(asked, known.task_id)  # it names the nonce; an ack does not
+        _acknowledge(asked, known.task_id)
         task = self._book.get(known.task_id)
         # one click of QGroundControl's is a command and an item: two messages, and nothing twice
         is_other_message = task is not None and task.command != asked.command.command
@@ -295,7 +293,8 @@ class Submissions:
             asked.tell(words, MavSeverity.INFO, now=now)
 
 
-def _note(asked: Asked, task_id: TaskId) -> None:
-    """Have a client that reads it told of a task's state."""
+def _acknowledge(asked: Asked, task_id: TaskId) -> None:
+    """Name the task, and have a client that reads it told of its state, nonce and all."""
+    asked.answer(MavResult.ACCEPTED, task_id)
     if asked.client.uses_dialect:
         asked.client.statuses.changed(task_id)
