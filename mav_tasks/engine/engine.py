@@ -131,7 +131,7 @@ class Engine:
             self._gcs, self._vehicles, self._book, self._submissions, self._plans, timers, settings
         )
         self._reports = MissionReports(
-            self._gcs, self._vehicles, self._book, self._plans, timers, settings
+            self._gcs, self._vehicles, self._book, self._plans, timers, settings, now=now
         )
         self._displays = Displays(self._gcs, self._vehicles, self._book)
         refusals = Refusals(self._book)
@@ -203,6 +203,9 @@ class Engine:
         match item:
             case Packets():
                 self._reception.receive((item,), now=now)
+            case Committed(through=through):
+                self._submissions.committed(through, now=now)
+                self._vehicles.commit(through, now=now)
             case AtOnce(packets=several) | Backlog(packets=several):
                 self._reception.receive(several, now=now)
             case LinkChanged(side=side):
@@ -224,9 +227,6 @@ class Engine:
                     self._passing.end(item.link, item.peer, now=now)
             case Congestion():
                 self._gcs.note_congestion(item, now=now)
-            case Committed(through=through):
-                self._submissions.committed(through, now=now)
-                self._vehicles.commit(through, now=now)
             case StoreFailed():
                 self._submissions.store_failed()
             case HaltNotStored(vehicle=vehicle):

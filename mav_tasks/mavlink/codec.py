@@ -15,7 +15,7 @@ from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import HEADER_V1, HEADER_V2, MAGIC_V2, Packet, crcs_of_one_byte
 
 _LAYOUTS = {message_id: Layout(message) for message_id, message in messages.ALL.items()}
-_HEADER = Struct("<BBBBBBHB")  # of MAVLink 2, without the magic byte
+_HEADER = Struct("<BBBBBBBHB")  # of MAVLink 2
 
 
 @dataclass(slots=True)
@@ -66,7 +66,8 @@ class Packer:
         layout = _LAYOUTS[message_id]
         whole = layout.struct.pack(*layout.values(message))
         payload = whole.rstrip(b"\0") or whole[:1]  # MAVLink 2 keeps the first byte at least
-        body = _HEADER.pack(
+        packet = _HEADER.pack(
+            MAGIC_V2,
             len(payload),
             0,
             0,
@@ -76,9 +77,8 @@ class Packer:
             message_id & 0xFFFF,
             message_id >> 16,
         )
-        body += payload
-        crc = mcrf4xx(body + layout.crc_extra)
-        return b"\xfd" + body + crc.to_bytes(2, "little")
+        packet += payload
+        return packet + mcrf4xx(packet[1:] + layout.crc_extra).to_bytes(2, "little")
 
 
 class Encoder:

@@ -59,8 +59,9 @@ class NumberLine:
 
     def _move_on(self, number: int, by: int, now: float) -> int:
         self._passed[number & 0xFF] = now
-        for each in range(number - min(by, 256) + 1, number):
-            self._passed[each & 0xFF] = now
+        if by > 1:
+            for each in range(number - min(by, 256) + 1, number):
+                self._passed[each & 0xFF] = now
         self._came[number & 0xFF] = number
         self._behind.clear()
         self.last = number

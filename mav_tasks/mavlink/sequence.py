@@ -37,10 +37,14 @@ class SequenceKeeper:
     def injected(self, source: Address) -> int:
         """Give the number of a packet of our own, put into the source's stream."""
         number, offset = self._next.get(source), self._offset.get(source)
-        for value, numbers in ((number, self._next), (offset, self._offset)):
-            if value is None and len(numbers) >= MOST:
-                del numbers[next(iter(numbers))]  # that one begins anew, which looks like a gap
+        if number is None or offset is None:
+            self._make_room(source)
         number = number or 0
         self._next[source] = (number + 1) & 0xFF
         self._offset[source] = ((offset or 0) + 1) & 0xFF
         return number
+
+    def _make_room(self, source: Address) -> None:
+        for numbers in (self._next, self._offset):
+            if source not in numbers and len(numbers) >= MOST:
+                del numbers[next(iter(numbers))]  # that one begins anew, which looks like a gap

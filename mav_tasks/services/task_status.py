@@ -53,7 +53,7 @@ class TaskStatusSender:
             self._streams.pop(vehicle, None)
         else:
             self._streams[vehicle] = _Stream(min(max(interval, SHORTEST), LONGEST), now)
-            self._wake(now)
+        self._wake(now)
 
     def interval(self, vehicle: int) -> float | None:
         """Give the interval of a vehicle's stream, seconds; None: there is none."""

@@ -119,6 +119,8 @@ class WaitingRoom:
             due = self.times.start(task.terms)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
             self._enter(task, now=came_at)
+            if task.id in self._dependencies:  # after a modification, in any order
+                self._lift(task.id)
         ready: dict[int, list[Entry]] = {}
         others: list[Task] = []
         for task in waiting:
@@ -147,7 +149,6 @@ class WaitingRoom:
         self.times.note(task)
         if terms.after:
             self._dependencies.add(task.id, terms.after)
-        if terms.after or task.id in self._dependencies:  # after a modification, in any order
             self._lift(task.id)
 
     # going on

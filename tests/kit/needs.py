@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.timers import Timer
 
 
 class Needs:
@@ -22,46 +23,50 @@ class Needs:
 
     def look_on(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Look from here on."""
-        for name in ("handle", "handle_deadline"):
+        for name in ("__init__", "handle", "handle_deadline"):
             monkeypatch.setattr(Engine, name, self._then_compare(getattr(Engine, name)))
 
     def _then_compare(self, done: Any) -> Any:
-        def step(engine: Engine, *args: Any, now: float) -> None:
-            done(engine, *args, now=now)
+        def step(engine: Engine, *args: Any, now: float, **kw: Any) -> None:
+            done(engine, *args, now=now, **kw)
             self.compare(engine, now=now)
 
         return step
 
     def compare(self, engine: Engine, *, now: float) -> None:
-        """Ask every part of an engine."""
-        said = engine.next_deadline()
-        needs = list(needs_of(engine))
-        first = min(at for _, at in needs)
-        if said != (None if first == inf else first):
-            who = [name for name, at in needs if at == first]
-            self.surprises.append(f"at {now}: {said} instead of {first}, by {who}")
+        """Ask every part of an engine, and the engine itself."""
+        due = engine.next_deadline()
+        timers = {timer for _, _, _, timer in engine._timers.heap if timer.at < inf}
+        first = min([timer.at for timer in timers], default=inf)
+        if due != (None if first == inf else first):
+            self.surprises.append(f"at {now}: {due} instead of {first}")
+        rhythms = sum(timer.period < inf for timer in timers)
+        links = len(list(engine._vehicles.links))
+        if rhythms != links + 1:  # the clients' heartbeats
+            self.surprises.append(f"at {now}: {rhythms} rhythms, {links} links to vehicles")
+        for timer, need, who in needs_of(engine):
+            if timer.at != need:
+                self.surprises.append(f"at {now}: {timer.at} instead of {need}, by {who!r}")
 
 
-def needs_of(engine: Engine) -> Iterator[tuple[str, float]]:
-    """Give when each part has something to do, by its state alone."""
+def needs_of(engine: Engine) -> Iterator[tuple[Timer, float, object]]:
+    """Give when each part has something to do, by its state alone; with its timer."""
     e: Any = engine
-    for _, _, _, timer in e._timers.heap:
-        if timer.period < inf:  # such a rhythm is nowhere else
-            yield f"{timer}", timer.at
     for vehicle in e._vehicles.all:
-        yield f"{vehicle}", vehicle.next_deadline()
-    for held in list(e._submissions._gate._held)[:1]:
-        yield "a submission", held.give_up_at
+        yield e._vehicles.agenda._due[vehicle.system_id], vehicle.next_deadline(), vehicle
+    gate = e._submissions.gate
+    yield gate._timer, gate._held[0][1] if gate._held else inf, gate
     for desk in e._desks._desks.values():
         due = desk.uploads.receiver.next_deadline()
-        yield "an upload", inf if due is None else due
+        yield desk._timer, inf if due is None else due, desk.uploads.receiver
     times = e._fleet.room.times
-    for heap in (times._starts, times._deadlines):
-        yield "a task's time", heap[0][0] if heap else inf
-    yield "the operator", e._operator._heard_at + e._settings.watch.operator_lost
-    yield "signatures", e.signatures.keep_at
-    yield "the end", inf if e._stop_by is None or e._stopped else e._stop_by
-    for client in e._gcs.clients:
-        yield f"{client}", client.statuses.next_deadline()
+    firsts = [heap[0][0] for heap in (times._starts, times._deadlines) if heap]
+    yield e._starting, min(firsts, default=inf), times
+    limit = e._settings.watch.operator_lost
+    yield e._operator._timer, e._operator._heard_at + limit, e._operator
+    yield e._keeping, e.signatures.keep_at, e.signatures
+    yield e._stopping, inf if e._stop_by is None or e._stopped else e._stop_by, "the end"
+    news = [client.statuses.next_deadline() for client in e._gcs.clients]
+    yield e._telling, min(news, default=inf), e._gcs.clients
     reports = e._reports
-    yield "reports", reports._next_at if reports._claims and len(e._vehicles) else inf
+    yield reports._timer, reports._next_at if reports._claims else inf, reports

@@ -21,7 +21,7 @@ ADDED = {
     },
     "engine/commands/goals.py": {
         "    Drive,\n": "    Dock,\n",
-        "_GOALS: dict[": (
+        "GOALS: dict[": (
             "def _dock(command: Command, driving: Driving) -> SingleGoal:\n"
             "    longest = driving.max_distance\n"
             "    return Dock(number(command, 1, 'distance', low=0.1, high=longest))\n\n"

@@ -121,7 +121,7 @@ class Displays:
             vehicle.tasks,
             self._book,
             reader=reader,
-            link_number=self._gcs.link_number(task.submitter.link),
+            link_number=self._gcs.link_numbers.get(task.submitter.link, 0),
             with_position=with_position,
             now=now,
         )

@@ -67,7 +67,8 @@ class GcsSide:
         self._newcomers: TokenBucket | None = None
         #: packets of strangers for whom there was no room
         self.turned_away = 0
-        self._link_numbers: dict[str, int] = {}  # from 1, in the order in which links came
+        #: of the client links that have been there in this run, from 1
+        self.link_numbers: dict[str, int] = {}
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
         #: all that are there
         self.clients = self._clients.values()
@@ -90,7 +91,8 @@ class GcsSide:
                 self._remove(key)
             return
         self.links.add(change.link)
-        self._link_numbers.setdefault(change.link, len(self._link_numbers) + 1)
+        number = min(len(self.link_numbers) + 1, MAX_LINK_NUMBER)
+        self.link_numbers.setdefault(change.link, number)
         for peer in change.peers:
             self._add(change.link, peer, is_configured=True, now=now)
 
@@ -106,10 +108,6 @@ class GcsSide:
         client = self._clients.get((change.link, change.peer))
         if client is not None:
             client.thinner.stretch.note(change.is_congested, now=now)
-
-    def link_number(self, link: str) -> int:
-        """Give a client link's number, from 1; 0 for one that is not there in this run."""
-        return min(self._link_numbers.get(link, 0), MAX_LINK_NUMBER)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""

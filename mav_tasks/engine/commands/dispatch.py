@@ -13,8 +13,8 @@ from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import (
+    GOALS,
     bad,
-    becomes_task,
     has_place,
     whole,
 )
@@ -138,7 +138,7 @@ class Commands:
         ):
             asked.rights.require(row.role, f"send {row.name}")
             match command.command:
-                case number if becomes_task(number) and (at_server or self._claims(number)):
+                case number if number in GOALS and (at_server or self._claims(number)):
                     if number == MavCmd.DO_REPOSITION:
                         self._reposition(asked, now=now)
                     else:

@@ -84,7 +84,7 @@ def wish_of(
     """
     if command.frame is not None and command.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
-    goal = _GOALS[command.command](command, driving)
+    goal = GOALS[command.command](command, driving)
     if command.command not in TASK_COMMANDS:
         refuse_infinite(command)
         terms = _terms(priority, is_cruising=is_cruising)
@@ -106,12 +106,7 @@ def _terms(priority: int, *, is_cruising: bool = False) -> Terms:
 
 def goal_of(command: Command, driving: Driving) -> SingleGoal:
     """Give the goal of a command that becomes a task; Rejection names a bad parameter."""
-    return _GOALS[command.command](command, driving)
-
-
-def becomes_task(number: int) -> bool:
-    """Whether a command of this MAV_CMD number asks for a task."""
-    return number in _GOALS
+    return GOALS[command.command](command, driving)
 
 
 def marks_of(command: Command, packet: bytes, *, nonce: int = 0) -> Marks:
@@ -378,7 +373,8 @@ def _set_yaw_speed(command: Command, driving: Driving) -> SingleGoal:
     return Head(radians(angle), speed, HEAD_FOR, is_relative=flag(command, 3, "relative"))
 
 
-_GOALS: dict[int, Callable[[Command, Driving], SingleGoal]] = {
+#: how the goal is made of each command that asks for a task
+GOALS: dict[int, Callable[[Command, Driving], SingleGoal]] = {
     MavCmd.TASK_MOVE: _move,
     MavCmd.TASK_ROTATE: _rotate,
     MavCmd.TASK_DRIVE: _drive,

@@ -68,21 +68,22 @@ class MissionReports:
         plans: Plans,
         timers: Timers,
         settings: Settings,
+        *,
+        now: float,
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
         self._book = book
         self._plans = plans
-        self._claims = settings.claim
-        self._has_vehicles = False
-        self._next_at = 0.0
+        self._next_at = now
         self._timer = timers.timer(Turn.REPORTS, self._report)
         self._last: dict[int, _Last] = {}  # by vehicle
+        self.apply(settings)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._claims = settings.claim
-        self._plan()
+        self._timer.set(self._next_at if self._claims else inf)
 
     def replaces(self, packet: Packet) -> bool:
         """Whether a vehicle's packet is not shown, because the server speaks of missions."""
@@ -106,10 +107,6 @@ class MissionReports:
             vehicle = self._vehicles.get(system_id)
             if vehicle is not None:
                 self._tell(vehicle, self._plans.current(vehicle))
-
-    def _plan(self) -> None:
-        """Have MISSION_CURRENT sent when that is due, if there is a vehicle to tell of."""
-        self._timer.set(self._next_at if self._claims and self._has_vehicles else inf)
 
     def _report(self, *, now: float) -> None:
         self._next_at = now + INTERVAL
@@ -142,9 +139,6 @@ class MissionReports:
 
     def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
         """Say what the vehicle would not do of what a plan orders; the plan goes on."""
-        if not self._has_vehicles:
-            self._has_vehicles = True
-            self._plan()
         for answered in vehicle.requests.take_unperformed():
             ack, command = answered.ack, answered.command
             what = "no answer" if ack is None else f"refused, result {ack.result}"

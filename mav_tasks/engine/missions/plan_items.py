@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 from mav_tasks.engine.commands.ability import Ability, as_driven
 from mav_tasks.engine.commands.goals import (
+    GOALS,
     KNOWN_FRAMES,
     MAX_DELAY,
     MAX_WAIT,
     MIN_SPEED,
     bad,
-    becomes_task,
     goal_of,
     identifier,
     number,
@@ -127,9 +127,9 @@ def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
         return kind(command, count, driving)
     if item.command in PERFORMED:
         return Perform()
-    if is_task_command(item.command) and becomes_task(item.command):
+    if is_task_command(item.command) and item.command in GOALS:
         return _own(command, driving)
-    if becomes_task(item.command) and item.command != MavCmd.DO_REPOSITION:
+    if item.command in GOALS and item.command != MavCmd.DO_REPOSITION:
         return goal_of(command, driving)
     words = f"item {seq}: command {item.command} is not supported in a plan"
     raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)

@@ -29,9 +29,14 @@ def test_links_are_numbered_as_they_came_and_keep_their_number() -> None:
     gcs.change_link(LinkChanged("one", LinkSide.CLIENTS, up=False), now=1.0)
     gcs.change_link(LinkChanged("three", LinkSide.CLIENTS, up=True), now=1.0)
     gcs.change_link(LinkChanged("one", LinkSide.CLIENTS, up=True), now=2.0)
-    assert [gcs.link_number(name) for name in ("one", "two", "three", "other")] == [1, 2, 3, 0]
+    assert [gcs.link_numbers.get(name, 0) for name in ("one", "two", "three", "other")] == [
+        1,
+        2,
+        3,
+        0,
+    ]
 
 
 def test_numbers_fit_their_field() -> None:
     gcs = side(*(f"link{number}" for number in range(300)))
-    assert gcs.link_number("link299") == MAX_LINK_NUMBER
+    assert gcs.link_numbers["link299"] == MAX_LINK_NUMBER
