@@ -6,15 +6,13 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from math import inf
 
+from mav_tasks.engine.vehicles.armings import BY_CLIENT, LATE
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
 
 STREAM_GAP = 0.5  # s between setpoints that are a stream: the least for OFFBOARD is 2 Hz
-BY_CLIENT = 2.0  # s after a client asked for a mode, in which a change to it is its doing
-LATE = 3.5  # s after a word, in which what had left before it may still come to the vehicle
 ANY_MODE = -1  # that a command may bring about: the vehicle's own affair which
-UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may be from before it
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +37,6 @@ class Authority:
         self._granted: set[Hashable] = set()
         self._other_at = -inf  # sticks, or a second controller
         self._by_client: tuple[Hashable, float] = (None, -inf)  # the last that drove through us
-        self._client_armed_at = -inf
-        self._outdated_at = -inf  # what was to arm it before that counts no more
-        self._was_disarmed = False  # then, or since
-        self._is_to_be_disarmed = False  # by a client's word, and it does not show that yet
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
         #: until somebody disarms or changes the mode
         self.may_arm = may_arm
@@ -90,7 +84,6 @@ class Authority:
         self.may_arm = self._arming_allowed
         self.is_withdrawn_by_restart = False
         self._before = None
-        self.end_older_arming()
 
     def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
         """A client's mode request goes to the vehicle; our own mode counts as set by us then.
@@ -102,54 +95,6 @@ class Authority:
         if mode == self._persona.control_mode:
             self._granted = {client}
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
-
-    def client_arms(self, *, now: float) -> None:
-        """A client's wish to arm goes to the vehicle through us."""
-        self._client_armed_at = now
-        self.end_older_arming()
-
-    def armed_by_client(self, *, now: float) -> bool:
-        """Whether that the vehicle is armed now is a client's doing, through us."""
-        is_newest = self._client_armed_at > self._outdated_at
-        return is_newest and now - self._client_armed_at <= BY_CLIENT
-
-    def outdate_arming(self, *, ours: float, armed: bool, now: float) -> None:
-        """It is to be disarmed, or stopped: what was to arm it before that does not count.
-
-        ``ours`` is when we last asked for arming ourselves.
-        """
-        if now - max(ours, self._client_armed_at) <= LATE:
-            self._outdated_at, self._was_disarmed = now, not armed
-
-    def outdate_our_arming(self, *, ours: float, armed: bool, now: float) -> None:
-        """What we wanted to arm it for is over: the same, of our own arming alone."""
-        if now - ours <= LATE and self._client_armed_at < ours:
-            self._outdated_at, self._was_disarmed = now, not armed
-
-    def is_told_to_disarm(self, *, armed: bool) -> None:
-        """A client's disarming goes to it: until it shows that, it is as good as disarmed."""
-        self._is_to_be_disarmed = armed
-
-    def shows_armed(self, *, armed: bool) -> None:
-        """Take note of what a heartbeat shows, or the answer to a disarming."""
-        self._was_disarmed |= not armed
-        self._is_to_be_disarmed &= armed
-
-    def may_be_armed_by_older(self, *, now: float) -> bool:
-        """Whether what arms it now does not count: it may have left before the disarming."""
-        return self._was_disarmed and now <= self._outdated_at + LATE
-
-    def is_as_disarmed(self, *, now: float) -> bool:
-        """Whether that it shows armed means nothing to a task that waits."""
-        return self._is_to_be_disarmed or self.may_be_armed_by_older(now=now)
-
-    def is_armed_by_older(self, *, now: float) -> bool:
-        """Whether it is, where it shows armed."""
-        return self.may_be_armed_by_older(now=now) and now >= self._outdated_at + UNSHOWN
-
-    def end_older_arming(self) -> None:
-        """Whatever arms it from here on is meant."""
-        self._outdated_at, self._is_to_be_disarmed = -inf, False
 
     def mode_changed(self, mode: int, *, by_us: bool, is_late: bool, now: float) -> bool:
         """The vehicle shows another mode; gives whether it is our, or our clients', doing.

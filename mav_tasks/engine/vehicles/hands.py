@@ -208,20 +208,20 @@ def _withdraw_arming(on: Reach, _word: Word, now: float) -> None:
 def _outdate_arming(on: Reach, _word: Word, now: float) -> None:
     """What was to arm it before counts no more, also where the net still has it."""
     ours, armed = on.parts.control.arming_asked_at, on.parts.monitor.armed
-    on.parts.authority.outdate_arming(ours=ours, armed=armed, now=now)
+    on.parts.armings.outdate(ours=ours, armed=armed, now=now)
 
 
 @_does(Effect.OUTDATE_OUR_ARMING)
 def _outdate_our_arming(on: Reach, _word: Word, now: float) -> None:
     """What we wanted to arm it for is over."""
     ours, armed = on.parts.control.arming_asked_at, on.parts.monitor.armed
-    on.parts.authority.outdate_our_arming(ours=ours, armed=armed, now=now)
+    on.parts.armings.outdate_ours(ours=ours, armed=armed, now=now)
 
 
 @_does(Effect.EXPECT_DISARMED)
 def _expect_disarmed(on: Reach, _word: Word, _now: float) -> None:
     """No task takes it by an arming that it shows until it has shown the disarming."""
-    on.parts.authority.is_told_to_disarm(armed=on.parts.monitor.armed)
+    on.parts.armings.expect_disarmed(armed=on.parts.monitor.armed)
 
 
 @_does(Effect.DISARM)
@@ -235,6 +235,7 @@ def _disarm(on: Reach, _word: Word, now: float) -> None:
 def _restore_arming(on: Reach, _word: Word, now: float) -> None:
     """A person said that all is well."""
     on.parts.authority.restore_arming()
+    on.parts.armings.forget_halts()
     on.parts.tasks.terms.let_arm(may_be_armed=True, now=now)
 
 

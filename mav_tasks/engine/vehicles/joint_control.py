@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from mav_tasks.engine.vehicles.authority import LATE
+from mav_tasks.engine.vehicles.armings import LATE
 from mav_tasks.engine.vehicles.control import Event, effects_of
 from mav_tasks.engine.vehicles.facts import client_driving, state_of
 from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
@@ -249,7 +249,7 @@ class JointControl:
         """A client's wish to arm goes to the vehicle through us."""
 
         def ask() -> None:
-            self._parts.authority.client_arms(now=now)
+            self._parts.armings.client_arms(now=now)
 
         self.on(Event.ARM, Word(do=ask), now=now)
 

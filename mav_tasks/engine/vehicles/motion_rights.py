@@ -61,4 +61,4 @@ class MotionRights:
 
     def is_armed_by_client(self, *, now: float) -> bool:
         """Whether a client has asked for arming, through us, just now."""
-        return self._parts.authority.armed_by_client(now=now)
+        return self._parts.armings.are_by_client(now=now)

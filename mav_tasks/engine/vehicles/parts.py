@@ -3,6 +3,7 @@
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
+from mav_tasks.engine.vehicles.armings import Armings
 from mav_tasks.engine.vehicles.authority import Authority
 from mav_tasks.engine.vehicles.hold_before import HoldBefore
 from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
@@ -42,6 +43,7 @@ class Parts:
     monitor: HeartbeatMonitor
     authority: Authority
     settings: Settings
+    armings: Armings = field(default_factory=Armings)
     failsafes: OwnFailsafes = field(default_factory=OwnFailsafes)
     sticks: StickWatch = field(default_factory=StickWatch)
     #: a HOLD that a "go to" may undo
@@ -72,7 +74,7 @@ class Parts:
 
     def is_armed(self, *, now: float) -> bool:
         """Whether it shows armed, by a word that counts."""
-        return self.monitor.armed and not self.authority.is_as_disarmed(now=now)
+        return self.monitor.armed and not self.armings.do_not_count(now=now)
 
     def note(self, text: str, *, now: float) -> None:
         """Tell everybody."""

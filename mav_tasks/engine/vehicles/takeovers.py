@@ -4,7 +4,8 @@ A heartbeat may show our own doing, a client's through us, a person's at the veh
 failsafe's. Which it was is found here; what follows is the table's to say.
 """
 
-from mav_tasks.engine.vehicles.authority import LATE, Before
+from mav_tasks.engine.vehicles.armings import LATE
+from mav_tasks.engine.vehicles.authority import Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import BUTTONS, Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
@@ -63,15 +64,15 @@ class Takeovers:
             self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
             self._disarmed(before, now=now)
-        parts.authority.shows_armed(armed=armed)
-        if armed and parts.authority.is_armed_by_older(now=now):
+        parts.armings.shows(armed=armed)
+        if armed and parts.armings.are_older(now=now):
             words = "is armed by a word from before it was to be disarmed: disarmed again"
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         if self._moves_late(now=now):
             words = "moves in HOLD, by a word from before it was to stand: HOLD again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
-        by_client = parts.authority.armed_by_client(now=now)
+        by_client = parts.armings.are_by_client(now=now)
         if armed and by_hand and not by_client and parts.control.is_asking_mode:
             self._taken(Event.TAKEN, "armed to be driven by hand", now=now)
         self._shows_restart = False
