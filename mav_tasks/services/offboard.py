@@ -33,6 +33,7 @@ ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
 #: s, the same of one that shows the very mode still which it was to leave: nobody has acted since
 INSISTS = 30.0
+SHOWN_LATELY = 2.5  # s since a heartbeat has shown it, of which one may be lost
 #: s after a request was last sent in which what it asks for may still come true: a copy of it may
 #: be late on the net. Longer, and a person who does the same would be taken for it.
 LATE = 0.3
@@ -95,7 +96,7 @@ class OffboardControl:
         self._sender = sender
         self._watch = watch
         self._armed = False
-        self._mode = -1
+        self._mode, self._shown_at = -1, -inf  # and when a heartbeat showed it last
         #: whether a heartbeat shows what became of the last mode or disarm request of ours
         self._is_settled = True
         self._asked_mode: int | None = persona.hold_mode  # by the last request; None: disarming
@@ -217,7 +218,7 @@ class OffboardControl:
         if self._armed and not armed:
             self.we_armed = False
         self._armed = armed
-        self._mode = mode
+        self._mode, self._shown_at = mode, now
 
     def answered(self, answer: Answered, *, now: float) -> None:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
@@ -419,8 +420,8 @@ class OffboardControl:
 
     def _gives_up_hold(self, now: float) -> bool:
         """Whether it is time to ask a vehicle that does not show HOLD no more."""
-        is_unmoved = self._mode == self._left_mode
-        return not self._in_our_mode and now >= self._ask_until + INSISTS * is_unmoved
+        shows_still = self._mode == self._left_mode and now - self._shown_at <= SHOWN_LATELY
+        return not self._in_our_mode and now >= self._ask_until + INSISTS * shows_still
 
     def begin_stop(self, *, now: float, brake_for: float = 0.0) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
@@ -453,6 +454,8 @@ class OffboardControl:
 
     def disarm_now(self, *, now: float) -> None:
         """It moves in spite of all: ask for disarming, whoever armed it, in whatever phase."""
+        if self.phase is Phase.IDLE:
+            self._unsettle(now)
         self._request_disarming(now=now)
 
     def stop(self, *, still: bool, heard: bool, now: float) -> None:

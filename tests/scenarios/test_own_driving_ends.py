@@ -125,4 +125,4 @@ def test_a_queue_that_is_cleared_leaves_no_velocity_of_the_clients_behind(
     world.client.command(54011, 1)
     world.run(1.5)
     assert world.stands()
-    assert world.rover.autopilot.mode is Mode.GUIDED
+    assert world.rover.autopilot.mode is Mode.HOLD

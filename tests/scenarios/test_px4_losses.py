@@ -193,7 +193,7 @@ class TestOneThatDrivesHomeWithoutUs:
 
     def test_what_is_refused_says_the_way_out_and_that_is_one(self, world: World) -> None:
         self.restart(world, away=2.5)
-        world.run(2.5)
+        world.run(4.0)
         refused = world.client.command(RELEASE, 1, AGAIN)
         world.run(0.2)
         assert refused.answer == (TEMPORARILY_REJECTED, R.WRONG_MODE)
@@ -209,7 +209,7 @@ class TestOneThatDrivesHomeWithoutUs:
     def test_one_that_has_disarmed_itself_at_home_is_released_at_once(self, world: World) -> None:
         self.restart(world, away=25.0)
         world.operator_arm(False)
-        world.run(1.5)
+        world.run(4.0)
         released = world.client.command(RELEASE, 1, AGAIN)
         world.run(0.2)
         assert released.answer == (ACCEPTED, 1)

@@ -172,7 +172,7 @@ def test_a_restart_forgets_no_figures(make_world: MakeWorld, tmp_path: Path) -> 
     world.run(6)
     later = PromptSqliteStore(path, wall_offset=UTC)
     world.start_server(later, later.load())
-    world.run(2.5)
+    world.run(4.0)
     assert [task.timing for task in world.tasks()] == timings
     for number, earlier in enumerate(before, 1):
         again = ask(world, number)

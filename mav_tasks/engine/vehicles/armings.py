@@ -54,17 +54,18 @@ class Armings:
         self._was_disarmed |= not armed
         self._is_to_be_disarmed &= armed
 
-    def are_older(self, *, now: float) -> bool:
+    def are_older(self, *, ours: float, now: float) -> bool:
         """Whether, where it shows armed, that is by a word from before it was to be disarmed."""
-        return self._may_be_older(now) and now >= self._outdated_at + UNSHOWN
+        return self._may_be_older(ours, now) and now >= self._outdated_at + UNSHOWN
 
-    def do_not_count(self, *, now: float) -> bool:
+    def do_not_count(self, *, ours: float, now: float) -> bool:
         """Whether that it shows armed means nothing to a task that waits."""
-        return self._is_to_be_disarmed or self._may_be_older(now)
+        return self._is_to_be_disarmed or self._may_be_older(ours, now)
 
     def forget_halts(self) -> None:
         """Whatever arms it from here on is meant."""
         self._outdated_at, self._is_to_be_disarmed = -inf, False
 
-    def _may_be_older(self, now: float) -> bool:
-        return self._was_disarmed and now <= self._outdated_at + LATE
+    def _may_be_older(self, ours: float, now: float) -> bool:
+        is_outdated = self._was_disarmed and ours <= self._outdated_at
+        return is_outdated and now <= self._outdated_at + LATE

@@ -268,6 +268,7 @@ TABLE = (
     _row(_E.LATE_MODE, _E.MODE, work=GOES_ON),
     _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
+    _row(_E.LATE_ARMING, grip=Grip.RELEASING),  # by which it is disarmed, if it was armed for us
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, queue=Queue.STOPPED),
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, work=Work.NONE),
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, _F.PAUSE),  # or it would be armed for what waits

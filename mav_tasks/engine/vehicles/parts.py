@@ -74,7 +74,8 @@ class Parts:
 
     def is_armed(self, *, now: float) -> bool:
         """Whether it shows armed, by a word that counts."""
-        return self.monitor.armed and not self.armings.do_not_count(now=now)
+        ours = self.control.arming_asked_at
+        return self.monitor.armed and not self.armings.do_not_count(ours=ours, now=now)
 
     def note(self, text: str, *, now: float) -> None:
         """Tell everybody."""

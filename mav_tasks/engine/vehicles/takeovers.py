@@ -65,7 +65,8 @@ class Takeovers:
         if was_armed and not armed:
             self._disarmed(before, now=now)
         parts.armings.shows(armed=armed)
-        if armed and parts.armings.are_older(now=now):
+        ours = parts.control.arming_asked_at
+        if armed and parts.armings.are_older(ours=ours, now=now):
             words = "is armed by a word from before it was to be disarmed: disarmed again"
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         if self._moves_late(now=now):
