@@ -15,15 +15,10 @@ class HeartbeatMonitor:
         #: s of silence after which it is not heard any more
         self.lost_after = lost_after
         self.heard_at = now
-        self.latest = first
+        self._take(first)
 
     def __repr__(self) -> str:
         return f"HeartbeatMonitor(mode={self.custom_mode}, armed={self.armed})"
-
-    @property
-    def armed(self) -> bool:
-        """Whether the vehicle says that it is armed."""
-        return bool(self.latest.base_mode & MavModeFlag.SAFETY_ARMED)
 
     @property
     def custom_mode(self) -> int:
@@ -32,8 +27,17 @@ class HeartbeatMonitor:
 
     def receive(self, heartbeat: Heartbeat, *, now: float) -> None:
         """Take a heartbeat in."""
-        self.latest = heartbeat
+        self._take(heartbeat)
         self.heard_at = now
+
+    def restarted(self) -> None:
+        """It has restarted, and a restart disarms, whatever it has said before."""
+        self.armed = False
+
+    def _take(self, heartbeat: Heartbeat) -> None:
+        self.latest = heartbeat
+        #: whether the vehicle says that it is armed
+        self.armed = bool(heartbeat.base_mode & MavModeFlag.SAFETY_ARMED)
 
     def is_heard(self, *, now: float) -> bool:
         """Whether heartbeats are coming."""

@@ -44,6 +44,7 @@ UNANSWERED = 0.3  # s after which a request without an answer was heard, or lost
 AWAITED = 1.5  # s, the longest until a 1 Hz heartbeat shows what a disarming has done
 LEAD_GAP = 0.2  # s between zeros, after which the stream counts anew
 LEAD_IN = 1.0  # s of zeros before a mode that is entered only while setpoints stream
+UNSHOWN = -1  # no mode of any vehicle
 UNSTOPPED = 1.0  # s after which a STOP may depend on HOLD no more, where HOLD is not to be trusted
 
 
@@ -96,7 +97,7 @@ class OffboardControl:
         self._sender = sender
         self._watch = watch
         self._armed = False
-        self._mode, self._shown_at = -1, -inf  # and when a heartbeat showed it last
+        self._mode, self._shown_at = UNSHOWN, -inf  # and when a heartbeat showed it last
         #: whether a heartbeat shows what became of the last mode or disarm request of ours
         self._is_settled = True
         self._asked_mode: int | None = persona.hold_mode  # by the last request; None: disarming
@@ -219,6 +220,11 @@ class OffboardControl:
             self.we_armed = False
         self._armed = armed
         self._mode, self._shown_at = mode, now
+
+    def restarted(self) -> None:
+        """The vehicle has restarted: what it showed before proves nothing any more."""
+        self._armed = self.we_armed = False
+        self._mode = UNSHOWN
 
     def answered(self, answer: Answered, *, now: float) -> None:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""

@@ -91,6 +91,7 @@ class Autopilot:
         self._estimate: Estimate = estimate_from(self._seen(truth), NO_FAULTS, None)
         self._faults = NO_FAULTS
         self._clock_stopped_at = now  # while that fault lasts; until then it goes
+        self.boots = 0  #: how often it has restarted
         self._start(now)
 
     def __repr__(self) -> str:
@@ -197,6 +198,7 @@ class Autopilot:
 
     def reboot(self, *, now: float) -> None:
         """Restart: time and state begin anew; parameters and missions are kept."""
+        self.boots += 1
         self._start(now + REBOOT_TIME)
 
     def _is_for_us(self, message: Message) -> bool:

@@ -54,6 +54,7 @@ class Vehicle:
         self._peers: dict[Hashable, float] = {}
         self._outgoing: list[tuple[Hashable, bytes]] = []
         self._next_step = now
+        self._boots = autopilot.boots
 
     def __repr__(self) -> str:
         return f"Vehicle({self.autopilot!r}, {len(self._peers)} peers)"
@@ -104,6 +105,9 @@ class Vehicle:
 
     def _collect(self) -> None:
         messages = self.autopilot.take_messages()
+        if self._boots != self.autopilot.boots:  # its numbers begin anew, too
+            self._boots = self.autopilot.boots
+            self._encoder = Encoder(self.autopilot.address)
         if not messages:
             return
         self._forget_silent_peers()

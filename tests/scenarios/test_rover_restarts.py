@@ -286,3 +286,18 @@ def test_another_origin_holds_no_task_of_which_nothing_was_driven(
     world.run(2.0)
     world.fault(Faults(position_jump=(5.0, 3.0)))
     world.until_state(1, S.COMPLETED, within=60)
+
+
+def test_it_is_not_armed_any_more_once_its_clock_tells_of_the_restart(driving: World) -> None:
+    """The heartbeat that says so comes later, and what was shown before it is not so any more."""
+    world = driving
+    world.fault(Faults(withheld=frozenset({0})))
+    restart(world, up=1.5)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    at = world.now
+    proceed(world)
+    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
+    world.run(1.0)
+    assert "move" not in world.observer.sent_since(at), "nobody has seen it armed since"
+    world.fault(Faults())
+    world.until_state(1, S.COMPLETED, within=60)

@@ -108,6 +108,11 @@ class Takeovers:
             parts.note(words, now=now)
 
         self._joint.on(Event.REBOOTED, Word(R.FRAME_RESET, text="restarted", do=restart), now=now)
+        # heartbeats that show it may have been lost, or be on their way
+        if parts.monitor.armed and not parts.control.may_have_disarmed(now=now):
+            self._disarmed_by_restart(parts.authority.may_arm)
+        parts.monitor.restarted()
+        parts.control.restarted()
 
     def learn(self, news: News, *, now: float) -> None:
         """Tell where it is, and, if that was a takeover so far, what has taken it."""
@@ -194,11 +199,14 @@ class Takeovers:
         if parts.control.may_have_disarmed(now=now):
             return
         if self._shows_restart:  # this heartbeat, or the clock before it, has told of that as well
-            was_allowed = before.may_arm or parts.authority.is_withdrawn_by_restart
-            parts.authority.restarted(was_allowed=was_allowed)
+            self._disarmed_by_restart(before.may_arm)
             return
         self._taken(Event.DISARMED, "disarmed", now=now)
         parts.authority.note_disarmed(before)  # a restart may turn out to have done it
+
+    def _disarmed_by_restart(self, could_arm: bool) -> None:
+        authority = self._parts.authority
+        authority.restarted(was_allowed=could_arm or authority.is_withdrawn_by_restart)
 
     def _note_rest(self, *, now: float) -> None:
         """What it measures at rest is learnt while nothing can be telling it to move."""

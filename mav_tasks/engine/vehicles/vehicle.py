@@ -94,6 +94,7 @@ class Vehicle:
         self.last_seq = 0  # of the autopilot's packets
         self._number = 0  # the same, counted on beyond 255
         self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
+        self._overtaken: tuple[m.Heartbeat | None, float] = (None, -inf)  # the last that was
         self._was_heard = True
         self._says = SelfDescription(parts)
         self.components = Components(system_id, first=settings.identity.component_id)
@@ -147,10 +148,11 @@ class Vehicle:
         self._number += (seq - self.last_seq + 0x80 & 0xFF) - 0x80
         self.last_seq = seq
 
-    def is_overtaken(self, *, now: float) -> bool:
-        """Whether a newer heartbeat came just before the one just counted."""
+    def is_overtaken(self, heartbeat: m.Heartbeat, *, now: float) -> bool:
+        """Whether a newer heartbeat came just before this one, which was counted just now."""
         number, at = self._last_beat
         if 0 < number - self._number <= REORDERED and now - at <= REORDERED_WITHIN:
+            self._overtaken = heartbeat, now
             return True
         self._last_beat = self._number, now
         return False
@@ -184,9 +186,7 @@ class Vehicle:
         elif isinstance(message, Stamped):
             due = self._clock.next_at  # a setpoint that is late is followed by a zero
             if self.where.receive(message, now=now, not_after=due) is Heard.RESTART:
-                self._last_beat = (0, -inf)
-                booted_at = now - message.time_boot_ms / 1000
-                self._takeovers.rebooted(booted_at=booted_at, now=now)
+                self._restarted(booted_at=now - message.time_boot_ms / 1000, now=now)
                 self.where.receive(message, now=now, not_after=due)
             self._look_at_frame(now=now)
             if not self.tasks.is_idle:
@@ -214,6 +214,14 @@ class Vehicle:
                 self.joint.on(Event.STICK, Word(TaskReason.TAKEOVER, self.parts.actor), now=now)
         elif isinstance(message, m.AutopilotVersion):
             self._says.receive_identity(identity_of(message), now=now)
+
+    def _restarted(self, *, booted_at: float, now: float) -> None:
+        """Its clock began anew, and its numbers did: what came since was not overtaken by them."""
+        self._last_beat = (0, -inf)
+        self._takeovers.rebooted(booted_at=booted_at, now=now)
+        heartbeat, at = self._overtaken
+        if heartbeat is not None and at >= booted_at:
+            self._receive_heartbeat(heartbeat, now=now)
 
     def _look_at_frame(self, *, now: float) -> None:
         if self.where.frame.changed:

@@ -240,7 +240,7 @@ class VehicleSide:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
                 if message.autopilot == MavAutopilot.INVALID:
                     return None  # of a program that has taken the rover's address
-                if vehicle.is_overtaken(now=now):
+                if vehicle.is_overtaken(message, now=now):
                     return vehicle  # an old mode, or an old arming, is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
