@@ -74,8 +74,6 @@ def test_a_stop_outlives_a_full_disk_and_the_end_of_the_server(
         wait_until(lambda: "the disk" in running.server.text, within=5, what="the full disk")
         running.server.end(end)
         with restarted(running, tmp_path, *GOES_ON):
-            link = running.connect()
-            refused = command_long(link, ARM, 1, target=AUTOPILOT)
             began = running.truth()[-1]
             wait_until(
                 lambda: running.truth()[-1]["time"] > began["time"] + DELAY + 4.0,
@@ -83,6 +81,7 @@ def test_a_stop_outlives_a_full_disk_and_the_end_of_the_server(
                 what="the time at which it would have driven",
             )
             assert running.truth()[-1]["north"] == pytest.approx(began["north"], abs=0.01)
+            refused = command_long(running.connect(), ARM, 1, target=AUTOPILOT)
             assert (refused.result, refused.result_param2) == (1, TaskReason.STOPPED)
             assert command_long(running.connect(), CONTINUE, 1).result == 0  # the way out
             wait_until(lambda: running.speed() > 0.2, within=15, what="the rover to drive")

@@ -20,7 +20,7 @@ from pymavlink import mavutil
 
 from mav_tasks.recording.reading import read
 from tests.kit.bridges import Bridge, TcpFar, bridge
-from tests.kit.processes import Stand, stand, submit, wait_for, wait_until
+from tests.kit.processes import Stand, after_a_restart, stand, submit, wait_for, wait_until
 
 PERIOD = 0.05  # s, between setpoints
 LATE = 0.5  # s, after which a task would be held; a try to write comes once a second
@@ -157,6 +157,7 @@ def test_a_killed_run_and_the_one_after_it_are_replayed(tmp_path: Path) -> None:
         running.server.end(signal.SIGKILL)
     with stand(tmp_path, *options, way=over_tcp([])) as running:
         link = running.connect()
+        after_a_restart()
         submit(link, 54013, 1, 2)
         submit(link, 193, 1)
         wait_for(link, "STATUSTEXT", "'Task 2 done' in STATUSTEXT.text", within=20)

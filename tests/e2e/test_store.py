@@ -14,8 +14,10 @@ from typing import Any
 import pytest
 
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.lifecycle import TaskReason
 from tests.kit.processes import (
     Stand,
+    after_a_restart,
     command_long,
     free_udp_ports,
     stand,
@@ -152,6 +154,12 @@ def test_after_a_kill_the_acknowledged_task_is_held_and_can_be_finished(
             wait_until(lambda: "found" in server_log.read_text(), within=20, what="the rover")
             link = running.connect()
             hold_is_seen(link)
+            at_once = command_long(link, CONTINUE, 1)
+            assert (at_once.result, at_once.result_param2) == (
+                TEMPORARILY_REJECTED,
+                TaskReason.STALE,
+            )
+            after_a_restart()
             submit(link, CONTINUE, 1)  # the queue; what is held stays so
             wait_for(link, "STATUSTEXT", "'has task 1 on hold' in STATUSTEXT.text")
             another = 0, 0, 0, 0, 0, 2  # in param7: no repeat of the first

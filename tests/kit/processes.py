@@ -19,6 +19,8 @@ os.environ.setdefault("MAVLINK20", "1")
 
 from pymavlink import mavutil
 
+from mav_tasks.engine.clients.sender import COPIED
+
 T = TypeVar("T")
 
 START_LIMIT = 20.0  # s, for a process to say that it is there (cold caches, busy machine)
@@ -233,6 +235,11 @@ def command_long(
     )
     assert ack is not None, f"no ack for {command}"
     return ack
+
+
+def after_a_restart() -> None:
+    """Wait until the server, just started again, takes no word for a copy of an older one."""
+    time.sleep(COPIED + 0.5)
 
 
 def free_tcp_ports(count: int) -> list[int]:
