@@ -69,9 +69,7 @@ class Takeovers:
         if armed and parts.armings.are_older(ours=ours, now=now):
             words = "is armed by a word from before it was to be disarmed: disarmed again"
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
-        if self._moves_late(now=now):
-            words = "moves in HOLD, by a word from before it was to stand: HOLD again"
-            self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
+        self.look_at_motion(now=now)
         by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
         by_client = parts.armings.are_by_client(now=now)
         if armed and by_hand and not by_client and parts.control.is_asking_mode:
@@ -79,6 +77,12 @@ class Takeovers:
         self._shows_restart = False
         self._note_rest(now=now)
         self._note_others(now=now)
+
+    def look_at_motion(self, *, now: float) -> None:
+        """Look whether it drives to a place that it was sent to before a halt."""
+        if now - self._parts.tasks.halts.at <= LATE and self._moves_late(now=now):
+            words = "moves in HOLD, by a word from before it was to stand: HOLD again"
+            self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
 
     def heard_again(self, *, now: float) -> None:
         """It was silent, and is not any more."""
@@ -171,14 +175,13 @@ class Takeovers:
         return is_halted and self._parts.authority.was_asked_before(mode, ours=ours, halt=halts.at)
 
     def _moves_late(self, *, now: float) -> bool:
-        """Whether a place that it was sent to before a halt moves it in HOLD."""
+        """Whether what it was told before a halt just now moves it in HOLD."""
         parts, halts = self._parts, self._parts.tasks.halts
         is_held = parts.monitor.custom_mode == parts.persona.hold_mode
         return (
             parts.persona.drives_in_hold
             and parts.monitor.armed
             and is_held
-            and now - halts.at <= LATE
             and halts.is_by_word
             and not halts.is_undone
             and parts.authority.moves_by_older(halt=halts.at)

@@ -189,6 +189,7 @@ class Vehicle:
                 self._restarted(booted_at=now - message.time_boot_ms / 1000, now=now)
                 self.where.receive(message, now=now, not_after=due)
             self._look_at_frame(now=now)
+            self._takeovers.look_at_motion(now=now)
             if not self.tasks.is_idle:
                 self.joint.wake(now=now)
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):

@@ -10,16 +10,20 @@ import pytest
 
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.links.memory import MemoryNet
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, command_long, setpoint
 from tests.kit.mission import Item, Upload
+from tests.kit.px4 import HOLD as PX4_HOLD
+from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.attacks.test_late_arming import catch_arming, mode_of
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.attacks.test_words_passed_on import go_to
+from tests.scenarios.conftest import MakeWorld
 
 MODE, GO_TO, CANCEL, CLEAR, MOVE = 176, 192, 54010, 54011, 54000
 NUMBER = 38  # where the number of a command is in a packet
@@ -99,6 +103,37 @@ def test_a_place_to_go_to(world: World) -> None:
     world.run(2)
     assert held.result == ACCEPTED
     assert mode_of(world) is Mode.HOLD
+    assert stays(world, 3)
+
+
+def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
+    make_world: MakeWorld,
+) -> None:
+    """It holds its place by going to it, and shows HOLD all along."""
+    world = make_world(persona=PROMPT_PX4, settings=Settings(claim=False))
+    person = world.add_client("person")
+    world.client.move(5)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(3)
+    world.client.arm()
+    world.run(1)
+    caught = catch(world, GO_TO)
+    world.client.send(go_to(20, 0))
+    world.run(0.1)
+    mend(world)
+    held = ask_mode(person, PX4_HOLD)
+    world.run(0.5)
+    since = world.now
+    world.fault(Faults(withheld=frozenset({HEARTBEAT})))
+    world.bring_late(caught[0])
+    fastest = 0.0
+    while world.now < since + 2.0:
+        world.run(0.05)
+        fastest = max(fastest, abs(world.truth.forward_speed))
+    assert held.result == ACCEPTED
+    assert fastest < 0.3  # m/s; until the heartbeat it was 1.9
+    world.fault(Faults())
+    world.run(1)
     assert stays(world, 3)
 
 
