@@ -55,6 +55,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "speeds": list(restored.speeds.items()),
         "homes": [_home_to_json(home) for home in restored.homes.values()],
         "halt_epochs": list(restored.halt_epochs.items()),
+        "halted": [[vehicle, int(why), at] for vehicle, (why, at) in restored.halted.items()],
         "disarmed": sorted(restored.disarmed),
         "plans": [[*key, *plan] for key, plan in restored.plans.items()],
         "parameters": list(restored.parameters.items()),
@@ -79,6 +80,7 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         speeds=dict(values["speeds"]),
         homes={row[0]: _home_of(row) for row in values.get("homes", ())},
         halt_epochs=dict(values.get("halt_epochs", ())),
+        halted={vehicle: (TaskReason(why), at) for vehicle, why, at in values.get("halted", ())},
         disarmed=frozenset(values.get("disarmed", ())),
         plans={
             (vehicle, kind): (plan_id, source) for vehicle, kind, plan_id, source in values["plans"]

@@ -21,6 +21,7 @@ from mav_tasks.tasks.events import (
     VehicleIdentified,
     VehicleSpeedSet,
 )
+from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
 from mav_tasks.tasks.task import following
 
@@ -107,6 +108,9 @@ class Batch:
                 self.vehicles["paused", event.vehicle] = None
             case VehicleHalted():
                 self.vehicles["halt_epoch", event.vehicle] = event.epoch
+                if event.reason is not TaskReason.RESTARTED:  # which is nobody's word
+                    self.vehicles["halt_reason", event.vehicle] = event.reason
+                    self.vehicles["halted_utc", event.vehicle] = utc
             case VehicleIdentified():
                 self.vehicles["uid", event.vehicle] = event.uid
             case VehicleHomeSet():

@@ -54,7 +54,8 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
                 task = event.task
                 tasks.append(_changed(task, rows, later, offset) if any(later) else task)
         vehicles = connection.execute(
-            "SELECT vehicle, paused, uid, speed, halt_epoch, may_arm FROM vehicles"
+            "SELECT vehicle, paused, uid, speed, halt_epoch, may_arm, halt_reason, halted_utc"
+            " FROM vehicles"
         ).fetchall()
         found = connection.execute("SELECT home FROM vehicles WHERE home IS NOT NULL")
         homes = rows.values(VehicleHomeSet, [row[0] for row in found], offset)
@@ -71,6 +72,11 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
             speeds={row[0]: row[3] for row in vehicles if row[3] is not None},
             homes={home.vehicle: home for home in homes},
             halt_epochs={row[0]: row[4] for row in vehicles if row[4] is not None},
+            halted={
+                row[0]: (TaskReason(row[6]), row[7] - offset)
+                for row in vehicles
+                if row[7] is not None
+            },
             disarmed=frozenset(row[0] for row in vehicles if row[5] == 0),
             plans={(row[0], row[1]): (row[2], row[3]) for row in plans if row[2]},
             parameters={name: value for name, value in parameters if value is not None},

@@ -57,6 +57,10 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     ("ALTER TABLE vehicles ADD COLUMN home TEXT",),  # the event that said where it is
     ("ALTER TABLE vehicles ADD COLUMN halt_epoch INTEGER",),
     ("ALTER TABLE vehicles ADD COLUMN may_arm INTEGER",),  # 0: somebody has disarmed it
+    (  # the last halt
+        "ALTER TABLE vehicles ADD COLUMN halt_reason INTEGER",
+        "ALTER TABLE vehicles ADD COLUMN halted_utc REAL",
+    ),
 )
 
 

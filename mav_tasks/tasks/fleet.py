@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, QueuePaused
+from mav_tasks.tasks.halts import WORDS
 from mav_tasks.tasks.lifecycle import ACTIVE, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
@@ -15,6 +16,11 @@ from mav_tasks.tasks.waiting_room import WaitingRoom
 
 R, S = TaskReason, TaskState
 
+#: halts that are somebody's word for HOLD; a disarming was acknowledged by the vehicle itself
+TO_STAND = WORDS - {R.DISARMED}
+#: s since such a halt in which nobody can have meant anything else since: a supervisor has started
+#: this run
+UNSEEN = 10.0
 LONG_IDLE = 600.0  # s without a write before the start: nobody remembers what was queued
 
 
@@ -27,6 +33,7 @@ class Fleet:
         self._of: dict[int, VehicleTasks] = {}
         self.room = WaitingRoom(book, settings)
         self._was_driven: set[int] = set()
+        self._was_halted: set[int] = set()
         self._comes_up_paused = False
         self._began_at = 0.0
 
@@ -49,6 +56,12 @@ class Fleet:
         was_driven = vehicle in self._was_driven
         self._was_driven.discard(vehicle)
         return was_driven
+
+    def was_halted(self, vehicle: int) -> bool:
+        """Whether the last run ended so soon after a halt that it may not have come; said once."""
+        was_halted = vehicle in self._was_halted
+        self._was_halted.discard(vehicle)
+        return was_halted
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -74,6 +87,11 @@ class Fleet:
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
+        if not restored.ended_well:
+            halted = restored.halted.items()
+            self._was_halted = {
+                vehicle for vehicle, (why, at) in halted if why in TO_STAND and now - at <= UNSEEN
+            }
         pauses = self._settings.on_restart == "pause"
         self._began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}

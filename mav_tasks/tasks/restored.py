@@ -15,12 +15,12 @@ class Restored:
 
     ``tasks`` are in the order of their submission, ``next_id`` is the id of the next. ``paused``
     are the queues that stood, with the reason, ``uids`` the vehicles' unique ids, ``speeds`` their
-    default speeds in m/s, ``homes`` where they return to and ``halt_epochs`` how often they were
-    halted, each by system id; ``disarmed`` are those that somebody has disarmed. ``plans`` by
-    system id and kind are (id, source) as PlanStored has them, ``parameters`` the last value of
-    each by name, ``signatures`` and ``signed_until`` what SignaturesSeen had said. ``ended_well``:
-    the last run closed its store; ``idle`` is the seconds since it last wrote. ``wall_offset`` is
-    UTC less monotonic time.
+    default speeds in m/s, ``homes`` where they return to, ``halt_epochs`` how often they were
+    halted, and ``halted`` why and when the last time, each by system id; ``disarmed`` are those
+    that somebody has disarmed. ``plans`` by system id and kind are (id, source) as PlanStored has
+    them, ``parameters`` the last value of each by name, ``signatures`` and ``signed_until`` what
+    SignaturesSeen had said. ``ended_well``: the last run closed its store; ``idle`` is the seconds
+    since it last wrote. ``wall_offset`` is UTC less monotonic time.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -30,6 +30,7 @@ class Restored:
     speeds: Mapping[int, float] = field(default_factory=dict)
     homes: Mapping[int, VehicleHomeSet] = field(default_factory=dict)
     halt_epochs: Mapping[int, int] = field(default_factory=dict)
+    halted: Mapping[int, tuple[TaskReason, float]] = field(default_factory=dict)
     disarmed: frozenset[int] = frozenset()
     plans: Mapping[tuple[int, int], tuple[int, str]] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)

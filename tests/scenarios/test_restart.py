@@ -14,16 +14,18 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, TEMPORARILY_REJECTED, command_long
 from tests.kit.mission import Download, Item, Upload, reached
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at, is_at, near_pose
+from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
 VERSION = 148  # AUTOPILOT_VERSION
 UTC = 1.8e9  # s, when the worlds begin
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
 RETURN = 11  # the mode
+TO_LAUNCH = 20  # the command
 STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
 
 
@@ -275,6 +277,43 @@ def test_a_rover_that_somebody_had_taken_is_left_to_it_after_a_restart(
     restart(world, path)
     world.run(3)
     assert in_mode(world) is Mode.GUIDED
+
+
+@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@pytest.mark.parametrize("ends", [1, 2])
+def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
+    world: World, path: Path, halt: str, ends: int
+) -> None:
+    """It was under a return of its own, HOLD was lost on the way, and nobody repeated it."""
+    away_from_home(world)
+    world.client.send(command_long(TO_LAUNCH, target=ELSEWHERE))
+    world.run(2)
+    assert in_mode(world) is Mode.RTL
+    world.watched.loses = lambda _source, target, _data: target == "rover1"
+    halted = world.client.mode(HOLD) if halt == "HOLD" else world.client.pause()
+    world.run(0.3)
+    assert halted.result == ACCEPTED
+    for number in range(ends):
+        restart(world, path.with_stem("tasks" + "+" * number), away=0.5, settles=0.3)
+    world.watched.loses = lambda *_: False
+    world.run(4)
+    assert in_mode(world) is Mode.HOLD
+    assert stays(world, 3)
+
+
+@pytest.mark.parametrize("other", ["long before", "by hand"])
+def test_a_rover_that_somebody_drives_after_a_halt_and_a_kill_is_left_to_it(
+    world: World, path: Path, other: str
+) -> None:
+    away_from_home(world)
+    world.client.pause()
+    world.run(1)
+    restart_with = 12.0 if other == "long before" else 1.0
+    world.operator_mode(Mode.RTL if other == "long before" else Mode.MANUAL)
+    at = world.now
+    restart(world, path, away=restart_with)
+    assert in_mode(world) is (Mode.RTL if other == "long before" else Mode.MANUAL)
+    assert "HOLD" not in world.observer.sent_since(at)
 
 
 @pytest.mark.parametrize("answers_lost", [0, 1, 1000])

@@ -66,6 +66,7 @@ class Event(Enum):
     LEAVE_MANUAL = auto()  # a client starts a mission while nobody is at the sticks
     COME_BACK = auto()  # the vehicle of an earlier run, that we left standing
     COME_BACK_DRIVEN = auto()  # the same, left driving, and it may follow set-points still
+    COME_BACK_HALTED = auto()  # the same, told to stand just before
     COME_BACK_LED_AWAY = auto()  # the same, in a mode in which it does not
 
 
@@ -353,6 +354,8 @@ TABLE = (
     _row(_E.COME_BACK_DRIVEN, _F.BRAKE, queue=Queue.STOPPED),
     _row(_E.COME_BACK_DRIVEN, queue=Queue.TAKEN, armed=False),  # somebody has it, and it stands
     _row(_E.COME_BACK_DRIVEN, _F.LET_GO),
+    _row(_E.COME_BACK_HALTED, _F.BRAKE, queue=Queue.STOPPED),
+    _row(_E.COME_BACK_HALTED, _F.LET_GO),
     _row(_E.COME_BACK_LED_AWAY, _F.BRAKE, queue=Queue.STOPPED),
     _row(_E.COME_BACK_LED_AWAY, _F.TELL, has_failsafe=True),  # a zero would have it lose us again
     _row(_E.COME_BACK_LED_AWAY, _F.ZERO),

@@ -29,8 +29,10 @@ class Takeovers:
     def __repr__(self) -> str:
         return f"Takeovers({self._joint!r})"
 
-    def come_back(self, *, was_driven: bool, now: float) -> None:
+    def come_back(self, *, was_driven: bool, was_halted: bool, now: float) -> None:
         """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
+
+        It does as well if it ``was_halted`` just before that run ended: HOLD may not have come.
 
         If somebody else had taken it over or disarmed it, we do not arm it before a person lets us
         go on.
@@ -45,7 +47,9 @@ class Takeovers:
             f"is in {persona.mode_name(mode)}, by its failsafe or by somebody, and is left to it:"
             " HOLD stops it, then release its task"
         )
-        if not was_driven:
+        if was_halted and parts.monitor.armed and not parts.is_by_hand:
+            event = Event.COME_BACK_HALTED
+        elif not was_driven:
             event = Event.COME_BACK
         elif is_lost or mode == persona.control_mode:
             event = Event.COME_BACK_DRIVEN

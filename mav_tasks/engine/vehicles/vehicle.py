@@ -168,9 +168,12 @@ class Vehicle:
         self.requests.move_to(outlet)
         self.parts.authority.moved(may_arm=may_arm)
 
-    def come_back(self, *, was_driven: bool, now: float) -> None:
-        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving."""
-        self._takeovers.come_back(was_driven=was_driven, now=now)
+    def come_back(self, *, was_driven: bool, was_halted: bool, now: float) -> None:
+        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
+
+        So it does if it ``was_halted`` just before that run ended.
+        """
+        self._takeovers.come_back(was_driven=was_driven, was_halted=was_halted, now=now)
         self.pilot.plan_tick(now=now)
 
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:

@@ -314,7 +314,9 @@ class VehicleSide:
         self.links.learn(packet.system_id, (link_name, peer))
         self.agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
-        vehicle.come_back(was_driven=self._fleet.was_driven(packet.system_id), now=now)
+        number = packet.system_id
+        was_driven, was_halted = self._fleet.was_driven(number), self._fleet.was_halted(number)
+        vehicle.come_back(was_driven=was_driven, was_halted=was_halted, now=now)
         vehicle.joint.step(now)
         return vehicle
 

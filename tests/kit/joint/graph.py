@@ -51,6 +51,8 @@ def can_happen(event: Event, state: State) -> bool:
             return state.queue is not Queue.STOPPED
         case Event.COME_BACK | Event.COME_BACK_DRIVEN | Event.COME_BACK_LED_AWAY:
             return state.grip is Grip.FREE and not has_task
+        case Event.COME_BACK_HALTED:
+            return state.grip is Grip.FREE and not has_task and state.armed
         case Event.CLOSE:
             return False  # nothing is after it
         case _:

@@ -154,6 +154,7 @@ def test_what_was_restored_comes_back_as_it_was() -> None:
         speeds={2: 0.3, 1: 1},
         homes={2: VehicleHomeSet(2, 5, 6, Frame(None, 1, -0.0, None), "a", 3.0)},
         halt_epochs={2: 7, 1: 1},
+        halted={2: (TaskReason.OPERATOR, -0.0), 1: (TaskReason.STOPPED, 0.1)},
         plans={(2, 0): (7, "[]"), (1, 1): (3, "ä")},
         parameters={"B": -0.0, "A": 1.5},
         ended_well=False,
