@@ -63,6 +63,8 @@ class TaskStatusSender:
     def next_deadline(self) -> float:
         """Give when ``due`` has something to give; inf: never, as things are."""
         first = self._retry_at if self._changed else inf
+        if not self._streams:  # as with nearly all clients
+            return first
         return min([first, *(stream.next_at for stream in self._streams.values())])
 
     def due(self, active: Mapping[int, int], *, now: float) -> list[int]:

@@ -163,7 +163,8 @@ class Lineup:
     @property
     def is_held_ahead(self) -> bool:
         """Whether a held task keeps all others from beginning."""
-        begun = self.begun
+        task_id = self.executor.task_id
+        begun = None if task_id is None else self.book.get(task_id)
         if begun is not None and begun.state is S.HELD:
             return True
         return bool(self.aside_ids) and any(task.state is S.HELD for task in self.aside)

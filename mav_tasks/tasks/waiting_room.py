@@ -101,7 +101,7 @@ class WaitingRoom:
         queueing = self._settings.queueing
         if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
             raise full(queueing.capacity)
-        if self.count_of(draft.submitter) >= queueing.quota:
+        if self._of_owner.get(draft.submitter.owner, 0) >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: {queueing.quota} tasks of this client wait")
         if draft.terms.after:
             self._dependencies.check(draft.terms.after)

@@ -111,13 +111,9 @@ class Vehicle:
         return self.parts.persona
 
     @property
-    def _settings(self) -> Settings:
-        return self.parts.settings
-
-    @property
     def setpoint_period(self) -> float:
         """Seconds from one setpoint to the next, as they should be."""
-        return self._settings.watch.setpoint_period
+        return self.parts.settings.watch.setpoint_period
 
     @property
     def server_component(self) -> int:
@@ -319,7 +315,7 @@ class Vehicle:
         deadline = min(self._clock.next_at, self.requests.next_deadline() or inf)
         if not self._was_heard:  # nothing is asked of one that cannot answer
             return deadline
-        silent_at = self._monitor.heard_at + self._settings.watch.heartbeat_lost + 1e-3
+        silent_at = self._monitor.heard_at + self.parts.settings.watch.heartbeat_lost + 1e-3
         return min(deadline, self.requests.intervals.next_deadline(), silent_at)
 
     def handle_deadline(self, *, now: float) -> None:

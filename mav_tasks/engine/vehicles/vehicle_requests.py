@@ -207,8 +207,10 @@ class VehicleRequests:
 
     def next_deadline(self) -> float | None:
         """Give when a command is to be repeated or given up."""
-        deadlines = (self._sender.next_deadline(), self._uploader.next_deadline())
-        return min((d for d in deadlines if d is not None), default=None)
+        command, upload = self._sender.next_deadline(), self._uploader.next_deadline()
+        if command is None or upload is None:
+            return upload if command is None else command
+        return min(command, upload)
 
     def handle_deadline(self, *, now: float) -> None:
         """Repeat and give up what is due; ``flush`` sends it."""
