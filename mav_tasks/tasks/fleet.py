@@ -3,6 +3,7 @@ them.
 """
 
 from collections.abc import Iterator
+from math import inf
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
@@ -18,9 +19,9 @@ R, S = TaskReason, TaskState
 
 #: halts that are somebody's word for HOLD; a disarming was acknowledged by the vehicle itself
 TO_STAND = WORDS - {R.DISARMED}
-#: s since such a halt in which nobody can have meant anything else since: a supervisor has started
-#: this run
-UNSEEN = 10.0
+#: s since such a halt, in which a supervisor starts this run and the vehicle is found. Later, what
+#: it does may be somebody's newer word, by another way than through a server
+UNSEEN = 15.0
 LONG_IDLE = 600.0  # s without a write before the start: nobody remembers what was queued
 
 
@@ -33,7 +34,7 @@ class Fleet:
         self._of: dict[int, VehicleTasks] = {}
         self.room = WaitingRoom(book, settings)
         self._was_driven: set[int] = set()
-        self._was_halted: set[int] = set()
+        self._halted_at: dict[int, float] = {}  # by somebody, before a run that did not end well
         self._comes_up_paused = False
         self._began_at = 0.0
 
@@ -57,11 +58,9 @@ class Fleet:
         self._was_driven.discard(vehicle)
         return was_driven
 
-    def was_halted(self, vehicle: int) -> bool:
+    def was_halted(self, vehicle: int, *, now: float) -> bool:
         """Whether the last run ended so soon after a halt that it may not have come; said once."""
-        was_halted = vehicle in self._was_halted
-        self._was_halted.discard(vehicle)
-        return was_halted
+        return now - self._halted_at.pop(vehicle, -inf) <= UNSEEN
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -89,9 +88,7 @@ class Fleet:
         self.room.restore(restored.tasks, now=now)
         if not restored.ended_well:
             halted = restored.halted.items()
-            self._was_halted = {
-                vehicle for vehicle, (why, at) in halted if why in TO_STAND and now - at <= UNSEEN
-            }
+            self._halted_at = {vehicle: at for vehicle, (why, at) in halted if why in TO_STAND}
         pauses = self._settings.on_restart == "pause"
         self._began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}

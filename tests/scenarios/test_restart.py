@@ -301,6 +301,22 @@ def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
     assert stays(world, 3)
 
 
+def test_a_rover_that_is_found_long_after_a_halt_and_a_kill_is_left_to_whoever_has_it(
+    world: World, path: Path
+) -> None:
+    away_from_home(world)
+    world.client.pause()
+    world.run(1)
+    world.operator_mode(Mode.RTL)
+    at = world.now
+    world.watched.loses = lambda source, _target, _data: source == "rover1"
+    restart(world, path, away=0.5, settles=18.0)
+    world.watched.loses = lambda *_: False
+    world.run(4)
+    assert in_mode(world) is Mode.RTL
+    assert "HOLD" not in world.observer.sent_since(at)
+
+
 @pytest.mark.parametrize("other", ["long before", "by hand"])
 def test_a_rover_that_somebody_drives_after_a_halt_and_a_kill_is_left_to_it(
     world: World, path: Path, other: str
@@ -308,10 +324,10 @@ def test_a_rover_that_somebody_drives_after_a_halt_and_a_kill_is_left_to_it(
     away_from_home(world)
     world.client.pause()
     world.run(1)
-    restart_with = 12.0 if other == "long before" else 1.0
+    away = 15.0 if other == "long before" else 1.0
     world.operator_mode(Mode.RTL if other == "long before" else Mode.MANUAL)
     at = world.now
-    restart(world, path, away=restart_with)
+    restart(world, path, away=away)
     assert in_mode(world) is (Mode.RTL if other == "long before" else Mode.MANUAL)
     assert "HOLD" not in world.observer.sent_since(at)
 

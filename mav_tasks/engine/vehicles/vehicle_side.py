@@ -315,7 +315,8 @@ class VehicleSide:
         self.agenda.touch(vehicle)
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         number = packet.system_id
-        was_driven, was_halted = self._fleet.was_driven(number), self._fleet.was_halted(number)
+        was_driven = self._fleet.was_driven(number)
+        was_halted = self._fleet.was_halted(number, now=now)
         vehicle.come_back(was_driven=was_driven, was_halted=was_halted, now=now)
         vehicle.joint.step(now)
         return vehicle
