@@ -50,7 +50,7 @@ class Executor:
         self._lost_at: Pose | None = None  # where it was last, before the loss
         self._was_silent = False  # during it
         self._meter: TimingMeter | None = None  # while EXECUTING
-        self._taking_since = 0.0  # while STARTING
+        self._taking_since = 0.0  # while STARTING, or EXECUTING and out of control
         self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
         #: what a STARTING task waits for, and that in the vehicle's own words
         self.waits_for: tuple[TaskReason, str] = (R.NONE, "")
@@ -270,7 +270,11 @@ class Executor:
         if self._pause_if_lost(seen, now):
             return view.HOLD
         if not seen.in_control:
+            if now - self._taking_since > self._settings.watch.start_timeout:
+                self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
+                return view.HOLD
             return view.TAKE
+        self._taking_since = now
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND

@@ -10,7 +10,7 @@ from mav_tasks.tasks.goal import Move, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import wait_reason
 from mav_tasks.tasks.task import Frame, Pose, Terms
-from mav_tasks.tasks.view import DemandKind, ModeKind
+from mav_tasks.tasks.view import DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.rig import (
     BY,
     SETTINGS,
@@ -44,6 +44,22 @@ def interrupted(*, queueing: Queueing | None = None) -> Rig:
     assert rig.states() == [S.PAUSED, S.EXECUTING]
     rig.story()
     return rig
+
+
+def test_a_task_whose_vehicle_is_not_in_control_again_in_time_fails() -> None:
+    """Whatever took it, nobody was told: the task does not stand there for ever."""
+    rig = begun()
+    lost = SETTINGS.watch.start_timeout - TICK
+
+    def out_of_control(now: float) -> VehicleView:
+        return replace(in_control(now), in_control=False)
+
+    assert rig.steps(out_of_control, seconds=lost).kind is K.TAKE
+    assert rig.step(in_control).kind is not K.TAKE
+    rig.steps(out_of_control, seconds=lost)
+    assert rig.story() == []
+    rig.steps(out_of_control, seconds=3 * TICK)
+    assert rig.story() == [(1, S.FAILED, R.START_TIMEOUT)]
 
 
 class TestCancel:
