@@ -19,7 +19,7 @@ os.environ.setdefault("MAVLINK20", "1")
 
 from pymavlink import mavutil
 
-from mav_tasks.engine.clients.sender import COPIED
+from mav_tasks.services.command_receiver import COPIED
 
 T = TypeVar("T")
 

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.number_line import NumberLine
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import CommandReceiver
+from mav_tasks.services.command_receiver import COPIED, CommandReceiver
 
-COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
 DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
 REMEMBERED = 256  # words
 COPIES = 32  # of one word

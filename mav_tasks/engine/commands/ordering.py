@@ -7,12 +7,12 @@ stood still. Who is refused may send it anew; that is told.
 
 from math import isfinite
 
-from mav_tasks.engine.clients.sender import COPIED, DOUBLED
+from mav_tasks.engine.clients.sender import DOUBLED
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.command_receiver import COPIED, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: where a word names the epoch that its sender was shown: which of the parameters, from 0

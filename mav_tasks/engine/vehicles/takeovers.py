@@ -71,7 +71,10 @@ class Takeovers:
         parts.armings.shows(armed=armed)
         ours = parts.control.arming_asked_at
         if armed and parts.armings.are_older(ours=ours, now=now):
-            words = "is armed by a word from before it was to be disarmed: disarmed again"
+            words = (
+                "is armed by a word from before it was to be disarmed: disarmed again;"
+                " to arm it, try again in 4 s"
+            )
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         self.look_at_motion(now=now)
         by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
