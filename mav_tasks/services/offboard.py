@@ -318,8 +318,7 @@ class OffboardControl:
             case _ if self._persona.arms_in_hold:
                 self._next_by_way_of_hold(may_arm=may_arm, now=now)
             case Phase.ASKING_ARM if self._in_our_mode:
-                self._send_setpoint(STANDING)
-                self.phase = Phase.CONTROL
+                self._be_in_control()
             case _ if self._in_our_mode:
                 self._begin_arming(may_arm=may_arm, now=now)
             case _:
@@ -329,8 +328,7 @@ class OffboardControl:
     def _next_by_way_of_hold(self, *, may_arm: bool, now: float) -> None:
         """The next step of HOLD, arm, zeros, our mode; zeros at each, which do no harm."""
         if self._armed and self._in_our_mode:
-            self._send_setpoint(STANDING)
-            self.phase = Phase.CONTROL
+            self._be_in_control()
         elif self.phase is Phase.ASKING_HOLD and not self._armed:
             self._begin_arming(may_arm=may_arm, now=now)
         elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._in_hold:
@@ -343,6 +341,12 @@ class OffboardControl:
         else:
             self._begin_asking(Phase.ASKING_HOLD, now=now)
             self._ask_hold(now=now)
+
+    def _be_in_control(self) -> None:
+        """What was asked for is shown, answered or not: asked again, it would undo a person's."""
+        self._withdraw_requests()
+        self._send_setpoint(STANDING)
+        self.phase = Phase.CONTROL
 
     def _lead_in(self, *, now: float) -> None:
         """Begin the zeros that our mode is entered from.
@@ -401,6 +405,8 @@ class OffboardControl:
             case Phase.RELEASING if self._gives_up_hold(now):
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self.phase = Phase.IDLE
+            case Phase.RELEASING if now >= self._ask_until and self._is_silent(now):
+                self._ask_until = now  # what it shows when it is heard again decides
             case Phase.RELEASING:
                 self._send_setpoint(STANDING)
                 if now >= self._next_hold_at:
@@ -426,8 +432,14 @@ class OffboardControl:
 
     def _gives_up_hold(self, now: float) -> bool:
         """Whether it is time to ask a vehicle that does not show HOLD no more."""
-        shows_still = self._mode == self._left_mode and now - self._shown_at <= SHOWN_LATELY
-        return not self._in_our_mode and now >= self._ask_until + INSISTS * shows_still
+        if self._in_our_mode or self._is_silent(now):
+            return False
+        shows_still = self._mode == self._left_mode
+        return now >= self._ask_until + INSISTS * shows_still
+
+    def _is_silent(self, now: float) -> bool:
+        """Whether no heartbeat has shown its mode lately."""
+        return now - self._shown_at > SHOWN_LATELY
 
     def begin_stop(self, *, now: float, brake_for: float = 0.0) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
