@@ -7,6 +7,9 @@ or whose STOP, is the newer word.
 from math import inf
 
 LATE = 3.5  # s after a word, in which what had left before it may still come to the vehicle
+#: s after a word, in which a heartbeat each second shows what had left before it
+SHOWN_LATE = LATE + 1.5
+RESENT = 1.0  # s in which an arming that is not answered is sent again
 UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may be from before it
 BY_CLIENT = 2.0  # s after a client has asked for arming or a mode, in which that is its doing
 
@@ -17,6 +20,7 @@ class Armings:
     def __init__(self) -> None:
         self._client_at = -inf  # a client's wish to arm went to it
         self._outdated_at = -inf  # what was to arm it before that counts no more
+        self._may_show_until = -inf  # s, that it is armed by that
         self._was_disarmed = False  # then, or since
         self._is_to_be_disarmed = False  # by a client's word, and it does not show that yet
 
@@ -37,13 +41,12 @@ class Armings:
 
         ``ours`` is when we last asked for arming ourselves.
         """
-        if now - max(ours, self._client_at) <= LATE:
-            self._outdated_at, self._was_disarmed = now, not armed
+        self._outdate(max(ours, self._client_at), armed=armed, now=now)
 
     def outdate_ours(self, *, ours: float, armed: bool, now: float) -> None:
         """What we wanted to arm it for is over: the same, of our own arming alone."""
-        if now - ours <= LATE and self._client_at < ours:
-            self._outdated_at, self._was_disarmed = now, not armed
+        if self._client_at < ours:
+            self._outdate(ours, armed=armed, now=now)
 
     def expect_disarmed(self, *, armed: bool) -> None:
         """A client's disarming goes to it: until it shows that, it is as good as disarmed."""
@@ -64,8 +67,13 @@ class Armings:
 
     def forget_halts(self) -> None:
         """Whatever arms it from here on is meant."""
-        self._outdated_at, self._is_to_be_disarmed = -inf, False
+        self._may_show_until, self._is_to_be_disarmed = -inf, False
+
+    def _outdate(self, asked_at: float, *, armed: bool, now: float) -> None:
+        if now - asked_at <= LATE:
+            self._outdated_at, self._was_disarmed = now, not armed
+            self._may_show_until = min(asked_at + RESENT, now) + SHOWN_LATE
 
     def _may_be_older(self, ours: float, now: float) -> bool:
         is_outdated = self._was_disarmed and ours <= self._outdated_at
-        return is_outdated and now <= self._outdated_at + LATE
+        return is_outdated and now <= self._may_show_until

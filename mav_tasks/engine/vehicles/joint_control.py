@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from mav_tasks.engine.vehicles.armings import LATE
+from mav_tasks.engine.vehicles.armings import SHOWN_LATE
 from mav_tasks.engine.vehicles.control import Event, effects_of
 from mav_tasks.engine.vehicles.facts import client_driving, state_of
 from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
@@ -67,7 +67,7 @@ class JointControl:
 
     def state(self, *, now: float) -> State:
         """Return what decides about the next event."""
-        is_late = now - self.stopped_at <= LATE
+        is_late = now - self.stopped_at <= SHOWN_LATE
         return state_of(self._parts, self._pilot, is_late=is_late, now=now)
 
     # words that let it stand

@@ -4,7 +4,7 @@ A heartbeat may show our own doing, a client's through us, a person's at the veh
 failsafe's. Which it was is found here; what follows is the table's to say.
 """
 
-from mav_tasks.engine.vehicles.armings import LATE
+from mav_tasks.engine.vehicles.armings import SHOWN_LATE
 from mav_tasks.engine.vehicles.authority import Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import BUTTONS, Word
@@ -73,7 +73,7 @@ class Takeovers:
         if armed and parts.armings.are_older(ours=ours, now=now):
             words = (
                 "is armed by a word from before it was to be disarmed: disarmed again;"
-                " to arm it, try again in 4 s"
+                " to arm it, try again in 5 s"
             )
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         self.look_at_motion(now=now)
@@ -87,7 +87,7 @@ class Takeovers:
 
     def look_at_motion(self, *, now: float) -> None:
         """Look whether it drives to a place that it was sent to before a halt."""
-        if now - self._parts.tasks.halts.at <= LATE and self._moves_late(now=now):
+        if now - self._parts.tasks.halts.at <= SHOWN_LATE and self._moves_late(now=now):
             words = "moves in HOLD, by a word from before it was to stand: HOLD again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
 
@@ -177,7 +177,7 @@ class Takeovers:
         persona, halts = self._parts.persona, self._parts.tasks.halts
         if mode == persona.hold_mode or mode in persona.manual_modes:
             return False
-        is_halted = now - halts.at <= LATE and halts.is_by_word and not halts.is_undone
+        is_halted = now - halts.at <= SHOWN_LATE and halts.is_by_word and not halts.is_undone
         ours = self._parts.control.mode_asked_at
         return is_halted and self._parts.authority.was_asked_before(mode, ours=ours, halt=halts.at)
 

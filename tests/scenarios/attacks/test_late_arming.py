@@ -11,10 +11,11 @@ import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
+from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long
 from tests.kit.world import World
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
+from tests.scenarios.conftest import MakeWorld
 
 COMMAND_LONG, ARM = 76, 400
 PARAMETERS, NUMBER = 10, 38  # where they begin in a packet, and the command's number
@@ -125,7 +126,7 @@ def test_a_person_at_the_rover_arms_it_all_the_same(waiting: World) -> None:
     waiting.client.arm()
     waiting.run(0.1)
     disarmed_at_last(waiting)
-    waiting.run(3)
+    waiting.run(5)
     waiting.operator_arm(armed=True)
     waiting.until_state(1, S.EXECUTING)
 
@@ -169,3 +170,27 @@ def test_a_pause_stops_what_a_client_has_armed_just_now(world: World) -> None:
     world.run(3)
     assert paused.result == ACCEPTED
     assert mode_of(world) is Mode.HOLD
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+@pytest.mark.parametrize("late", [2.0, 2.6, 3.0, 3.4])
+def test_an_arming_that_shows_only_with_the_next_heartbeat(
+    make_world: MakeWorld, late: float, phase: float
+) -> None:
+    """It came in time to be called late; a rover that says once a second shows it after that."""
+    world = make_world(persona=ARDUPILOT)
+    world.operator_mode(Mode.HOLD)
+    world.run(2)
+    world.client.arm(False)
+    world.run(3)
+    world.client.move(5, speed=0.5)
+    world.run(3 + phase)
+    caught = catch_arming(world)
+    world.client.arm()
+    world.run(0.5)
+    world.watched.loses = lambda *_: False
+    answer = world.client.arm(False)
+    world.run(late)
+    assert answer.result == ACCEPTED
+    world.bring_late(caught[0])
+    assert stays(world, 6)

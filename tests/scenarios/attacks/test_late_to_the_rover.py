@@ -14,7 +14,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.personas import Mode
+from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, command_long, setpoint
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
@@ -135,6 +135,51 @@ def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
     world.fault(Faults())
     world.run(1)
     assert stays(world, 3)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+@pytest.mark.parametrize("late", [2.8, 3.0, 3.2, 3.4])
+def test_a_mode_that_shows_only_with_the_next_heartbeat(
+    make_world: MakeWorld, late: float, phase: float
+) -> None:
+    world = make_world(persona=ARDUPILOT)
+    person = world.add_client("person")
+    away_from_home(world)
+    world.client.mode(HOLD)
+    world.run(3 + phase)
+    caught = catch(world, RETURN)
+    world.client.send(command_long(RETURN, target=ELSEWHERE))
+    world.run(0.05)
+    mend(world)
+    halted = person.mode(HOLD)
+    world.run(late)
+    world.bring_late(caught[0])
+    world.run(6)
+    assert halted.result == ACCEPTED
+    assert mode_of(world) is Mode.HOLD
+
+
+@pytest.mark.parametrize("late", [2.6, 3.0, 3.4])
+def test_a_px4_that_a_place_moves_in_hold_only_some_time_later(
+    make_world: MakeWorld, late: float
+) -> None:
+    world = make_world(persona=PROMPT_PX4, settings=Settings(claim=False))
+    person = world.add_client("person")
+    world.client.move(5)
+    world.until_state(1, S.COMPLETED, within=60)
+    world.run(3)
+    world.client.arm()
+    world.run(1)
+    caught = catch(world, GO_TO)
+    world.client.send(go_to(40, 0))
+    world.run(0.05)
+    mend(world)
+    halted = ask_mode(person, PX4_HOLD)
+    world.run(late)
+    world.bring_late(caught[0])
+    world.run(9)
+    assert halted.result == ACCEPTED
+    assert abs(world.truth.forward_speed) < 0.05
 
 
 def test_our_own_mode(world: World) -> None:
