@@ -17,6 +17,7 @@ class NumberLine:
 
     def __init__(self) -> None:
         self.last = -1  #: the highest number so far, counted on beyond 255; -1: none has come
+        self._first = -1  # number that came
         self._passed = [0.0] * 256  # s, when each number came, or a higher one
         self._came = [-1] * 256  # which numbers came themselves, before any higher one
         self._behind: list[tuple[int, float]] = []  # number and s, of those since the last ahead
@@ -32,6 +33,7 @@ class NumberLine:
         silence, self._heard_at = now - self._heard_at, now
         was_at_0, self._is_at_0 = self._is_at_0, seq == 0 and silence >= SILENT
         if self.last < 0:
+            self._first = seq
             return self._move_on(seq, 256, now)
         ahead = (seq - self.last + BEHIND & 0xFF) - BEHIND
         if ahead > 0:
@@ -54,6 +56,8 @@ class NumberLine:
         """
         if number >= self.last:
             return now
+        if number < self._first:  # who has sent it was there before this server, as far as it knows
+            return 0.0
         came_before = self._came[number & 0xFF] == number
         return self._passed[number & 0xFF if came_before else (number + 1) & 0xFF]
 

@@ -31,8 +31,8 @@ ASK_REPEAT = 0.25  # s, between requests that the vehicle refuses
 STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
 ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 3.7 s
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
-#: s, the same of one that shows the very mode still which it was to leave: nobody has acted since
-INSISTS = 30.0
+#: times, that one is asked which shows the very mode still that it was to leave: nobody has acted
+INSISTS = 30
 SHOWN_LATELY = 2.5  # s since a heartbeat has shown it, of which one may be lost
 #: s after a request was last sent in which what it asks for may still come true: a copy of it may
 #: be late on the net. Longer, and a person who does the same would be taken for it.
@@ -111,6 +111,7 @@ class OffboardControl:
         self._ask_until = -inf  # our mode or arming is asked for until then
         self._ask_again_at: float | None = None  # a refused request is repeated then
         self._next_hold_at = 0.0
+        self._asks_left = 0  # times
         self._left_mode = -1  # which it showed when HOLD was asked for
         self._release_until: float | None = None  # zeros only, until then at the longest
         self._lead_until = 0.0  # zeros only, before our mode is asked for
@@ -406,10 +407,11 @@ class OffboardControl:
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self.phase = Phase.IDLE
             case Phase.RELEASING if now >= self._ask_until and self._is_silent(now):
-                self._ask_until = now  # what it shows when it is heard again decides
+                self._ask_until, self._asks_left = now, INSISTS  # until it is heard again
             case Phase.RELEASING:
                 self._send_setpoint(STANDING)
                 if now >= self._next_hold_at:
+                    self._asks_left -= 1
                     self._request_hold(now=now, again_after=RELEASE_REPEAT)
             case Phase.DISARMING:
                 self._end_disarming()
@@ -426,6 +428,7 @@ class OffboardControl:
         self.phase = Phase.RELEASING
         self.refused = None
         self._ask_until, self._left_mode = now + RELEASE_LIMIT, self._mode
+        self._asks_left = INSISTS
         self._unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
@@ -435,7 +438,7 @@ class OffboardControl:
         if self._in_our_mode or self._is_silent(now):
             return False
         shows_still = self._mode == self._left_mode
-        return now >= self._ask_until + INSISTS * shows_still
+        return now >= self._ask_until and not (shows_still and self._asks_left > 0)
 
     def _is_silent(self, now: float) -> bool:
         """Whether no heartbeat has shown its mode lately."""
@@ -513,6 +516,8 @@ class OffboardControl:
         match self.phase:
             case Phase.ASKING_MODE:
                 self.mode_asked_at = now
+            case Phase.STOPPING if self._is_braking:
+                pass  # HOLD is not asked for yet: who shows it was switched by a person
             case Phase.ASKING_HOLD | Phase.RELEASING | Phase.STOPPING:
                 self._hold_at = now
             case Phase.DISARMING:

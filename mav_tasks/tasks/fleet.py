@@ -3,12 +3,11 @@ them.
 """
 
 from collections.abc import Iterator
-from math import inf
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, QueuePaused
-from mav_tasks.tasks.halts import WORDS
+from mav_tasks.tasks.halts import WORDS, LastHalt
 from mav_tasks.tasks.lifecycle import ACTIVE, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
@@ -17,8 +16,6 @@ from mav_tasks.tasks.waiting_room import WaitingRoom
 
 R, S = TaskReason, TaskState
 
-#: halts that are somebody's word for HOLD; a disarming was acknowledged by the vehicle itself
-TO_STAND = WORDS - {R.DISARMED}
 #: s since such a halt, in which a supervisor starts this run and the vehicle is found. Later, what
 #: it does may be somebody's newer word, by another way than through a server
 UNSEEN = 15.0
@@ -34,7 +31,7 @@ class Fleet:
         self._of: dict[int, VehicleTasks] = {}
         self.room = WaitingRoom(book, settings)
         self._was_driven: set[int] = set()
-        self._halted_at: dict[int, float] = {}  # by somebody, before a run that did not end well
+        self._halted: dict[int, LastHalt] = {}  # by somebody, before this run
         self._comes_up_paused = False
         self._began_at = 0.0
 
@@ -58,9 +55,10 @@ class Fleet:
         self._was_driven.discard(vehicle)
         return was_driven
 
-    def was_halted(self, vehicle: int, *, now: float) -> bool:
-        """Whether the last run ended so soon after a halt that it may not have come; said once."""
-        return now - self._halted_at.pop(vehicle, -inf) <= UNSEEN
+    def last_halt(self, vehicle: int, *, now: float) -> LastHalt | None:
+        """Give the word after which the last run ended so soon that it may not have come; once."""
+        halt = self._halted.pop(vehicle, None)
+        return halt if halt is not None and now - halt.at <= UNSEEN else None
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -86,9 +84,9 @@ class Fleet:
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
-        if not restored.ended_well:
-            halted = restored.halted.items()
-            self._halted_at = {vehicle: at for vehicle, (why, at) in halted if why in TO_STAND}
+        # also where that ended well: it does not wait for a vehicle that does not answer
+        halted = restored.halted.items()
+        self._halted = {each: LastHalt(*halt) for each, halt in halted if halt[0] in WORDS}
         pauses = self._settings.on_restart == "pause"
         self._began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}

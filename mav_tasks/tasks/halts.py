@@ -5,6 +5,7 @@ Each halt raises the epoch, whatever it was: STOP, HOLD, a pause, disarming, a t
 
 from collections.abc import Hashable
 from math import inf
+from typing import NamedTuple
 
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, words_of
@@ -35,6 +36,13 @@ WORDS = frozenset(
 )
 
 
+class LastHalt(NamedTuple):
+    """The last halt of an earlier run."""
+
+    reason: TaskReason
+    at: float  # s, of this run's clock
+
+
 class Halts:
     """The halts of one vehicle: how many there were, and the last."""
 
@@ -45,8 +53,10 @@ class Halts:
         self.number = -1  #: of that word, among those of its sender
         self.command = 0  #: of that word, if it is one
         self.is_undone = False  #: somebody has let the queue go on since
+        self.restored_at = -inf  #: s, when this server began, after another one
         self._reason, self._actor = TaskReason.NONE, ""
         self._was_asked = False  # to go on, since the last
+        self._shown_at = -inf  # s, the last disarming that was said before
         self._counted_at = -inf  # s, when the last came that is no other one again
 
     def __repr__(self) -> str:
@@ -60,11 +70,6 @@ class Halts:
         return what if self._actor in ("", SERVER) else f"{what} by {who}"
 
     @property
-    def is_of_restart(self) -> bool:
-        """Whether nothing has made it stand since this server has begun, after another one."""
-        return self._reason is TaskReason.RESTARTED
-
-    @property
     def is_by_word(self) -> bool:
         """Whether the last is somebody's word, and not what was seen of the vehicle."""
         return self._reason in WORDS
@@ -72,19 +77,23 @@ class Halts:
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it is the last one again, and is not counted."""
         is_same = (reason, actor) == (self._reason, self._actor)
-        shows_last = (
-            self._reason is TaskReason.DISARMED and reason in TAKEN and now - self.at <= SHOWN
-        )
+        if self._reason is TaskReason.DISARMED and reason in TAKEN and now <= self._shown_at:
+            self.at = now  # it shows what was said
+            return False
         self.at = now  # the last of them, by which words are overtaken
         if is_same and now - self._counted_at < SAME and not self._was_asked:
             return False
         self.epoch += 1
         self._counted_at = now
-        if not shows_last:  # as it was told
-            self.by, self.number, self.command = None, -1, 0
+        self.by, self.number, self.command = None, -1, 0
         self._reason, self._actor, self._was_asked = reason, actor, False
         self.is_undone = False
         return True
+
+    def shows_disarmed(self, *, now: float) -> None:
+        """Note that the vehicle shows it is disarmed: that may be what was said just before."""
+        if self._reason is TaskReason.DISARMED and now - self.at <= SHOWN:
+            self._shown_at = now
 
     def lets_go(self) -> None:
         """Note that the queue goes on; that does not arm what was disarmed."""

@@ -58,6 +58,7 @@ class VehicleTasks(Lineup):
     ) -> None:
         """Take on what had begun in an earlier run, as it was left."""
         self.halts = Halts(epoch=halt_epoch)
+        self.halts.restored_at = now
         self.halt(R.RESTARTED, actor=SERVER, now=now)
         self.paused = paused
         self.terms.restore(speed=speed, uid=uid, may_be_armed=may_be_armed)

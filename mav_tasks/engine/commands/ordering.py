@@ -67,7 +67,7 @@ def why_older(asked: Asked, *, now: float) -> str:
         epoch = halts.epoch if halts.at < sent_by else halts.epoch - 1
         epoch = epoch if first is None else min(epoch, first)
     # it may be a copy of what only the server before has heard
-    if first is None and halts.is_of_restart and now - halts.at <= COPIED:
+    if first is None and now - halts.restored_at <= COPIED:
         epoch = halts.epoch - 1
     if named:
         epoch = halts.epoch if named == halts.epoch % EPOCHS else halts.epoch - 1

@@ -48,6 +48,11 @@ class Armings:
         if self._client_at < ours:
             self._outdate(ours, armed=armed, now=now)
 
+    def outdate_earlier(self, *, armed: bool, until: float, now: float) -> None:
+        """An earlier run has ended just after that: what it sent may show ``until`` then."""
+        self._outdated_at, self._was_disarmed = now, not armed
+        self._may_show_until = until
+
     def expect_disarmed(self, *, armed: bool) -> None:
         """A client's disarming goes to it: until it shows that, it is as good as disarmed."""
         self._is_to_be_disarmed = armed

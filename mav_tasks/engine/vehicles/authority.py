@@ -119,10 +119,16 @@ class Authority:
         Also where it was shown before the halt: the net may have a copy of the word for it.
         ``ours`` is when we last asked for our mode.
         """
-        asked = max(self._passed_on.get(mode, -inf), self._passed_on.get(ANY_MODE, -inf))
-        if mode == self._persona.control_mode:
-            asked = max(asked, ours)
+        asked = self._asked_for(mode, ours=ours)
         return asked < halt <= asked + LATE
+
+    def was_asked(self, mode: int, *, ours: float) -> bool:
+        """Whether a mode was asked for at all, by a client through this server, or by us."""
+        return self._asked_for(mode, ours=ours) > -inf
+
+    def _asked_for(self, mode: int, *, ours: float) -> float:
+        asked = max(self._passed_on.get(mode, -inf), self._passed_on.get(ANY_MODE, -inf))
+        return max(asked, ours) if mode == self._persona.control_mode else asked
 
     def moves_by_older(self, *, halt: float) -> bool:
         """Whether what a client had sent before a halt may move the vehicle in any mode."""

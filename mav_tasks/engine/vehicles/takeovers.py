@@ -4,6 +4,8 @@ A heartbeat may show our own doing, a client's through us, a person's at the veh
 failsafe's. Which it was is found here; what follows is the table's to say.
 """
 
+from math import inf
+
 from mav_tasks.engine.vehicles.armings import SHOWN_LATE
 from mav_tasks.engine.vehicles.authority import Before
 from mav_tasks.engine.vehicles.control import Event
@@ -12,6 +14,7 @@ from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.tasks.events import VehicleSeen
+from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason
 
 R = TaskReason
@@ -23,16 +26,17 @@ class Takeovers:
     def __init__(self, parts: Parts, joint: JointControl) -> None:
         self._parts = parts
         self._joint = joint
+        self._may_show_until = -inf  # s, what left before the last halt of an earlier run
         self._shows_restart = False  # until the heartbeat comes that does, too
         self._others_drive = False  # it moved in a mode in which nothing of ours drove it
 
     def __repr__(self) -> str:
         return f"Takeovers({self._joint!r})"
 
-    def come_back(self, *, was_driven: bool, was_halted: bool, now: float) -> None:
+    def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:
         """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
 
-        It does as well if it ``was_halted`` just before that run ended: HOLD may not have come.
+        It does as well if that run ended just after a ``halt``: HOLD may not have come.
 
         If somebody else had taken it over or disarmed it, we do not arm it before a person lets us
         go on.
@@ -47,7 +51,14 @@ class Takeovers:
             f"is in {persona.mode_name(mode)}, by its failsafe or by somebody, and is left to it:"
             " HOLD stops it, then release its task"
         )
-        if was_halted and parts.monitor.armed and not parts.is_by_hand:
+        if halt is not None:
+            self._may_show_until = halt.at + SHOWN_LATE
+            if halt.reason is R.STOPPED:
+                self._joint.stopped_at = halt.at
+            if halt.reason in (R.STOPPED, R.DISARMED):
+                armed = parts.monitor.armed
+                parts.armings.outdate_earlier(armed=armed, until=self._may_show_until, now=now)
+        if halt is not None and parts.monitor.armed and not parts.is_by_hand:
             event = Event.COME_BACK_HALTED
         elif not was_driven:
             event = Event.COME_BACK
@@ -177,9 +188,13 @@ class Takeovers:
         persona, halts = self._parts.persona, self._parts.tasks.halts
         if mode == persona.hold_mode or mode in persona.manual_modes:
             return False
-        is_halted = now - halts.at <= SHOWN_LATE and halts.is_by_word and not halts.is_undone
-        ours = self._parts.control.mode_asked_at
-        return is_halted and self._parts.authority.was_asked_before(mode, ours=ours, halt=halts.at)
+        authority, ours = self._parts.authority, self._parts.control.mode_asked_at
+        if halts.is_undone:
+            return False
+        if now <= self._may_show_until and not authority.was_asked(mode, ours=ours):
+            return True  # nor has this server asked for it
+        is_halted = now - halts.at <= SHOWN_LATE and halts.is_by_word
+        return is_halted and authority.was_asked_before(mode, ours=ours, halt=halts.at)
 
     def _moves_late(self, *, now: float) -> bool:
         """Whether what it was told before a halt just now moves it in HOLD."""
@@ -211,6 +226,7 @@ class Takeovers:
         if self._shows_restart:  # this heartbeat, or the clock before it, has told of that as well
             self._disarmed_by_restart(before.may_arm)
             return
+        parts.tasks.halts.shows_disarmed(now=now)
         self._taken(Event.DISARMED, "disarmed", now=now)
         parts.authority.note_disarmed(before)  # a restart may turn out to have done it
 

@@ -35,6 +35,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace
+from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
@@ -164,12 +165,12 @@ class Vehicle:
         self.requests.move_to(outlet)
         self.parts.authority.moved(may_arm=may_arm)
 
-    def come_back(self, *, was_driven: bool, was_halted: bool, now: float) -> None:
+    def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:
         """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
 
-        So it does if it ``was_halted`` just before that run ended.
+        So it does if that run ended just after a ``halt``.
         """
-        self._takeovers.come_back(was_driven=was_driven, was_halted=was_halted, now=now)
+        self._takeovers.come_back(was_driven=was_driven, halt=halt, now=now)
         self.pilot.plan_tick(now=now)
 
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:

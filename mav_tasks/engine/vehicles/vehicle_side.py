@@ -316,8 +316,8 @@ class VehicleSide:
         self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         number = packet.system_id
         was_driven = self._fleet.was_driven(number)
-        was_halted = self._fleet.was_halted(number, now=now)
-        vehicle.come_back(was_driven=was_driven, was_halted=was_halted, now=now)
+        halt = self._fleet.last_halt(number, now=now)
+        vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
         vehicle.joint.step(now)
         return vehicle
 

@@ -52,8 +52,10 @@ def was_handled(task: Task, before: Pose, after: Pose) -> bool:
 
     On a straight line it rolls on by itself; it does not turn, and does not come back.
     """
+    if task.progress.anchor is None:  # it had not begun to drive
+        return False
     leg = leg_of(goal_of(task), task.progress)
-    if task.progress.anchor is None or not isinstance(leg, Move):
+    if not isinstance(leg, Move):
         return False
     north, east = after.north - before.north, after.east - before.east
     ahead = copysign(1.0, leg.distance) * (north * cos(before.yaw) + east * sin(before.yaw))
