@@ -9,6 +9,7 @@ BEHIND = 0x80  # of 256 numbers; one that is farther behind looks as if it were 
 ANEW_AFTER, ANEW = 2.0, 3
 #: s of silence after which one that counts from 0 has begun anew with its second packet
 SILENT = 1.0
+JUMP = 32  # numbers; 25 packets/s that come 7 s late are 80 ahead by their 8 bits
 FIRST = 8  # numbers, of which the second packet has one: some may be lost
 
 
@@ -20,8 +21,9 @@ class NumberLine:
         self._first = -1  # number that came
         self._passed = [0.0] * 256  # s, when each number came, or a higher one
         self._came = [-1] * 256  # which numbers came themselves, before any higher one
+        self._ahead_by = [0] * 256  # by how many these were ahead
         self._behind: list[tuple[int, float]] = []  # number and s, of those since the last ahead
-        self._heard_at = 0.0
+        self.heard_at = 0.0  #: s, when the last packet came
         self._is_at_0 = False  # the last one was number 0, after a silence
         self.lives = 0  #: times that the sender has begun anew
 
@@ -30,11 +32,11 @@ class NumberLine:
 
     def place(self, seq: int, *, now: float) -> int:
         """Take a packet in; return its number, counted on. It is late if that is below ``last``."""
-        silence, self._heard_at = now - self._heard_at, now
+        silence, self.heard_at = now - self.heard_at, now
         was_at_0, self._is_at_0 = self._is_at_0, seq == 0 and silence >= SILENT
         if self.last < 0:
             self._first = seq
-            return self._move_on(seq, 256, now)
+            return self._move_on(seq, 1, now)
         ahead = (seq - self.last + BEHIND & 0xFF) - BEHIND
         if ahead > 0:
             return self._move_on(self.last + ahead, ahead, now)
@@ -49,24 +51,30 @@ class NumberLine:
         """Return the number, counted on, of a packet that was taken in."""
         return self.last + (seq - self.last + BEHIND & 0xFF) - BEHIND
 
-    def sent_by(self, number: int, *, now: float) -> float:
-        """Return the latest time in s at which the packet of this number can have left.
+    def sent_after(self, number: int, *, now: float) -> float:
+        """Return the earliest time in s at which the packet of this number can have left.
 
-        The last number again says nothing: some senders do not count.
+        That is when the number before it came. The last number again says nothing: some senders do
+        not count. One from before the first that came may have left before this server began.
         """
         if number >= self.last:
             return now
-        if number < self._first:  # who has sent it was there before this server, as far as it knows
-            return 0.0
-        came_before = self._came[number & 0xFF] == number
-        return self._passed[number & 0xFF if came_before else (number + 1) & 0xFF]
+        for each in range(number, max(self._first, self.last - 256) - 1, -1):
+            if self._came[each & 0xFF] == each:
+                return self._passed[each & 0xFF]
+        return 0.0
+
+    def jumped_to(self, number: int) -> bool:
+        """Whether a packet seemed to be so far ahead that it may as well be far behind."""
+        came = self._came[number & 0xFF] == number
+        return came and self._ahead_by[number & 0xFF] > JUMP
 
     def _move_on(self, number: int, by: int, now: float) -> int:
         self._passed[number & 0xFF] = now
         if by > 1:
             for each in range(number - min(by, 256) + 1, number):
                 self._passed[each & 0xFF] = now
-        self._came[number & 0xFF] = number
+        self._came[number & 0xFF], self._ahead_by[number & 0xFF] = number, by
         self._behind.clear()
         self.last = number
         return number

@@ -14,6 +14,7 @@ from mav_tasks.mavlink.messages import CommandAck, CommandInt, CommandLong, Mess
 SAME_PACKET = 5.0  # s, the very same packet again: the same answer
 REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
 COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
+DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
 REMEMBERED = 256  # packets of one client
 
 

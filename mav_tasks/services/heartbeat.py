@@ -25,6 +25,11 @@ class HeartbeatMonitor:
         """The autopilot's own mode number."""
         return int(self.latest.custom_mode)
 
+    @property
+    def may_be_armed(self) -> bool:
+        """Whether it said that it is armed, though it may have restarted since."""
+        return bool(self.latest.base_mode & MavModeFlag.SAFETY_ARMED)
+
     def receive(self, heartbeat: Heartbeat, *, now: float) -> None:
         """Take a heartbeat in."""
         self._take(heartbeat)
@@ -37,7 +42,7 @@ class HeartbeatMonitor:
     def _take(self, heartbeat: Heartbeat) -> None:
         self.latest = heartbeat
         #: whether the vehicle says that it is armed
-        self.armed = bool(heartbeat.base_mode & MavModeFlag.SAFETY_ARMED)
+        self.armed = self.may_be_armed
 
     def is_heard(self, *, now: float) -> bool:
         """Whether heartbeats are coming."""

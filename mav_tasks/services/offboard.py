@@ -191,7 +191,8 @@ class OffboardControl:
         if mode not in (self._persona.hold_mode, self._persona.control_mode):
             return False
         asked_at = self._hold_at if mode == self._persona.hold_mode else self.mode_asked_at
-        return now - asked_at <= LATE or (self._last_was_awaited and asked_at > -inf)
+        is_awaited = self._last_was_awaited and mode == self._asked_mode
+        return now - asked_at <= LATE or (is_awaited and asked_at > -inf)
 
     def may_have_disarmed(self, *, now: float) -> bool:
         """Whether a disarming just seen can be our own doing."""

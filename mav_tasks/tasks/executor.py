@@ -178,6 +178,11 @@ class Executor:
         return killed
 
     @property
+    def lost_since(self) -> float | None:
+        """Since when, in s, the task has stood that resumes by itself; None: it does not."""
+        return self._since if self.resumes_by_itself else None
+
+    @property
     def resumes_by_itself(self) -> bool:
         """Whether it stands only as long as the vehicle, or its position, is not heard of."""
         task = self.task

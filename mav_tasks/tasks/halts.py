@@ -11,6 +11,7 @@ from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, words_of
 
 SAME = 0.2  # s, in which the same halt by the same one is one: five a second of a flood
+SENDERS = 32  # whose halts are remembered
 SHOWN = 2.0  # s after a disarming in which the vehicle shows that it is disarmed, at 1 Hz
 
 _WORDS = {
@@ -52,6 +53,7 @@ class Halts:
         self.by: Hashable = None  #: whose word it was; None: nobody's
         self.number = -1  #: of that word, among those of its sender
         self.command = 0  #: of that word, if it is one
+        self._numbers: dict[Hashable, int] = {}  # of the last halt of each sender
         self.is_undone = False  #: somebody has let the queue go on since
         self.restored_at = -inf  #: s, when this server began, after another one
         self._reason, self._actor = TaskReason.NONE, ""
@@ -100,8 +102,17 @@ class Halts:
         self.is_undone = self._reason is not TaskReason.DISARMED
 
     def was_said_by(self, sender: Hashable, number: int, *, command: int = 0) -> None:
-        """Note whose word the last halt was, its number among the sender's, and its command."""
-        self.by, self.number, self.command = sender, number, command
+        """Note whose word the last halt was, its number among the sender's, and its command.
+
+        A copy of an older one of the same sender, which comes late, is not the last.
+        """
+        before = self._numbers.pop(sender, -1)
+        if number >= before:
+            self.command = command
+        self.by, self.number = sender, max(number, before)
+        self._numbers[sender] = self.number
+        if len(self._numbers) > SENDERS:
+            del self._numbers[next(iter(self._numbers))]
 
     def was_asked_to_go_on(self) -> None:
         """Note that a word that lets go has come, whatever became of it."""

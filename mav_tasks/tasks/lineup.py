@@ -174,6 +174,11 @@ class Lineup:
         """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
         return self.executor.resumes_by_itself
 
+    @property
+    def lost_since(self) -> float | None:
+        """Since when, in s, a task has stood that resumes by itself; None: none does."""
+        return self.executor.lost_since
+
     def waits(self, task: Task) -> bool:
         """Whether a task has not begun."""
         return task.state in WAITING

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.number_line import NumberLine
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import COPIED, CommandReceiver
+from mav_tasks.services.command_receiver import COPIED, DOUBLED, CommandReceiver
 
-DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
-REMEMBERED = 256  # words
+REMEMBERED = 1024  # words: a gimbal that is turned says 20 a second
 COPIES = 32  # of one word
 
 

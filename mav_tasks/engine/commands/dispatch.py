@@ -97,7 +97,7 @@ class Commands:
             return  # clients send everything to everyone: it is for somebody else
         receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
-        if known is not None and not halts_again(command, vehicle.persona):
+        if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
             if known.answer is not None:
                 client.answer(known.answer, packet.source)
             return

@@ -7,12 +7,11 @@ stood still. Who is refused may send it anew; that is told.
 
 from math import isfinite
 
-from mav_tasks.engine.clients.sender import DOUBLED
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.services.command_receiver import COPIED, Command
+from mav_tasks.services.command_receiver import COPIED, DOUBLED, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 
 #: where a word names the epoch that its sender was shown: which of the parameters, from 0
@@ -43,7 +42,7 @@ def why_older(asked: Asked, *, now: float) -> str:
     is_old = asked.client.is_late
     halts.was_asked_to_go_on()
     number = sender.line.number_of(packet.seq)
-    sent_by = sender.line.sent_by(number, now=now)
+    sent_after = sender.line.sent_after(number, now=now)
     named = _epoch_in(asked.command)
     content = (asked.command.target, asked.command.command, repr(asked.command.params))
     copies = asked.command.confirmation
@@ -54,8 +53,11 @@ def why_older(asked: Asked, *, now: float) -> str:
         is_anothers=halts.by is not sender,
         now=now,
     )
+    elsewhere = asked.vehicle.go_words.first_epoch(packet.raw, sender, now=now)
+    if elsewhere is not None:
+        first = elsewhere if first is None else min(first, elsewhere)
     if first is None and copies:  # the first one was lost, and had left before this one
-        sent_by = min(sent_by, now - min(copies * COPIED, DOUBLED))
+        sent_after = min(sent_after, now - min(copies * COPIED, DOUBLED))
     # its sender has said the last halt itself, and before this, which it does not repeat by itself:
     # no stock client has two commands of one number under way; or that halt has been let go since
     follows = halts.by is sender and number > halts.number
@@ -64,16 +66,17 @@ def why_older(asked: Asked, *, now: float) -> str:
     if follows and not is_repeated and (is_over or now - sender.last_copy_at(content) > REPEATED):
         epoch = halts.epoch
     else:
-        epoch = halts.epoch if halts.at < sent_by else halts.epoch - 1
+        epoch = halts.epoch if halts.at < sent_after else halts.epoch - 1
         epoch = epoch if first is None else min(epoch, first)
     # it may be a copy of what only the server before has heard
     if first is None and now - halts.restored_at <= COPIED:
         epoch = halts.epoch - 1
     if named:
         epoch = halts.epoch if named == halts.epoch % EPOCHS else halts.epoch - 1
-    if is_old:
+    if is_old or (sender.line.jumped_to(number) and not named):
         epoch = min(epoch, halts.epoch - 1)
     sender.says(content, packet, epoch=epoch, now=now)
+    asked.vehicle.go_words.says(packet.raw, sender, epoch=epoch, now=now)
     if epoch == halts.epoch:
         return ""
     if is_old:
@@ -87,6 +90,13 @@ def has_left_before_halt(asked: Asked) -> bool:
     """Return whether the last halt is the same sender's, and this word had left before it."""
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
     return halts.by is asked.sender and line.number_of(asked.packet.seq) < halts.number
+
+
+def is_overtaken(asked: Asked, *, now: float) -> bool:
+    """Return whether this word may have left before the last halt, whoever has said that."""
+    line = asked.sender.line
+    number = line.number_of(asked.packet.seq)
+    return line.sent_after(number, now=now) <= asked.vehicle.tasks.halts.at
 
 
 def note_halt(asked: Asked, *, before: int) -> None:

@@ -8,7 +8,12 @@ from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.commands.ability import driven
 from mav_tasks.engine.commands.asked import Asked
 from mav_tasks.engine.commands.goals import wish_of
-from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt, why_older
+from mav_tasks.engine.commands.ordering import (
+    AGAIN,
+    has_left_before_halt,
+    is_overtaken,
+    why_older,
+)
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Timers
@@ -113,7 +118,8 @@ class Submissions:
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
-        if has_left_before_halt(asked):
+        waits = bool(vehicle.tasks.paused)  # nothing moves by it before a word that lets go
+        if has_left_before_halt(asked) or (not waits and is_overtaken(asked, now=now)):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came since: {AGAIN}")
         task = self.take_in(
             asked.rights,

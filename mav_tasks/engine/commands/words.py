@@ -12,7 +12,7 @@ from mav_tasks.engine.policy import (
 )
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
-from mav_tasks.services.command_receiver import Command, command_of
+from mav_tasks.services.command_receiver import REPEATED, Command, command_of
 from mav_tasks.services.persona import Persona
 
 #: the commands that are something else by what they say
@@ -53,12 +53,13 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
     return Kind.WISH if message is None else row_of_message(message.id).kind
 
 
-def halts_again(command: Command, persona: Persona) -> bool:
-    """Whether each copy of a word makes a rover stand, also the very same packet.
+def halts_again(command: Command, persona: Persona, *, after: float) -> bool:
+    """Whether a copy of a word makes a rover stand, the very same packet ``after`` so many seconds.
 
     Some senders do not count their packets: it may be another word, and is acknowledged. Who calls
-    a task off means that one task.
+    a task off means that one task; whatever runs, or all of them, are others after a while.
     """
     if command.command in OF_ONE_TASK:
-        return False
+        is_by_id = command.command == MavCmd.TASK_CANCEL and command.params[0] != 0.0
+        return after > REPEATED and not is_by_id
     return kind_of(command, row_said(command), persona) is Kind.HALT

@@ -58,9 +58,13 @@ class Armings:
         self._is_to_be_disarmed = armed
 
     def shows(self, *, armed: bool) -> None:
-        """Take note of what a heartbeat shows, or the answer to a disarming."""
+        """Take note of what a heartbeat shows."""
         self._was_disarmed |= not armed
         self._is_to_be_disarmed &= armed
+
+    def was_answered(self) -> None:
+        """A disarming was acknowledged: the answer may be an older one's, until it shows."""
+        self._was_disarmed = True
 
     def are_older(self, *, ours: float, now: float) -> bool:
         """Whether, where it shows armed, that is by a word from before it was to be disarmed."""

@@ -266,7 +266,7 @@ TABLE = (
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
     # since then something was let go: it is a person at the vehicle, or as good as one
-    _row(_E.LATE_MODE, _E.MODE, work=GOES_ON),
+    _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.LOST)),
     _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
     _row(_E.LATE_ARMING, grip=Grip.RELEASING),  # by which it is disarmed, if it was armed for us
@@ -277,7 +277,7 @@ TABLE = (
     # a request from before the STOP was late; later, it is a person at the vehicle
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING, _F.BRAKE, is_late=True, grip=Grip.FREE),
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING),
-    _row(_E.DISARMED, _F.WITHDRAW_ARMING, _F.ZERO_KEPT, _E.TAKEN),
+    _row(_E.DISARMED, _F.WITHDRAW_ARMING, _F.OUTDATE_OUR_ARMING, _F.ZERO_KEPT, _E.TAKEN),
     _row(_E.PARKED, _F.PAUSE_TAKEN, work=(Work.WAITS, *HAS_IT), queue=IS_LET_RUN),
     _row(_E.PARKED),
     # zeros do not stop it, nor can anybody steer it by the stick
@@ -298,10 +298,24 @@ TABLE = (
     _row(_E.DRIVEN_BY_HAND, _F.NOTE_OTHERS, _F.ZERO_KEPT, _E.TAKEN),
     _row(_E.SECOND, _F.TELL, _F.COUNT, _F.NOTE_OTHERS, _E.SECOND, driver=Driver.NOBODY),
     _row(_E.SECOND, _F.NOTE_OTHERS, grip=Grip.STOPPING),
-    _row(_E.SECOND, _F.NOTE_OTHERS, grip=Grip.FREE, work=NO_TASK_HAS_IT),
+    _row(
+        _E.SECOND,
+        *(_F.COUNT, *TAKE_BACK, _F.NOTE_OTHERS, _F.ZERO),
+        driver=Driver.CLIENT,
+        grip=Grip.FREE,
+        work=NO_TASK_HAS_IT,
+    ),
+    _row(_E.SECOND, *TAKE_BACK, _F.NOTE_OTHERS, grip=Grip.FREE, work=NO_TASK_HAS_IT),
     _row(_E.SECOND, _F.NOTE_OTHERS, _E.TAKEN, grip=Grip.FREE),
     _row(_E.SECOND, _F.NOTE_OTHERS, _F.ZERO_AND_HOLD, _E.TAKEN),
     _row(_E.REBOOTED, *TAKE_BACK, _F.TELL, queue=Queue.STOPPED),
+    # it may as well be late news of its start: HOLD does no harm to one that has restarted
+    _row(
+        _E.REBOOTED,
+        *(*TAKE_BACK, _F.DO),
+        grip=(Grip.RELEASING, Grip.STOPPING),
+        work=(Work.NONE, Work.WAITS, Work.STANDS),
+    ),
     _row(_E.REBOOTED, *TAKE_BACK, _F.LOSE, _F.DO),
     _row(_E.LATE, _F.LET_GO, _F.LEFT, _F.HOLD_TASK, has_failsafe=True),  # which a zero would end
     _row(_E.LATE, _F.ZERO, _F.LEFT, _F.HOLD_TASK),

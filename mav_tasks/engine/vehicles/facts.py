@@ -33,7 +33,7 @@ def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
         work=_work(tasks),
         driver=_driver(parts, now=now),
         armed=parts.monitor.armed,
-        may_be_armed=parts.monitor.armed or parts.armings.are_by_client(now=now),
+        may_be_armed=parts.monitor.may_be_armed or parts.armings.are_by_client(now=now),
         may_arm=authority.may_arm,
         waits=_waits(parts, now=now),
         is_led=kind in (ModeKind.MANUAL, ModeKind.OTHER),

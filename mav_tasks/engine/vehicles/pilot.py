@@ -164,8 +164,9 @@ class Pilot:
                     parts.where.motion.standstill.may_move()
                 control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
-                still = seen.still and not parts.hold_before.is_open(now=now)
-                slows, disarm = self.guard.ladder.is_slowing(now=now), self._is_back_home
+                is_deaf, disarm = self._is_deaf(now=now), self._is_back_home
+                still = seen.still and not is_deaf and not parts.hold_before.is_open(now=now)
+                slows = is_deaf or self.guard.ladder.is_slowing(now=now)
                 control.release(still=still, disarm=disarm, now=now, is_slowing=slows)
             case DemandKind.HAND_BACK:
                 slows = self.guard.ladder.is_slowing(now=now)
@@ -206,7 +207,8 @@ class Pilot:
                 words = "moves though it is told to stand: HOLD"
                 return Seen(Event.NOT_STANDING, TaskReason.STOP_UNCONFIRMED, words)
             case Measure.HOLD_NOW | Measure.HOLD if control.in_control:
-                control.begin_release(now=now)
+                if not self._is_deaf(now=now):
+                    control.begin_release(now=now)
             case Measure.HOLD_NOW:
                 control.hold_now(now=now)
             case Measure.HOLD if control.phase is Phase.STOPPING:
@@ -215,6 +217,16 @@ class Pilot:
                 self._parts.note(found.words, now=now)
                 control.disarm_now(now=now)
         return None
+
+    def _is_deaf(self, *, now: float) -> bool:
+        """Whether a task stands by a gap, since which no heartbeat has shown who has the vehicle.
+
+        A person may have taken it over in the gap, whom HOLD would undo; zeros do nothing then.
+        """
+        parts = self._parts
+        heard_at, lost_at = parts.monitor.heard_at, parts.tasks.lost_since
+        is_heard = now - heard_at <= parts.settings.watch.heartbeat_lost
+        return lost_at is not None and heard_at < lost_at and is_heard
 
     def _note_end(self, ended: Task) -> None:
         """A return has ended: as on an autopilot that has landed, whoever armed it is done."""

@@ -12,6 +12,7 @@ from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.joint_control import JointControl
@@ -41,6 +42,7 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
 REORDERED = 127  # packets that a net can put one behind others, as far as numbers tell
+SILENT = 0.5  # s without any of its packets
 REORDERED_WITHIN = 3.5  # s; after a longer silence a smaller number is a restart
 MOVING = frozenset({Kind.GO, Kind.MOTION, Kind.ACTION})
 
@@ -94,9 +96,12 @@ class Vehicle:
         self.last_heartbeat: Packet | None = None
         self.last_seq = 0  # of the autopilot's packets
         self._number = 0  # the same, counted on beyond 255
+        self._counted_at = -inf  # s, the last of them
         self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
         self._overtaken: tuple[m.Heartbeat | None, float] = (None, -inf)  # the last that was
         self._was_heard = True
+        #: what was to let it go, whichever endpoint it came from
+        self.go_words = GoWords()
         self._says = SelfDescription(parts)
         self.components = Components(system_id, first=settings.identity.component_id)
         #: the task server's address inside this vehicle's system
@@ -140,10 +145,14 @@ class Vehicle:
         """Whether its heartbeats are coming."""
         return now - self._monitor.heard_at <= self._monitor.lost_after
 
-    def count(self, seq: int) -> None:
-        """Take note of the number of a packet of its autopilot."""
-        self._number += (seq - self.last_seq + 0x80 & 0xFF) - 0x80
-        self.last_seq = seq
+    def count(self, seq: int, *, now: float) -> None:
+        """Take note of the number of a packet of its autopilot.
+
+        After a silence it is ahead, however many were lost: nothing is late that long by itself.
+        """
+        behind = 0 if now - self._counted_at > SILENT else 0x80
+        self._number += (seq - self.last_seq + behind & 0xFF) - behind
+        self.last_seq, self._counted_at = seq, now
 
     def is_overtaken(self, heartbeat: m.Heartbeat, *, now: float) -> bool:
         """Whether a newer heartbeat came just before this one, which was counted just now."""

@@ -234,7 +234,7 @@ class VehicleSide:
                 offset = vehicle.where.clock.offset
                 offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if packet.component_id == AUTOPILOT:
-            vehicle.count(packet.seq)
+            vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:

@@ -18,33 +18,45 @@ def test_numbers_are_counted_on_beyond_255() -> None:
     assert line.last == 259
 
 
-def test_one_that_was_overtaken_had_left_before_what_overtook_it() -> None:
+def test_one_that_was_overtaken_may_have_left_just_after_the_one_before_it() -> None:
     line = line_of((10, 1.0), (12, 2.0), (13, 3.0))
     number = line.place(11, now=20.0)
     assert number == 11
-    assert line.sent_by(number, now=20.0) == 2.0
+    assert line.sent_after(number, now=20.0) == 1.0
     assert line.last == 13
 
 
 def test_a_sender_that_does_not_count_is_taken_at_its_word() -> None:
     line = line_of((0, 1.0), (0, 2.0))
-    assert line.sent_by(line.place(0, now=20.0), now=20.0) == 20.0
+    assert line.sent_after(line.place(0, now=20.0), now=20.0) == 20.0
 
 
 def test_the_same_packet_again_had_left_when_it_came_first() -> None:
     line = line_of((10, 1.0), (11, 2.0), (12, 3.0))
-    assert line.sent_by(line.place(11, now=20.0), now=20.0) == 2.0
+    assert line.sent_after(line.place(11, now=20.0), now=20.0) == 2.0
 
 
-def test_what_was_lost_in_between_was_passed_by_what_came_after_it() -> None:
+def test_what_was_lost_in_between_may_have_left_after_what_came_before_it() -> None:
     line = line_of((250, 1.0), (5, 2.0))
     for seq in (251, 255, 0, 4):
-        assert line.sent_by(line.place(seq, now=9.0), now=9.0) == 2.0
+        assert line.sent_after(line.place(seq, now=9.0), now=9.0) == 1.0
+
+
+def test_who_was_there_before_the_first_that_came_may_have_said_it_at_any_time() -> None:
+    line = line_of((10, 5.0), (11, 6.0))
+    assert line.sent_after(line.place(9, now=7.0), now=7.0) == 0.0
+
+
+def test_a_packet_that_seems_far_ahead_may_be_far_behind() -> None:
+    line = line_of((10, 1.0), (12, 2.0), (112, 3.0))
+    assert line.jumped_to(112)
+    assert not line.jumped_to(12)
+    assert not line_of((112, 3.0)).jumped_to(112)
 
 
 def test_the_newest_may_have_left_just_now() -> None:
     line = line_of((10, 1.0))
-    assert line.sent_by(line.place(11, now=5.0), now=5.0) == 5.0
+    assert line.sent_after(line.place(11, now=5.0), now=5.0) == 5.0
 
 
 def test_a_sender_that_counts_from_0_again_is_believed_after_a_while() -> None:
