@@ -117,6 +117,7 @@ class Observer:
     ways: Ways = ARDUPILOT_WAYS
     #: a test that stops the server's clock expects a gap
     expects_gaps: bool = False
+    expects_late_modes: bool = False  # from before a halt: zeros go with the HOLD that undoes them
     #: a world that does several things in one step: which came first is not known
     batches: bool = False
     #: whether the rover is really armed and in our mode
@@ -390,7 +391,7 @@ class Observer:
             is_held = self._is_held_for_sticks(now)
             if not moves and (now == self._pause_at or (self._is_held_since_stick and not is_held)):
                 self._hold_due = now
-            elif moves or (self._zeros_left == 0 and not is_held):
+            elif moves or (self._zeros_left == 0 and not is_held and not self.expects_late_modes):
                 self._violation(now, f"setpoint after a takeover: {self._name(message)}")
             self._zeros_left = max(0, self._zeros_left - 1)
         self._check_rate(now, moves=moves)

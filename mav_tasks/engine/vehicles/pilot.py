@@ -21,6 +21,7 @@ from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
 #: s in which a vehicle that was told to move and says that it stands may be stopping all the same
 UNSEEN_STOP = 3.0
+SHOWS_AGAIN = 1.5  # s after a gap, in which a heartbeat each second comes
 BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
 GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
 
@@ -225,8 +226,8 @@ class Pilot:
         """
         parts = self._parts
         heard_at, lost_at = parts.monitor.heard_at, parts.tasks.lost_since
-        is_heard = now - heard_at <= parts.settings.watch.heartbeat_lost
-        return lost_at is not None and heard_at < lost_at and is_heard
+        is_soon = now - heard_at <= parts.settings.watch.heartbeat_lost + SHOWS_AGAIN
+        return lost_at is not None and heard_at < lost_at and is_soon
 
     def _note_end(self, ended: Task) -> None:
         """A return has ended: as on an autopilot that has landed, whoever armed it is done."""

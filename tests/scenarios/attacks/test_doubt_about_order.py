@@ -1,0 +1,230 @@
+"""Where nobody can know whether a word is older than a halt, it does not let the rover go.
+
+The net keeps one packet of a client back, and brings it after somebody's halt was acknowledged;
+others of that client have overtaken it. A word that is new counts, and a refused one may be sent
+again.
+"""
+
+from collections.abc import Callable
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from tests.kit.client import (
+    ACCEPTED,
+    HOLD,
+    MOVE,
+    PAUSE_CONTINUE,
+    SET_MODE,
+    STOP,
+    FakeClient,
+    Sent,
+    command_long,
+    heartbeat,
+)
+from tests.kit.world import World
+from tests.scenarios.attacks.test_left_waiting import stays
+
+CANCEL, CLEAR, GIMBAL = 54010, 54011, 1000
+CONTINUE = command_long(PAUSE_CONTINUE, 1)
+HALTS: dict[str, Callable[[FakeClient], Sent]] = {
+    "pause": lambda person: person.pause(),
+    "HOLD": lambda person: person.mode(HOLD),
+    "STOP": lambda person: person.stop(),
+    "disarm": lambda person: person.arm(False),
+}
+
+
+@pytest.fixture
+def other(world: World) -> FakeClient:
+    """Another station than the one that halts."""
+    return world.add_client("other", system_id=245)
+
+
+def paused_while_driving(world: World) -> None:
+    """Let a task of two run and be paused."""
+    world.client.move(60, speed=0.5)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.client.move(30, speed=0.5)
+    world.client.pause()
+    world.run(4)
+
+
+@pytest.mark.parametrize("late", [2.0, 6.0, 15.0])
+@pytest.mark.parametrize("before", [0.1, 0.5, 0.8])
+@pytest.mark.parametrize("halt", HALTS)
+def test_what_left_within_the_second_before_a_halt(
+    world: World, other: FakeClient, halt: str, before: float, late: float
+) -> None:
+    """The sender's next heartbeat comes after the halt, and overtakes it: which was first?"""
+    paused_while_driving(world)
+    beats: list[float] = []
+    other.on_sent = lambda message, _: beats.extend([world.now] * (message.get_msgId() == 0))
+    world.until(lambda: bool(beats), within=2)
+    world.run(0.9 - before)
+    old = other.send_repeated(CONTINUE)
+    world.run(before - 0.05)
+    halted = HALTS[halt](world.client)
+    world.run(late)
+    assert halted.result == ACCEPTED
+    other.send_raw(old)
+    assert stays(world, 5)
+    assert world.paused() is not R.NONE
+
+
+@pytest.mark.parametrize("first", ["pause", "HOLD", "STOP", "cancel"])
+@pytest.mark.parametrize("halt", HALTS)
+def test_a_second_copy_of_an_older_halt_takes_no_later_ones_place(
+    world: World, other: FakeClient, halt: str, first: str
+) -> None:
+    world.client.move(60, speed=0.5)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    words = {
+        "pause": command_long(PAUSE_CONTINUE, 0),
+        "HOLD": command_long(SET_MODE, 1, HOLD, target=(1, 1)),
+        "STOP": command_long(STOP),
+        "cancel": command_long(CANCEL, 77),
+    }
+    older = other.send(words[first])
+    world.run(1.5)
+    old = other.send_repeated(CONTINUE)
+    world.run(1.5)
+    halted = HALTS[halt](other)
+    world.run(5)
+    assert halted.result == ACCEPTED
+    other.send_raw(older)
+    world.run(0.1)
+    other.send_raw(old)
+    assert stays(world, 5)
+
+
+@pytest.mark.parametrize(("rate", "late"), [(25, 6.5), (10, 14.0)])
+@pytest.mark.parametrize("halt", HALTS)
+def test_what_its_senders_eight_bits_call_far_ahead(
+    world: World, other: FakeClient, halt: str, rate: float, late: float
+) -> None:
+    """A station with a joystick sends 25 packets a second: 128 of them in five seconds."""
+    paused_while_driving(world)
+    other.stream(heartbeat(), rate=rate)
+    world.run(3)
+    old = other.send_repeated(CONTINUE)
+    world.run(1)
+    halted = HALTS[halt](world.client)
+    world.run(late - 1)
+    assert halted.result == ACCEPTED
+    other.send_raw(old)
+    assert stays(world, 4)
+
+
+def test_a_copy_after_hundreds_of_other_words(world: World, other: FakeClient) -> None:
+    """A gimbal is turned by commands, 20 a second, while the net holds the copy."""
+    paused_while_driving(world)
+    copy = other.send(CONTINUE)
+    world.run(0.5)
+
+    def turn_gimbal(seconds: float) -> None:
+        for number in range(int(seconds * 20)):
+            other.send(command_long(GIMBAL, 0.1 * number, target=(1, 154)))
+            world.run(0.05)
+
+    turn_gimbal(2.0)
+    halted = world.client.pause()
+    turn_gimbal(14.0)
+    assert halted.result == ACCEPTED
+    other.send_raw(copy)
+    assert stays(world, 4)
+
+
+@pytest.mark.parametrize("gap", [0.5, 2.0])
+@pytest.mark.parametrize("halt", HALTS)
+def test_the_same_packet_from_another_port(
+    world: World, other: FakeClient, halt: str, gap: float
+) -> None:
+    paused_while_driving(world)
+    copy = other.send(CONTINUE)
+    world.run(0.5)
+    halted = HALTS[halt](world.client)
+    world.run(gap)
+    assert halted.result == ACCEPTED
+    elsewhere = world.add_client("other port", system_id=245)
+    elsewhere.heartbeats = elsewhere.reads_dialect = False
+    elsewhere.send_raw(copy)
+    world.run(1)
+    assert stays(world, 4)
+    assert world.paused() is not R.NONE
+
+
+@pytest.mark.parametrize("halt", HALTS)
+def test_the_same_packet_by_a_slower_second_link(
+    world: World, other: FakeClient, halt: str
+) -> None:
+    paused_while_driving(world)
+    copy = other.send(CONTINUE)
+    world.run(0.5)
+    halted = HALTS[halt](world.client)
+    world.run(12)
+    assert halted.result == ACCEPTED
+    elsewhere = world.add_client("second link", system_id=245)
+    elsewhere.heartbeats = elsewhere.reads_dialect = False
+    elsewhere.send_raw(copy)
+    assert stays(world, 4)
+    assert world.paused() is not R.NONE
+
+
+def test_a_script_that_is_run_again_from_another_port_is_heard(
+    world: World, other: FakeClient
+) -> None:
+    paused_while_driving(world)
+    other.heartbeats = False
+    copy = other.send(CONTINUE)
+    world.run(0.5)
+    world.client.pause()
+    world.run(5)
+    again = world.add_client("run again", system_id=245)
+    again.heartbeats = again.reads_dialect = False
+    again.send_raw(copy)
+    world.run(3)
+    assert world.truth.forward_speed > 0.3
+
+
+@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+def test_a_submission_that_had_left_before_somebody_elses_halt(
+    world: World, other: FakeClient, halt: str
+) -> None:
+    world.run(3)
+    late = other.send_repeated(command_long(MOVE, 3, 0.5, 0, 7, 0, 0, 5))
+    world.run(1.5)
+    halted = world.client.mode(HOLD) if halt == "HOLD" else world.client.command(CLEAR, 1)
+    world.run(2)
+    assert halted.result == ACCEPTED
+    other.send_raw(late)
+    assert stays(world, 6)
+
+
+@pytest.mark.parametrize("halt", ["cancel", "everything"])
+def test_a_second_copy_of_a_submission_that_was_called_off(
+    world: World, other: FakeClient, halt: str
+) -> None:
+    world.run(3)
+    copy = other.send(command_long(MOVE, 10, 0.5, 0, 0, 0, 0, 5))
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    word = command_long(CANCEL, 0) if halt == "cancel" else command_long(CLEAR, 1)
+    world.client.send(word)
+    world.run(6)
+    other.send_raw(copy)
+    assert stays(world, 6)
+
+
+@pytest.mark.parametrize("word", [command_long(CLEAR, 1), command_long(CANCEL, 0)])
+def test_who_does_not_count_may_call_off_what_runs_twice(world: World, word: object) -> None:
+    same = world.client.packed(word)  # the next message has the same number
+    world.client.move(20, speed=0.5)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.client.send_raw(same)
+    world.run(2)
+    world.client.move(21, speed=0.5, nonce=3)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
+    world.run(0.5)
+    world.client.send_raw(same)
+    world.run(2)
+    assert stays(world, 3)
