@@ -90,10 +90,10 @@ def test_a_rover_that_was_taken_and_parked_unheard_does_not_go_on_by_itself(
     world.client.move(10, speed=0.5)
     world.until(lambda: world.truth.north > 3, within=40)
     unheard(world)
-    world.run(6)
+    world.run(8)  # the server asks for HOLD, of which it hears nothing
     world.operator_mode(Mode.MANUAL)
     throttle, steering = (-0.5, 0.0) if way == "put back" else (0.0, 0.5)
-    for _ in range(3):  # the server asks for HOLD, of which it hears nothing
+    for _ in range(3):
         world.operator_mode(Mode.MANUAL)
         world.rover.autopilot.operator_sticks(throttle, steering)
         world.run(1)
