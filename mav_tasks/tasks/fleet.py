@@ -56,7 +56,7 @@ class Fleet:
         return was_driven
 
     def last_halt(self, vehicle: int, *, now: float) -> LastHalt | None:
-        """Give the word after which the last run ended so soon that it may not have come; once."""
+        """Give a vehicle's last halt if it came within UNSEEN before now; None when asked again."""
         halt = self._halted.pop(vehicle, None)
         return halt if halt is not None and now - halt.at <= UNSEEN else None
 

@@ -90,7 +90,7 @@ def connect(it: MavProxy) -> None:
 def assert_nothing_lost(it: MavProxy, *, restarts: int = 0) -> None:
     """By its own count, by the log that it writes, and nothing in it that it cannot read.
 
-    The rover's numbers begin anew at each of its ``restarts``, which it counts as packets lost.
+    At each of its ``restarts`` the rover counts from 0 again: MAVProxy takes that for a loss.
     """
     link = it.link()
     count = int(link["packets"])

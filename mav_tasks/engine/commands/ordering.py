@@ -93,7 +93,7 @@ def has_left_before_halt(asked: Asked) -> bool:
 
 
 def is_overtaken(asked: Asked, *, now: float) -> bool:
-    """Return whether this word may have left before the last halt, whoever has said that."""
+    """Return whether this word may have left before the last halt, whoever sent the halt."""
     line = asked.sender.line
     number = line.number_of(asked.packet.seq)
     return line.sent_after(number, now=now) <= asked.vehicle.tasks.halts.at
