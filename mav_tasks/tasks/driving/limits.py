@@ -12,7 +12,7 @@ from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
 
 MARGIN = 0.05  # m left between a vehicle and its fence
 LATENCY = 0.3  # s in which a vehicle does not yet do what it is told; what it says is that old, too
-USUAL_AGE = 0.1  # s, of telemetry at 10 Hz: as much is in LATENCY; older, the way since then counts
+USUAL_AGE = 0.05  # s, of telemetry: as much is in LATENCY; if older, the way since then counts
 TURNS_ON = LATENCY + 0.3  # s in which a vehicle that is told to stand still turns
 APART = 0.1  # rad, at the most, between directions that are looked in
 CREEP = 0.02  # m/s; slower than this is standing

@@ -58,17 +58,20 @@ GROWS: dict[str, Delay] = {
 }
 
 
-@pytest.mark.parametrize("growth", GROWS)
+@pytest.mark.parametrize(
+    ("growth", "begins"),
+    [*((growth, 8.0) for growth in GROWS), *(("and shrinks", 8.0 + n / 2) for n in range(1, 8))],
+)
 @pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
 def test_a_delay_that_grows_leads_nobody_over_a_fence(
-    make_world: MakeWorld, persona: Persona, growth: str
+    make_world: MakeWorld, persona: Persona, growth: str, begins: float
 ) -> None:
     world = make_world(settings=BRISK, persona=persona)
     fenced(world, 40)
-    begin = world.now + 8.0
+    begin = world.now + begins
     world.net.buffers[DOWN] = Queue(lambda now: GROWS[growth](now - begin))
     reached = drive_at(world, 2.0, seconds=90)
-    print(f"{growth}: reached {reached:.1f} m of 40 m")
+    print(f"{growth}: reached {reached:.3f} m of 40 m")
     assert 2 < reached < 40
 
 
