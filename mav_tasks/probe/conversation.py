@@ -12,8 +12,9 @@ from mav_tasks.probe.others import SETPOINTS, Others
 from mav_tasks.probe.steps import Steps, Wait
 from mav_tasks.services.command_sender import Answered, CommandSender
 from mav_tasks.services.heartbeat import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
-from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
+from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.persona import Persona
+from mav_tasks.services.phase import Phase
 from mav_tasks.services.text_receiver import TextReceiver
 from mav_tasks.settings import Watch
 

@@ -20,7 +20,7 @@ from mav_tasks.probe.questions import (
 from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
 from mav_tasks.probe.wheel import DriveEnded, Wheel, is_fresh
-from mav_tasks.services.offboard import Phase
+from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Identity, Turning, Watch
 
 FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven

@@ -1,12 +1,13 @@
 """Driving a vehicle from outside: take control, stream velocity setpoints, hand back, stop.
 
-MAVLink guide, "Offboard Control Interface". Steps for ArduPilot: its GUIDED mode, one zero setpoint
-(it keeps a setpoint from before and would drive off when armed: observed), arm, zeros until seen
-armed, and only then motion. For PX4: HOLD, asked for even where it is shown (one that shows it
-because the setpoints were lost would drive again by itself when they return), arm, a second of
-zeros, OFFBOARD, motion. A mode or arm request is believed when a HEARTBEAT shows it, not when it is
-acknowledged. The caller calls one of ``take``, ``drive``, ``release`` or ``stop`` at each setpoint
-period; each does the next thing that is due.
+MAVLink guide, "Offboard Control Interface". First a heartbeat that comes from now on: whoever has
+taken the vehicle since the last one keeps it. Steps for ArduPilot: its GUIDED mode, one zero
+setpoint (it keeps a setpoint from before and would drive off when armed: observed), arm, zeros
+until seen armed, and only then motion. For PX4: HOLD, asked for even where it is shown (one that
+shows it because the setpoints were lost would drive again by itself when they return), arm, a
+second of zeros, OFFBOARD, motion. A mode or arm request is believed when a HEARTBEAT shows it, not
+when it is acknowledged. The caller calls one of ``take``, ``drive``, ``release`` or ``stop`` at
+each setpoint period; each does the next thing that is due.
 """
 
 from enum import Enum, auto
@@ -21,8 +22,10 @@ from mav_tasks.mavlink.messages import (
     SetPositionTargetLocalNed,
 )
 from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.news import AWAITED, News
 from mav_tasks.services.orders import STANDING, Orders, Posture, Speeds, to_stand
 from mav_tasks.services.persona import Persona
+from mav_tasks.services.phase import ENDED, STREAMING, TAKING, Phase
 from mav_tasks.settings import Watch
 
 STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirmed yet
@@ -33,49 +36,11 @@ ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
 #: times, that one is asked which shows the very mode still that it was to leave: nobody has acted
 INSISTS = 30
-SHOWN_LATELY = 2.5  # s since a heartbeat has shown it, of which one may be lost
-#: s after a request was last sent in which what it asks for may still come true: a copy of it may
-#: be late on the net. Longer, and a person who does the same would be taken for it.
-LATE = 0.3
-#: s after an accepted request in which a heartbeat may still show what was before: PX4 answers, and
-#: composes the heartbeat that it is asked for, before its mode has changed (1.17, SITL)
-SHOWN_LATE = 0.3
-UNANSWERED = 0.3  # s after which a request without an answer was heard, or lost
-AWAITED = 1.5  # s, the longest until a 1 Hz heartbeat shows what a disarming has done
 LEAD_GAP = 0.2  # s between zeros, after which the stream counts anew
 LEAD_IN = 1.0  # s of zeros before a mode that is entered only while setpoints stream
-UNSHOWN = -1  # no mode of any vehicle
 UNSTOPPED = 1.0  # s after which a STOP may depend on HOLD no more, where HOLD is not to be trusted
-
-
-class Phase(Enum):
-    """How far control of the vehicle has come."""
-
-    #: it is not ours; nothing is sent
-    IDLE = auto()
-    #: HOLD is asked for, to arm in it
-    ASKING_HOLD = auto()
-    #: arming is asked for, zeros are streamed
-    ASKING_ARM = auto()
-    #: armed in HOLD; zeros are streamed
-    LEADING_IN = auto()
-    #: our mode is asked for
-    ASKING_MODE = auto()
-    #: in our mode and seen armed: setpoints move it
-    CONTROL = auto()
-    #: standing, HOLD is asked for
-    RELEASING = auto()
-    #: HOLD seen after a release that disarms; disarming is asked for
-    DISARMING = auto()
-    #: STOP: zeros and HOLD until confirmed
-    STOPPING = auto()
-
-
 #: results of an arm request by a vehicle that may arm later: ArduPilot's, PX4's of two versions
 NOT_READY = frozenset({MavResult.FAILED, MavResult.TEMPORARILY_REJECTED, MavResult.DENIED})
-#: control is being taken
-TAKING = frozenset({Phase.ASKING_HOLD, Phase.ASKING_ARM, Phase.LEADING_IN, Phase.ASKING_MODE})
-STREAMING = frozenset({Phase.ASKING_ARM, Phase.LEADING_IN, Phase.CONTROL})
 
 
 class Refused(Enum):
@@ -96,15 +61,9 @@ class OffboardControl:
         self._orders = Orders(target, persona)
         self._sender = sender
         self._watch = watch
-        self._armed = False
-        self._mode, self._shown_at = UNSHOWN, -inf  # and when a heartbeat showed it last
-        #: whether a heartbeat shows what became of the last mode or disarm request of ours
-        self._is_settled = True
-        self._asked_mode: int | None = persona.hold_mode  # by the last request; None: disarming
-        self._settles_at = -inf  # a heartbeat from then on was sent after the request was heard
-        #: HOLD was shown when it was asked for: only the answer tells it from that of a failsafe
-        self._awaits_answer = False
-        self._last_was_awaited = False  # the latest heartbeat was the first to show it
+        self._news = News(persona)
+        self._looks_since = -inf  # s, while LOOKING
+        self._looks_back = False  # while LOOKING: it was being handed back, or stopped
         #: what decides which set-point asks it to stand
         self.posture = Posture()
         self._outgoing: list[Message] = []
@@ -119,20 +78,18 @@ class OffboardControl:
         self._was_heard_leading_in = False
         self._is_braking = False  # while STOPPING: zeros alone, as long as they slow it down
         self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
-        self._hold_at = self._disarm_at = -inf  # last asked for
-        self.mode_asked_at = self.arming_asked_at = -inf  #: s, the last time, of our mode
         self.phase = Phase.IDLE
         self.refused: Refused | None = None
         self._arm_result: int | None = None  # of the last arm request; None: no answer
         self.we_armed = False
 
     def __repr__(self) -> str:
-        return f"OffboardControl({self.phase.name}, mode={self._mode}, armed={self._armed})"
+        return f"OffboardControl({self.phase.name}, {self._news!r})"
 
     @property
     def in_control(self) -> bool:
         """Whether a non-zero setpoint may be sent."""
-        return self.phase is Phase.CONTROL and self._armed and self._in_our_mode
+        return self.phase is Phase.CONTROL and self._news.armed and self._news.in_our_mode
 
     @property
     def is_not_ready(self) -> bool:
@@ -156,8 +113,8 @@ class OffboardControl:
 
     @property
     def is_asking_mode(self) -> bool:
-        """Whether a mode is asked for, so as to get into control."""
-        return self.phase in (Phase.ASKING_HOLD, Phase.ASKING_MODE)
+        """Whether a mode is asked for, or about to be, so as to get into control."""
+        return self.phase in (Phase.LOOKING, Phase.ASKING_HOLD, Phase.ASKING_MODE)
 
     @property
     def is_streaming(self) -> bool:
@@ -166,15 +123,21 @@ class OffboardControl:
 
     @property
     def _may_arm_here(self) -> bool:
-        return self._in_hold if self._persona.arms_in_hold else self._in_our_mode
+        return self._news.in_hold if self._persona.arms_in_hold else self._news.in_our_mode
 
     @property
-    def _in_our_mode(self) -> bool:
-        return self._is_settled and self._mode == self._persona.control_mode
+    def _is_armed_in_hold(self) -> bool:
+        return self._news.in_hold and self._news.armed
 
     @property
-    def _in_hold(self) -> bool:
-        return self._is_settled and self._mode == self._persona.hold_mode
+    def mode_asked_at(self) -> float:
+        """When our mode was last asked for, s."""
+        return self._news.mode_asked_at
+
+    @property
+    def arming_asked_at(self) -> float:
+        """When arming was last asked for, s."""
+        return self._news.arming_asked_at
 
     def apply(self, watch: Watch) -> None:
         """Take new settings."""
@@ -184,22 +147,18 @@ class OffboardControl:
         """Speak otherwise from now on: other setpoints, to the same make of vehicle."""
         self._persona = persona
         self._orders = Orders(self._target, persona)
+        self._news.adopt(persona)
 
     def may_have_set(self, mode: int, *, now: float) -> bool:
         """Whether a change to this mode can be our own doing."""
         self._note_requests(now)
-        if mode not in (self._persona.hold_mode, self._persona.control_mode):
-            return False
-        asked_at = self._hold_at if mode == self._persona.hold_mode else self.mode_asked_at
-        is_awaited = self._last_was_awaited and mode == self._asked_mode
-        return now - asked_at <= LATE or (is_awaited and asked_at > -inf)
+        return self._news.may_be_our_mode(mode, now=now)
 
     def may_have_disarmed(self, *, now: float) -> bool:
         """Whether a disarming just seen can be our own doing."""
         self._note_requests(now)
-        since = now - self._disarm_at
-        is_awaited = self._last_was_awaited or self.phase is Phase.STOPPING
-        return since <= LATE or (is_awaited and since <= AWAITED)
+        is_stopping = self.phase is Phase.STOPPING
+        return self._news.may_be_our_disarming(is_stopping=is_stopping, now=now)
 
     def take_messages(self) -> list[Message]:
         """Give the setpoints to send since the last call."""
@@ -207,34 +166,25 @@ class OffboardControl:
         return outgoing
 
     def heard(self, *, armed: bool, mode: int, now: float) -> None:
-        """Take in what a HEARTBEAT of the vehicle says.
-
-        One that may have left before our last request was heard proves nothing about it: at 1 Hz
-        the last known mode is up to a second old.
-        """
-        self._last_was_awaited = not self._is_settled
-        is_old_news = self._awaits_answer and mode == self._persona.hold_mode
-        shows_it = not armed if self._asked_mode is None else mode == self._asked_mode
-        if now >= self._settles_at + (0.0 if shows_it else SHOWN_LATE) and not is_old_news:
-            self._is_settled = True
-        self._was_heard_leading_in = True
-        if self._armed and not armed:
+        """Take in what a HEARTBEAT of the vehicle says."""
+        if self._news.armed and not armed:
             self.we_armed = False
-        self._armed = armed
-        self._mode, self._shown_at = mode, now
+        self._news.heard(armed=armed, mode=mode, now=now)
+        self._was_heard_leading_in = True
+
+    def outdated(self, *, until: float) -> None:
+        """What is read until then has lain unread, and shows who had the vehicle before."""
+        self._news.outdated(until=until)
 
     def restarted(self) -> None:
         """The vehicle has restarted: what it showed before proves nothing any more."""
-        self._armed = self.we_armed = False
-        self._mode = UNSHOWN
+        self.we_armed = False
+        self._news.restarted()
 
     def answered(self, answer: Answered, *, now: float) -> None:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
         if answer.ack is not None and answer.ack.result == MavResult.ACCEPTED:
-            self._settles_at = min(self._settles_at, now)
-            if self._awaits_answer and answer.command == MavCmd.DO_SET_MODE:
-                self._awaits_answer = False
-                self._is_settled = True  # shown before, and heard that it is meant
+            self._news.accepted(is_mode=answer.command == MavCmd.DO_SET_MODE, now=now)
             return
         asked = {
             Phase.ASKING_HOLD: MavCmd.DO_SET_MODE,
@@ -252,7 +202,7 @@ class OffboardControl:
         """Somebody else has the vehicle, or may have: send not one thing more."""
         self._withdraw_requests()
         self._outgoing.clear()
-        self._awaits_answer = False
+        self._news.awaits_answer = False
         self.phase = Phase.IDLE
         self.refused = None
         self.we_armed = False
@@ -262,7 +212,7 @@ class OffboardControl:
 
         It may be a failsafe's, which ends as soon as a setpoint that is under way comes.
         """
-        self._hold_at = now
+        self._news.hold_asked_at = now
         until = now + self._watch.ask_vehicle
         self._request(self._orders.hold(), until=until, now=now, urgent=True)
 
@@ -275,7 +225,7 @@ class OffboardControl:
 
     def disarm_at_end(self) -> None:
         """Whoever armed the vehicle has done with it: it is disarmed when we hand it back."""
-        self.we_armed = self._armed
+        self.we_armed = self._news.armed
 
     def hand_over(self) -> None:
         """Somebody else goes on from the hand-back, and HOLD asked for again would undo it.
@@ -296,46 +246,61 @@ class OffboardControl:
         self._release_until = None
         if self.refused is not None:
             self.phase = Phase.IDLE
+        if self.phase in ENDED and not self._shows_whose_it_is(now):
+            self._look(now=now)
         match self.phase:
+            case Phase.LOOKING if not self._shows_whose_it_is(now):
+                if self._looks_back and self._news.mode == self._persona.control_mode:
+                    self._send_setpoint(STANDING)
             case Phase.DISARMING:  # seen through first: it could come true while we arm
                 self._end_disarming()
-            case Phase.ASKING_HOLD if not self._in_hold:
+            case Phase.ASKING_HOLD if not self._news.in_hold:
                 self._insist(Refused.MODE, now=now)
-            case Phase.ASKING_MODE if not self._in_our_mode and self._persona.arms_in_hold:
+            case Phase.ASKING_MODE if not self._news.in_our_mode and self._persona.arms_in_hold:
                 if now > self._led_at + LEAD_GAP:  # the stream has ended: what is asked for, too
                     self._lead_in(now=now)
                 else:
                     self._led_at = now
                     self._send_setpoint(STANDING)
                     self._insist(Refused.MODE, now=now)
-            case Phase.ASKING_MODE if not self._in_our_mode:
+            case Phase.ASKING_MODE if not self._news.in_our_mode:
                 self._insist(Refused.MODE, now=now)
-            case Phase.ASKING_ARM if self._may_arm_here and not self._armed:
+            case Phase.ASKING_ARM if self._may_arm_here and not self._news.armed:
                 self._send_setpoint(STANDING)
                 self._insist(Refused.ARM, now=now)
-            case Phase.LEADING_IN if self._in_hold and self._armed and self._is_leading_in(now):
+            case Phase.LEADING_IN if self._is_armed_in_hold and self._is_leading_in(now):
                 self._send_setpoint(STANDING)
             case Phase.CONTROL if self.in_control:
                 self._send_setpoint(STANDING)
             case _ if self._persona.arms_in_hold:
                 self._next_by_way_of_hold(may_arm=may_arm, now=now)
-            case Phase.ASKING_ARM if self._in_our_mode:
+            case Phase.ASKING_ARM if self._news.in_our_mode:
                 self._be_in_control()
-            case _ if self._in_our_mode:
+            case _ if self._news.in_our_mode:
                 self._begin_arming(may_arm=may_arm, now=now)
             case _:
                 self._begin_asking(Phase.ASKING_MODE, now=now)
                 self._ask_mode(now=now)
 
+    def _look(self, *, now: float) -> None:
+        """Await a heartbeat: the last is up to a second old, and a person may have it since."""
+        self._looks_back = self.phase is not Phase.IDLE
+        self._begin_asking(Phase.LOOKING, now=now)
+        self._looks_since = now
+
+    def _shows_whose_it_is(self, now: float) -> bool:
+        since = self._looks_since if self.phase is Phase.LOOKING else now
+        return self._news.is_newer_than(since)
+
     def _next_by_way_of_hold(self, *, may_arm: bool, now: float) -> None:
         """The next step of HOLD, arm, zeros, our mode; zeros at each, which do no harm."""
-        if self._armed and self._in_our_mode:
+        if self._news.armed and self._news.in_our_mode:
             self._be_in_control()
-        elif self.phase is Phase.ASKING_HOLD and not self._armed:
+        elif self.phase is Phase.ASKING_HOLD and not self._news.armed:
             self._begin_arming(may_arm=may_arm, now=now)
-        elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._in_hold:
+        elif self.phase in (Phase.ASKING_HOLD, Phase.ASKING_ARM) and self._news.in_hold:
             self._lead_in(now=now)
-        elif self.phase is Phase.LEADING_IN and self._in_hold and self._armed:
+        elif self.phase is Phase.LEADING_IN and self._is_armed_in_hold:
             self._withdraw(MavCmd.DO_REPOSITION)
             self._begin_asking(Phase.ASKING_MODE, now=now)
             self._send_setpoint(STANDING)
@@ -389,7 +354,9 @@ class OffboardControl:
         self._note_requests(now)
         self.refused = None
         match self.phase:
-            case Phase.ASKING_HOLD | Phase.ASKING_MODE:
+            case Phase.LOOKING if not self._news.in_our_mode and not self._looks_back:
+                self.phase = Phase.IDLE  # nothing was asked of it yet
+            case Phase.LOOKING | Phase.ASKING_HOLD | Phase.ASKING_MODE:
                 self.begin_release(now=now)
             case Phase.ASKING_ARM | Phase.LEADING_IN | Phase.CONTROL:
                 self._send_setpoint(STANDING)
@@ -401,13 +368,13 @@ class OffboardControl:
                     self.begin_release(now=now)
             case Phase.STOPPING:  # continued before it was confirmed
                 self.begin_release(now=now)
-            case Phase.RELEASING if self._in_hold:
+            case Phase.RELEASING if self._news.in_hold:
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self._end_release(disarm=disarm, now=now)
             case Phase.RELEASING if self._gives_up_hold(now):
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self.phase = Phase.IDLE
-            case Phase.RELEASING if now >= self._ask_until and self._is_silent(now):
+            case Phase.RELEASING if now >= self._ask_until and self._news.is_silent(now):
                 self._ask_until, self._asks_left = now, INSISTS  # until it is heard again
             case Phase.RELEASING:
                 self._send_setpoint(STANDING)
@@ -419,7 +386,7 @@ class OffboardControl:
 
     def _end_disarming(self) -> None:
         """Believe it when it is shown, by a heartbeat that is no older than the request."""
-        if self._is_settled and not self._armed:
+        if self._news.is_settled and not self._news.armed:
             self.phase = Phase.IDLE
             self.we_armed = False
 
@@ -428,22 +395,18 @@ class OffboardControl:
         self._withdraw_requests()
         self.phase = Phase.RELEASING
         self.refused = None
-        self._ask_until, self._left_mode = now + RELEASE_LIMIT, self._mode
+        self._ask_until, self._left_mode = now + RELEASE_LIMIT, self._news.mode
         self._asks_left = INSISTS
-        self._unsettle(now, awaits_hold=True)
+        self._news.unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=RELEASE_REPEAT)
 
     def _gives_up_hold(self, now: float) -> bool:
         """Whether it is time to ask a vehicle that does not show HOLD no more."""
-        if self._in_our_mode or self._is_silent(now):
+        if self._news.in_our_mode or self._news.is_silent(now):
             return False
-        shows_still = self._mode == self._left_mode
+        shows_still = self._news.mode == self._left_mode
         return now >= self._ask_until and not (shows_still and self._asks_left > 0)
-
-    def _is_silent(self, now: float) -> bool:
-        """Whether no heartbeat has shown its mode lately."""
-        return now - self._shown_at > SHOWN_LATELY
 
     def begin_stop(self, *, now: float, brake_for: float = 0.0) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
@@ -462,7 +425,7 @@ class OffboardControl:
             self._send_setpoint(STANDING)
             self._next_hold_at = now + brake_for
             return
-        self._unsettle(now, awaits_hold=True)
+        self._news.unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
         self._request_hold(now=now, again_after=STOP_REPEAT)
 
@@ -470,14 +433,14 @@ class OffboardControl:
         """While STOPPING: ask for HOLD, braking has no effect or was enough."""
         if self.phase is Phase.STOPPING and self._is_braking:
             self._is_braking = False
-            self._unsettle(now, awaits_hold=True)
+            self._news.unsettle(now, awaits_hold=True)
             self._send_setpoint(STANDING)
             self._request_hold(now=now, again_after=STOP_REPEAT)
 
     def disarm_now(self, *, now: float) -> None:
         """It moves in spite of all: ask for disarming, whoever armed it, in whatever phase."""
         if self.phase is Phase.IDLE:
-            self._unsettle(now)
+            self._news.unsettle(now)
         self._request_disarming(now=now)
 
     def stop(self, *, still: bool, heard: bool, now: float) -> None:
@@ -489,7 +452,7 @@ class OffboardControl:
         self._note_requests(now)
         if self.phase is not Phase.STOPPING:
             return
-        if heard and still and (self._in_hold or self._is_disarmed_by_stop):
+        if heard and still and (self._news.in_hold or self._is_disarmed_by_stop):
             self._withdraw_requests()
             self.phase = Phase.IDLE
             return
@@ -516,15 +479,15 @@ class OffboardControl:
         """Remember until when what we ask for was still being asked for."""
         match self.phase:
             case Phase.ASKING_MODE:
-                self.mode_asked_at = now
+                self._news.mode_asked_at = now
             case Phase.STOPPING if self._is_braking:
                 pass  # HOLD is not asked for yet: who shows it was switched by a person
             case Phase.ASKING_HOLD | Phase.RELEASING | Phase.STOPPING:
-                self._hold_at = now
+                self._news.hold_asked_at = now
             case Phase.DISARMING:
-                self._disarm_at = now
+                self._news.disarming_asked_at = now
             case Phase.ASKING_ARM if self.we_armed:
-                self.arming_asked_at = now
+                self._news.arming_asked_at = now
 
     def _begin_asking(self, phase: Phase, *, now: float) -> None:
         self._withdraw_requests()
@@ -537,7 +500,7 @@ class OffboardControl:
         """In the mode for it: clear what setpoint there was, then see to arming."""
         self._begin_asking(Phase.ASKING_ARM, now=now)
         self._send_setpoint(STANDING)
-        if not self._armed and may_arm:
+        if not self._news.armed and may_arm:
             self.we_armed = True
             self._ask_arming(now=now)
 
@@ -548,7 +511,7 @@ class OffboardControl:
         if now >= self._ask_until:
             self.refused = what
             self.we_armed = False
-            self._awaits_answer = False
+            self._news.awaits_answer = False
         elif now >= self._ask_again_at:
             self._ask_again_at = None
             if what is Refused.ARM:
@@ -559,63 +522,52 @@ class OffboardControl:
                 self._ask_mode(now=now)
 
     def _ask_mode(self, *, now: float) -> None:
-        self.mode_asked_at = now
-        self._unsettle(now, mode=self._persona.control_mode)
+        self._news.mode_asked_at = now
+        self._news.unsettle(now, mode=self._persona.control_mode)
         self._request(self._orders.our_mode(), until=self._ask_until, now=now)
 
     def _ask_hold(self, *, now: float) -> None:
-        self._hold_at = now
-        self._unsettle(now, awaits_hold=True)
+        self._news.hold_asked_at = now
+        self._news.unsettle(now, awaits_hold=True)
         self._request(self._orders.hold(), until=self._ask_until, now=now)
 
     def _ask_arming(self, *, now: float) -> None:
-        self.arming_asked_at = now
+        self._news.arming_asked_at = now
         self._request(self._orders.arming(arm=True), until=self._ask_until, now=now)
 
     def _end_release(self, *, disarm: bool, now: float) -> None:
         if disarm and self.we_armed:  # also where that was asked for and is not seen yet
             self.phase = Phase.DISARMING
-            self._unsettle(now)
+            self._news.unsettle(now)
             self._request_disarming(now=now)
         else:
             self.phase = Phase.IDLE
 
     def _request_hold(self, *, now: float, again_after: float) -> None:
-        self._hold_at = now
+        self._news.hold_asked_at = now
         self._next_hold_at = now + again_after
         until = now + self._watch.ask_vehicle
         self._request(self.hold_request(), until=until, now=now, urgent=True)
-        if self._persona.drives_in_hold and self._mode == self._persona.hold_mode:
+        if self._persona.drives_in_hold and self._news.mode == self._persona.hold_mode:
             staying = self._orders.staying(changes_mode=True)
             self._request(staying, until=until, now=now, urgent=True)
 
     def _request_disarming(self, *, now: float) -> None:
-        self._disarm_at = now
+        self._news.disarming_asked_at = now
         until = now + self._watch.ask_vehicle
         self._request(self._orders.arming(arm=False), until=until, now=now, urgent=True)
 
     def _is_hold_in_vain(self, now: float) -> bool:
         """Whether a vehicle whose HOLD is not to be trusted has not shown it in time."""
-        if now < self._disarm_by or not self._armed or self._in_hold:
+        if now < self._disarm_by or not self._news.armed or self._news.in_hold:
             return False
         # a heartbeat each second may be a little late, and show that all is well
-        return self._is_settled or now >= self._disarm_by + AWAITED - UNSTOPPED
+        return self._news.is_settled or now >= self._disarm_by + AWAITED - UNSTOPPED
 
     @property
     def _is_disarmed_by_stop(self) -> bool:
-        is_news = self._is_settled or self._awaits_answer
-        return self._persona.stop_disarms and is_news and not self._armed
-
-    def _unsettle(self, now: float, *, mode: int | None = None, awaits_hold: bool = False) -> None:
-        """What the next heartbeats say may be from before the request that leaves now.
-
-        ``mode`` is what is asked for; None: disarming.
-        """
-        self._asked_mode = self._persona.hold_mode if awaits_hold else mode
-        is_shown = self._mode == self._persona.hold_mode
-        self._awaits_answer = awaits_hold and is_shown and self._persona.has_loss_failsafe
-        self._is_settled = False
-        self._settles_at = now + UNANSWERED
+        is_news = self._news.is_settled or self._news.awaits_answer
+        return self._persona.stop_disarms and is_news and not self._news.armed
 
     def _request(
         self,
@@ -636,7 +588,7 @@ class OffboardControl:
 
     @property
     def _standing(self) -> Speeds:
-        return to_stand(self._persona, self.posture, armed=self._armed)
+        return to_stand(self._persona, self.posture, armed=self._news.armed)
 
     def _send_setpoint(self, wanted: Speeds) -> None:
         wanted = self._standing if wanted == STANDING else wanted

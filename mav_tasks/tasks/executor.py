@@ -49,6 +49,7 @@ class Executor:
         self._resumes_by_itself = False
         self._lost_at: Pose | None = None  # where it was last, before the loss
         self._was_silent = False  # during it
+        self._untaken_in: ModeKind | None = None  # when it was lost, disarmed
         self._meter: TimingMeter | None = None  # while EXECUTING
         self._taking_since = 0.0  # while STARTING, or EXECUTING and out of control
         self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
@@ -320,6 +321,7 @@ class Executor:
             lost = R.POSITION_LOST
         if lost:
             self._lost_at, self._was_silent = None if motion is None else motion.pose, False
+            self._untaken_in = None if seen.armed else seen.mode
             self.pause(lost, actor=SERVER, now=now)
         return bool(lost)
 
@@ -332,7 +334,10 @@ class Executor:
             self._finish(S.FAILED, R.LINK_TIMEOUT, actor=SERVER, now=now)
             return
         self._was_silent |= not seen.heard
-        ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD) and seen.armed
+        if seen.armed:
+            ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD)
+        else:  # as it was when it was lost, before it could be taken
+            ours = seen.mode is self._untaken_in
         task = self._begun(S.PAUSED)
         if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):
             self._lost_until = now

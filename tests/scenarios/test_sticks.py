@@ -65,7 +65,7 @@ def test_a_stick_held_forward_ends_in_hold(
 ) -> None:
     world = with_transmitter(make_world, frame)
     world.client.move(10.0)
-    world.run(0.05 if when == "starting" else 4.0)
+    world.run(0.1 if when == "starting" else 4.0)
     if when == "cancelled":
         world.client.command(CANCEL, 1)
     world.rover.autopilot.operator_pulses(FORWARD, CENTRE)

@@ -162,7 +162,7 @@ def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: 
     world.client.move(5)
     if phase == "ASKING_MODE":
         world.fault(Faults(deaf=True))
-        world.run(0.2)
+        world.until(lambda: world.control() == phase, within=2)
     else:
         world.until(lambda: world.rover.autopilot.mode is Mode.GUIDED, within=1)
         world.fault(Faults(deaf=True))

@@ -5,13 +5,14 @@ from collections.abc import Hashable
 from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
-from mav_tasks.services.offboard import Phase
+from mav_tasks.services.phase import Phase
 from mav_tasks.tasks.lifecycle import RUNNING, TAKEN, TaskReason, TaskState
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import ModeKind
 
 GRIPS = {
     Phase.IDLE: Grip.FREE,
+    Phase.LOOKING: Grip.TAKING,
     Phase.ASKING_HOLD: Grip.TAKING,
     Phase.ASKING_ARM: Grip.TAKING,
     Phase.LEADING_IN: Grip.TAKING,

@@ -3,7 +3,7 @@
 from collections.abc import Hashable
 
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.services.offboard import Phase
+from mav_tasks.services.phase import Phase
 
 
 class MotionRights:

@@ -10,8 +10,8 @@ from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
-from mav_tasks.services.offboard import Phase
 from mav_tasks.services.orders import Posture, Speeds
+from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.driving.guidance import ZERO
 from mav_tasks.tasks.goal import ends_at_home
@@ -158,7 +158,10 @@ class Pilot:
         control = parts.control
         match demand.kind:
             case DemandKind.TAKE:
+                was_looking = control.phase is Phase.LOOKING
                 control.take(may_arm=seen.may_arm, now=now)
+                if control.phase is Phase.LOOKING and not was_looking:
+                    parts.requests.ask_to_show(now=now)
             case DemandKind.DRIVE:
                 wanted = demand.velocity
                 if not wanted.is_zero:

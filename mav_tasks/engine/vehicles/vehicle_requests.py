@@ -20,9 +20,10 @@ from mav_tasks.services.interval_requester import IntervalRequester
 from mav_tasks.services.loss_failsafe import LossFailsafe
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import Done, MissionUploader
-from mav_tasks.services.offboard import OffboardControl, Phase, is_request_of
+from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.orders import moves
 from mav_tasks.services.persona import Persona
+from mav_tasks.services.phase import Phase
 from mav_tasks.services.turning_kind import TurningKind
 from mav_tasks.settings import Watch
 

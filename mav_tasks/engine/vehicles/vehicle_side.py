@@ -258,6 +258,7 @@ class VehicleSide:
         self._old_until, self._stood_for = now + OLD_NEWS, now - due
         for vehicle in self.all:
             self.agenda.touch(vehicle)
+            vehicle.control.outdated(until=self._old_until)
             vehicle.joint.check_late(now=now)
 
     def may_have_waited(self, *, now: float) -> float:

@@ -11,7 +11,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.car import Car
-from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long, setpoint
+from tests.kit.client import ACCEPTED, GUIDED, HOLD, MOVE, command_long, setpoint
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World
 from tests.scenarios.attacks.test_late_arming import is_arming, mode_of
@@ -239,3 +239,51 @@ def test_a_second_controller_takes_a_streaming_client_the_rover(world: World) ->
     world.client.stream(setpoint(0.5), rate=10)
     world.run(4)
     assert abs(world.truth.north) < 0.1
+
+
+@EVERY_MAKE
+@pytest.mark.parametrize("shows_on_request", [True, False])
+@pytest.mark.parametrize("word", ["a task", "a continue", "the next task"])
+@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_who_takes_it_just_before_we_do_keeps_it(
+    make_world: MakeWorld, persona: Persona, shows_on_request: bool, word: str, phase: float
+) -> None:
+    """The last heartbeat may be a second old: it does not show whose the rover is now."""
+    world = make_world(persona=persona, shows_on_request=shows_on_request)
+    if word != "a task":
+        driving(world)
+        if word == "a continue":
+            world.client.pause()
+        else:
+            world.client.command(CANCEL, 1)
+    world.run(6 + phase)
+    world.operator_mode(Mode.MANUAL)
+    world.operator_arm(True)
+    world.run(0.05)
+    if word == "a continue":
+        world.client.proceed()
+    else:
+        world.client.move(2.0)
+    assert stays(world, 6)
+    assert mode_of(world) is Mode.MANUAL
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=["ap", "px4"])
+@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_who_takes_it_while_the_server_stands_still_keeps_it(
+    make_world: MakeWorld, persona: Persona, phase: float
+) -> None:
+    """Its receive buffer is full of what came first, and what shows who has the rover is lost."""
+    world = make_world(persona=persona, shows_on_request=False)
+    world.client.arm()
+    world.run(3 + phase)
+    world.client.command(MOVE, 2.0, 0, 0, 0, 0, 6.0, 5)
+    world.run(1)
+    world.suspend_server(2)
+    world.watched.loses = lambda source, *_: source == "rover1"
+    world.operator_mode(Mode.MANUAL)
+    world.operator_arm(True)
+    world.suspend_server(5)
+    mend(world)
+    assert stays(world, 6)
+    assert mode_of(world) is Mode.MANUAL

@@ -11,9 +11,11 @@ from mav_tasks.mavlink.messages import (
 )
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_sender import CommandSender
-from mav_tasks.services.offboard import UNANSWERED, OffboardControl, Phase, Refused
+from mav_tasks.services.news import UNANSWERED
+from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.orders import Speeds
 from mav_tasks.services.persona import ARDUPILOT, Persona
+from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Watch
 
 PERIOD = 0.05  # s

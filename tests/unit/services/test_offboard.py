@@ -5,9 +5,10 @@ from math import inf, nan
 import pytest
 
 from mav_tasks.mavlink.enums import MavCmd, MavResult
-from mav_tasks.services.offboard import Phase, Refused
+from mav_tasks.services.offboard import Refused
 from mav_tasks.services.orders import Speeds
 from mav_tasks.services.persona import ARDUPILOT
+from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Watch
 from tests.unit.services.control_rig import PERIOD, Rig
 
@@ -36,6 +37,47 @@ class TestTakingControl:
         rig.take()
         rig.drive(0.5, -0.1)
         assert rig.story() == ["zero", "velocity 0.5 -0.1"]
+
+    @pytest.mark.parametrize("mode", [HOLD, GUIDED])
+    def test_waits_for_a_heartbeat_that_shows_whose_it_is_now(self, mode: int) -> None:
+        rig = Rig(mode=mode, armed=True)
+        rig.now += 1.0
+        for _ in range(10):
+            rig.take()
+            rig.tick()
+        assert (rig.phase, rig.story()) == (Phase.LOOKING, [])
+        rig.hear()
+        rig.take()
+        assert rig.story() == (["our mode"] if mode == HOLD else ["zero"])
+
+    def test_believes_no_heartbeat_that_had_lain_unread(self) -> None:
+        rig = Rig()
+        rig.control.outdated(until=rig.now + 1.0)
+        rig.take()
+        rig.hear()
+        rig.take()
+        assert (rig.phase, rig.story()) == (Phase.LOOKING, [])
+        rig.now += 1.0
+        rig.hear()
+        rig.take()
+        assert rig.story() == ["our mode"]
+
+    def test_that_is_not_wanted_any_more_asks_nothing_of_it(self) -> None:
+        rig = Rig()
+        rig.now += 1.0
+        rig.take()
+        rig.release()
+        assert (rig.phase, rig.story()) == (Phase.IDLE, [])
+
+    def test_while_it_is_handed_back_keeps_it_standing_meanwhile(self) -> None:
+        rig = Rig().in_control()
+        rig.release()
+        rig.story()
+        rig.now += 1.0
+        rig.take()
+        assert (rig.phase, rig.story()) == (Phase.LOOKING, ["zero"])
+        rig.release()
+        assert (rig.phase, rig.story()) == (Phase.RELEASING, ["zero", "HOLD"])
 
     def test_believes_the_heartbeat_not_the_ack(self) -> None:
         rig = Rig()

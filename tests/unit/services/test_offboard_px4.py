@@ -6,9 +6,11 @@ import pytest
 
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import SetPositionTargetLocalNed
-from mav_tasks.services.offboard import AWAITED, LEAD_IN, UNSTOPPED, Phase, Refused
+from mav_tasks.services.news import AWAITED
+from mav_tasks.services.offboard import LEAD_IN, UNSTOPPED, Refused
 from mav_tasks.services.orders import STANDING, Posture, Speeds, moves
 from mav_tasks.services.persona import GENERIC, PX4, Persona
+from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Watch
 from tests.unit.services.control_rig import PERIOD, Rig
 
