@@ -32,9 +32,10 @@ class Times:
         terms = task.terms
         if terms.start_utc is not None or terms.start_at is not None:
             heappush(self._starts, (self.start(terms), task.id))
+            self._look()
         if terms.deadline is not None:
             heappush(self._deadlines, (terms.deadline, task.id))
-        self._look()
+            self._look()
 
     def _look(self) -> None:
         first_start = self._starts[0][0] if self._starts else inf

@@ -101,13 +101,14 @@ class WaitingRoom:
         queueing = self._settings.queueing
         if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
             raise full(queueing.capacity)
-        if self._of_owner.get(draft.submitter.owner, 0) >= queueing.quota:
+        owner = draft.submitter.owner
+        if self._of_owner.get(owner, 0) >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: {queueing.quota} tasks of this client wait")
         if draft.terms.after:
             self._dependencies.check(draft.terms.after)
         state = self._state_by(draft.terms, now=now)
         task = self._book.submit(draft, state=state, now=now)
-        self._enter(task, now=now)
+        self._enter(task, owner, now=now)
         if state is S.QUEUED:  # nobody is woken: it is not durable yet
             self._line_up(task)
         return task
@@ -118,7 +119,7 @@ class WaitingRoom:
         for task in waiting:
             due = self.times.start(task.terms)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
-            self._enter(task, now=came_at)
+            self._enter(task, task.submitter.owner, now=came_at)
             if task.id in self._dependencies:  # after a modification, in any order
                 self._lift(task.id)
         ready: dict[int, list[Entry]] = {}
@@ -139,11 +140,10 @@ class WaitingRoom:
             else:
                 self._settle(task, now=now)
 
-    def _enter(self, task: Task, *, now: float) -> None:
+    def _enter(self, task: Task, owner: str, *, now: float) -> None:
         own = _own_rank(self._settings, task, now)
         self._waiters[task.id] = _Waiter(now, own, own)
         self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
-        owner = task.submitter.owner
         self._of_owner[owner] = self._of_owner.get(owner, 0) + 1
         terms = task.terms
         self.times.note(task)

@@ -232,7 +232,7 @@ class Commands:
             return
         held_at = asked.vehicle.hold_before.since
         # one from before a HOLD, or a copy of one, says nothing about that
-        is_older = has_left_before_halt(asked)
+        is_older = has_left_before_halt(asked, now=now)
         is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
         self._submissions.submit(asked, now=now)
         if not is_older:

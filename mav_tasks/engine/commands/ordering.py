@@ -86,17 +86,16 @@ def why_older(asked: Asked, *, now: float) -> str:
     return f"{halts.words} came since: {AGAIN}"
 
 
-def has_left_before_halt(asked: Asked) -> bool:
-    """Return whether the last halt is the same sender's, and this word had left before it."""
+def has_left_before_halt(asked: Asked, *, anybodys: bool = False, now: float) -> bool:
+    """Return whether the last halt is the same sender's, and this word had left before it.
+
+    With ``anybodys`` also whether it may have left before, whoever sent that halt.
+    """
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
-    return halts.by is asked.sender and line.number_of(asked.packet.seq) < halts.number
-
-
-def is_overtaken(asked: Asked, *, now: float) -> bool:
-    """Return whether this word may have left before the last halt, whoever sent the halt."""
-    line = asked.sender.line
     number = line.number_of(asked.packet.seq)
-    return line.sent_after(number, now=now) <= asked.vehicle.tasks.halts.at
+    if halts.by is asked.sender and number < halts.number:
+        return True
+    return anybodys and line.sent_after(number, now=now) <= halts.at
 
 
 def note_halt(asked: Asked, *, before: int) -> None:

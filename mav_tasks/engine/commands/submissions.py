@@ -11,7 +11,6 @@ from mav_tasks.engine.commands.goals import wish_of
 from mav_tasks.engine.commands.ordering import (
     AGAIN,
     has_left_before_halt,
-    is_overtaken,
     why_older,
 )
 from mav_tasks.engine.commit_gate import CommitGate
@@ -119,7 +118,7 @@ class Submissions:
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
         waits = bool(vehicle.tasks.paused)  # nothing moves by it before a word that lets go
-        if has_left_before_halt(asked) or (not waits and is_overtaken(asked, now=now)):
+        if has_left_before_halt(asked, anybodys=not waits, now=now):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came since: {AGAIN}")
         task = self.take_in(
             asked.rights,
