@@ -43,10 +43,12 @@ class Takeovers:
         """
         parts = self._parts
         mode, persona = parts.monitor.custom_mode, parts.persona
-        if parts.tasks.paused in TAKEN or not parts.tasks.terms.may_be_armed:
+        is_taken = parts.tasks.paused in TAKEN
+        if is_taken or not parts.tasks.terms.may_be_armed:
             parts.withdraw_arming(now=now)
-        # it holds because set-points were lost, and would follow them again if one came
-        is_lost = persona.has_loss_failsafe and mode == persona.hold_mode
+        # it holds because set-points were lost, and would follow them again if one came; ours to
+        # one that somebody has taken had ended before
+        is_lost = persona.has_loss_failsafe and mode == persona.hold_mode and not is_taken
         words = (
             f"is in {persona.mode_name(mode)}, by its failsafe or by somebody, and is left to it:"
             " HOLD stops it, then release its task"

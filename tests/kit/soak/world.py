@@ -181,8 +181,12 @@ class SoakWorld(World):
         self.halts[number - 1].person("HOLD at the rover", drives=drives, now=self.now)
 
     def person_arms(self, number: int, *, armed: bool) -> None:
-        """Let a person arm or disarm a rover."""
-        self.rovers[number - 1].autopilot.operator_arm(armed, now=self.now)
+        """Let a person arm or disarm a rover; what changes nothing nobody can see."""
+        autopilot = self.rovers[number - 1].autopilot
+        was_armed = autopilot.armed
+        autopilot.operator_arm(armed, now=self.now)
+        if autopilot.armed is was_armed:
+            return
         self.halts[number - 1].person("disarmed at the rover", drives=armed, now=self.now)
 
     def _restart(self, *, away: float) -> None:
