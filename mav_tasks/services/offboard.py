@@ -62,7 +62,8 @@ class OffboardControl:
         self._sender = sender
         self._watch = watch
         self._news = News(persona)
-        self._looks_since = -inf  # s, while LOOKING
+        #: s, since when a heartbeat is awaited that shows whose it is
+        self.looks_since = -inf
         self._looks_back = False  # while LOOKING: it was being handed back, or stopped
         #: what decides which set-point asks it to stand
         self.posture = Posture()
@@ -75,7 +76,6 @@ class OffboardControl:
         self._release_until: float | None = None  # zeros only, until then at the longest
         self._lead_until = 0.0  # zeros only, before our mode is asked for
         self._led_at = 0.0  # the last of them
-        self._was_heard_leading_in = False
         self._is_braking = False  # while STOPPING: zeros alone, as long as they slow it down
         self._disarm_by = inf  # while STOPPING: not seen in HOLD by then, it is disarmed
         self.phase = Phase.IDLE
@@ -95,6 +95,11 @@ class OffboardControl:
     def is_not_ready(self) -> bool:
         """Return whether arming was refused in words that do not say "never"."""
         return self.refused is Refused.ARM and self._arm_result in NOT_READY
+
+    @property
+    def is_untouched(self) -> bool:
+        """Whether nothing has been asked of a vehicle that is being taken."""
+        return self.phase is Phase.LOOKING and not self._looks_back
 
     @property
     def is_engaged(self) -> bool:
@@ -124,6 +129,14 @@ class OffboardControl:
     @property
     def _may_arm_here(self) -> bool:
         return self._news.in_hold if self._persona.arms_in_hold else self._news.in_our_mode
+
+    @property
+    def _moves_in_hold(self) -> bool:
+        return self._persona.drives_in_hold and self._news.armed
+
+    @property
+    def _may_move(self) -> bool:
+        return self._news.armed or self._news.in_our_mode
 
     @property
     def _is_armed_in_hold(self) -> bool:
@@ -170,7 +183,6 @@ class OffboardControl:
         if self._news.armed and not armed:
             self.we_armed = False
         self._news.heard(armed=armed, mode=mode, now=now)
-        self._was_heard_leading_in = True
 
     def outdated(self, *, until: float) -> None:
         """What is read until then has lain unread, and shows who had the vehicle before."""
@@ -286,10 +298,10 @@ class OffboardControl:
         """Await a heartbeat: the last is up to a second old, and a person may have it since."""
         self._looks_back = self.phase is not Phase.IDLE
         self._begin_asking(Phase.LOOKING, now=now)
-        self._looks_since = now
+        self.looks_since = now
 
     def _shows_whose_it_is(self, now: float) -> bool:
-        since = self._looks_since if self.phase is Phase.LOOKING else now
+        since = self.looks_since if self.phase is Phase.LOOKING else now
         return self._news.is_newer_than(since)
 
     def _next_by_way_of_hold(self, *, may_arm: bool, now: float) -> None:
@@ -326,18 +338,21 @@ class OffboardControl:
             self._request(staying, until=now + LEAD_IN, now=now)
         self._begin_asking(Phase.LEADING_IN, now=now)
         self._lead_until, self._led_at = now + LEAD_IN, now
-        self._was_heard_leading_in = False
         self._send_setpoint(STANDING)
 
     def _is_leading_in(self, now: float) -> bool:
-        """Whether the stream has not lasted yet, or nothing was heard of the vehicle meanwhile.
+        """Whether the stream has not lasted yet, or nothing was heard of the vehicle after it.
 
-        Somebody may have taken it since, and a mode is not asked for on old news.
+        Somebody may have taken it meanwhile, and a mode is not asked for on old news.
         """
         if now > self._led_at + LEAD_GAP:
             self._lead_until = now + LEAD_IN
         self._led_at = now
-        return now < self._lead_until or not self._was_heard_leading_in
+        if now < self._lead_until:
+            return True
+        if self.looks_since < self._lead_until:
+            self.looks_since = now
+        return not self._news.is_newer_than(self.looks_since)
 
     def drive(self, wanted: Speeds) -> None:
         """Send a velocity setpoint; zeros unless ``in_control``."""
@@ -345,18 +360,32 @@ class OffboardControl:
             self._release_until = None
             self._send_setpoint(wanted if self.in_control and wanted.is_finite else STANDING)
 
-    def release(self, *, still: bool, disarm: bool, now: float, is_slowing: bool = False) -> None:
+    def release(
+        self,
+        *,
+        still: bool,
+        disarm: bool,
+        now: float,
+        is_slowing: bool = False,
+        is_deaf: bool = False,
+    ) -> None:
         """Zeros until the vehicle stands, then HOLD until seen, then nothing more.
 
         A vehicle that cannot be seen to stand gets HOLD after a while all the same, later while it
-        ``is_slowing``. With ``disarm`` a vehicle that we armed is disarmed in the end.
+        ``is_slowing``. With ``disarm`` a vehicle that we armed is disarmed in the end. One that is
+        armed and does not follow set-points yet may be driving to a place: it gets HOLD at once,
+        unless we are ``is_deaf`` to who has taken it.
         """
         self._note_requests(now)
         self.refused = None
         match self.phase:
-            case Phase.LOOKING if not self._news.in_our_mode and not self._looks_back:
-                self.phase = Phase.IDLE  # nothing was asked of it yet
+            case Phase.LOOKING if self.is_untouched and (is_deaf or not self._may_move):
+                self.phase = Phase.IDLE
             case Phase.LOOKING | Phase.ASKING_HOLD | Phase.ASKING_MODE:
+                self.begin_release(now=now)
+            case Phase.ASKING_ARM | Phase.LEADING_IN if (
+                self._persona.drives_in_hold and not is_deaf
+            ):
                 self.begin_release(now=now)
             case Phase.ASKING_ARM | Phase.LEADING_IN | Phase.CONTROL:
                 self._send_setpoint(STANDING)

@@ -49,7 +49,7 @@ class Executor:
         self._resumes_by_itself = False
         self._lost_at: Pose | None = None  # where it was last, before the loss
         self._was_silent = False  # during it
-        self._untaken_in: ModeKind | None = None  # when it was lost, disarmed
+        self._untaken_in: ModeKind | None = None  # when it was lost, and nothing was asked of it
         self._meter: TimingMeter | None = None  # while EXECUTING
         self._taking_since = 0.0  # while STARTING, or EXECUTING and out of control
         self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
@@ -321,7 +321,7 @@ class Executor:
             lost = R.POSITION_LOST
         if lost:
             self._lost_at, self._was_silent = None if motion is None else motion.pose, False
-            self._untaken_in = None if seen.armed else seen.mode
+            self._untaken_in = seen.mode if seen.is_untouched and not seen.armed else None
             self.pause(lost, actor=SERVER, now=now)
         return bool(lost)
 

@@ -47,6 +47,7 @@ class VehicleView:
     is_unknown: bool = False  # it has yet to say whether it is the one whose tasks these are
     is_not_ready: bool = False  # the refusal is of arming, and may be another one later
     why_not_ready: str = ""  # in the vehicle's own words, as far as it has said lately
+    is_untouched: bool = False  # nothing has been asked of it yet, while it is being taken
     is_booting: bool = False  # it shows that it is, and takes no mode yet
     drives_on: bool = False  # it is not known to stand when nothing is asked of it, and must
 

@@ -128,6 +128,7 @@ class Parts:
         return VehicleView(
             heard=monitor.is_heard(now=now),
             mode=self.authority.kind_of(mode, armed=monitor.armed),
+            is_untouched=control.is_untouched,
             is_booting=mode == persona.booting_mode,
             armed=self.is_armed(now=now),
             may_arm=self.authority.may_arm,

@@ -158,9 +158,9 @@ class Pilot:
         control = parts.control
         match demand.kind:
             case DemandKind.TAKE:
-                was_looking = control.phase is Phase.LOOKING
+                looked_since = control.looks_since
                 control.take(may_arm=seen.may_arm, now=now)
-                if control.phase is Phase.LOOKING and not was_looking:
+                if control.looks_since != looked_since:
                     parts.requests.ask_to_show(now=now)
             case DemandKind.DRIVE:
                 wanted = demand.velocity
@@ -171,7 +171,9 @@ class Pilot:
                 is_deaf, disarm = self._is_deaf(now=now), self._is_back_home
                 still = seen.still and not is_deaf and not parts.hold_before.is_open(now=now)
                 slows = is_deaf or self.guard.ladder.is_slowing(now=now)
-                control.release(still=still, disarm=disarm, now=now, is_slowing=slows)
+                control.release(
+                    still=still, disarm=disarm, now=now, is_slowing=slows, is_deaf=is_deaf
+                )
             case DemandKind.HAND_BACK:
                 slows = self.guard.ladder.is_slowing(now=now)
                 control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)

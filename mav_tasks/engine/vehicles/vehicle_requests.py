@@ -202,7 +202,8 @@ class VehicleRequests:
         self.flush(now=now)
 
     def ask_which_again(self) -> None:
-        """It may be another one now."""
+        """It may be another one now, or one that hears us again."""
+        self._shows = max(self._shows, 1)
         self.is_identified = False
         self._versions_asked, self._ask_version_at = 0, -inf
 

@@ -50,10 +50,12 @@ def is_off_line(task: Task, pose: Pose) -> bool:
 def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     """Whether somebody has had a vehicle while nothing was heard of it.
 
-    On a straight line it rolls on by itself; it does not turn, and does not come back.
+    On a straight line it rolls on by itself; it does not turn, and does not come back. Before it
+    was driven it stays where it is.
     """
-    if task.progress.anchor is None:  # it had not begun to drive
-        return False
+    if task.progress.anchor is None:
+        away = hypot(after.north - before.north, after.east - before.east)
+        return away > PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
     leg = leg_of(goal_of(task), task.progress)
     if not isinstance(leg, Move):
         return False

@@ -287,3 +287,85 @@ def test_who_takes_it_while_the_server_stands_still_keeps_it(
     mend(world)
     assert stays(world, 6)
     assert mode_of(world) is Mode.MANUAL
+
+
+@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["px4 1 Hz", "px4"])
+@pytest.mark.parametrize("word", ["a task", "a continue"])
+@pytest.mark.parametrize("after", [0.25, 0.45, 0.65, 0.85, 1.05])
+@pytest.mark.parametrize("phase", [0.0, 0.35, 0.7])
+def test_who_takes_it_while_zeros_lead_in_keeps_it(
+    make_world: MakeWorld, persona: Persona, word: str, after: float, phase: float
+) -> None:
+    """A second passes between the heartbeat that shows it armed and the request for our mode."""
+    world = make_world(persona=persona)
+    if word == "a continue":
+        driving(world)
+        world.client.pause()
+    world.run(6 + phase)
+    if word == "a continue":
+        world.client.proceed()
+    else:
+        world.client.move(3.0)
+    world.run(after)
+    world.operator_mode(Mode.MANUAL)
+    assert stays(world, 6)
+    assert mode_of(world) is Mode.MANUAL
+
+
+@EVERY_MAKE
+@pytest.mark.parametrize("shows_on_request", [True, False])
+@pytest.mark.parametrize("seconds", [4.0, 8.0, 20.0])
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.6])
+def test_who_drives_and_parks_it_unheard_before_we_take_it_keeps_it(
+    make_world: MakeWorld, persona: Persona, shows_on_request: bool, seconds: float, phase: float
+) -> None:
+    """The task was lost before anything was asked for; disarmed and in its mode it is as before."""
+    world = make_world(persona=persona, shows_on_request=shows_on_request)
+    world.run(3 + phase)
+    world.watched.loses = lambda source, target, _: "rover1" in (source, target)
+    world.run(0.05)
+    world.client.move(5.0)
+    mode = mode_of(world)
+    world.run(1.0)
+    world.operator_mode(Mode.MANUAL)
+    world.operator_arm(True)
+    world.run(0.2)
+    world.rover.autopilot.operator_sticks(0.8, 0.0)
+    world.run(seconds / 2 - 0.6)
+    world.rover.autopilot.operator_sticks(0.0, 0.0)
+    world.run(seconds / 2 - 0.6)
+    world.operator_arm(False)
+    world.operator_mode(mode)
+    mend(world)
+    assert stays(world, 14)
+    assert not world.rover.autopilot.armed
+
+
+@pytest.mark.parametrize("persona", [PROMPT_PX4, PX4], ids=["px4", "px4 1 Hz"])
+@pytest.mark.parametrize("shows_on_request", [True, False])
+@pytest.mark.parametrize("halt", ["pause", "cancel"])
+@pytest.mark.parametrize("after", [0.02, 0.1, 0.3, 0.6])
+def test_a_halt_while_it_is_being_taken_stops_its_way_to_a_place(
+    make_world: MakeWorld, persona: Persona, shows_on_request: bool, halt: str, after: float
+) -> None:
+    """In HOLD a PX4 drives to where a client has sent it, whatever zeros it hears."""
+    settings = Settings(claim=False)
+    world = make_world(persona=persona, shows_on_request=shows_on_request, settings=settings)
+    person = world.add_client("person")
+    world.client.move(5)
+    world.until_idle(tasks=1)
+    world.run(3)
+    world.client.arm()
+    world.run(1)
+    world.client.send(go_to(60, 0))
+    world.run(4.5)
+    speed = world.truth.forward_speed
+    world.client.move(3)
+    world.run(after)
+    said = person.pause() if halt == "pause" else person.command(CANCEL, 2)
+    north = world.truth.north
+    world.run(12)
+    assert speed > 3
+    assert said.result == ACCEPTED
+    assert world.truth.north - north < 20  # by STOP, too, 14 to 18 m
+    assert abs(world.truth.forward_speed) < 0.05
