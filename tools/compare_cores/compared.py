@@ -7,11 +7,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .differences import Difference, Kind, differences
-from .intended import INTENDED, After, Intended
+from .entries import After, Intended
+from .intended import INTENDED
+from .ledger import Ledger, can_move
+from .motion import MotionWatch
 from .new_core import NewCore, sent_of
+from .story import Story
 from .wire import Layouts, Sent
 
 MOST_WAKE_UPS = 1_000  # that only the new core wants, between two inputs
+MOVES = "after the runs had split, to a rover that the old core does not move"
 
 
 @dataclass
@@ -22,7 +27,7 @@ class Compared:
     seconds: float = 0.0  # of its run that were compared
     inputs: int = 0
     packets: int = 0  # of the old core, compared
-    left_out: int = 0  # of the old core, after the runs had diverged
+    left_out: int = 0  # of the old core, after the runs had diverged: seen for motion only
     skipped: int = 0  # wake-ups that only the old core wanted
     added: int = 0  # and only the new one
     intended: Counter[str] = field(default_factory=Counter)
@@ -50,7 +55,11 @@ class Comparison:
         self._table = table
         self._sent: list[Sent] = []  # by the old core, in this instant
         self._counts_numbers = True
-        self._is_over = False
+        self._is_over = False  # nothing is looked at any more
+        self._is_split = False  # packets are not compared any more
+        self._story = Story(new, is_restart=False)
+        self._ledger = Ledger()
+        self._motion = MotionWatch()
         self._began: float | None = None
         self._now = 0.0
 
@@ -60,6 +69,7 @@ class Comparison:
         if isinstance(head, list):  # the end at once
             self.result.unusable = head[1]
             return self.result
+        self._story.is_restart = head["restored"] is not None
         core, waiting, due = None, [], None
         for line in lines:
             values = json.loads(line)
@@ -80,7 +90,7 @@ class Comparison:
                 self.result.skipped, self.result.added = core.skipped, core.added
             except Exception as error:  # noqa: BLE001 - whatever it is, it is what is looked for
                 text = f"{type(error).__name__}: {error}"
-                self._judge([Difference(Kind.CRASHED, self._now, None, None, text)])
+                self._fail(Difference(Kind.CRASHED, self._now, None, None, text))
         raise RuntimeError("the other revision's process ended")
 
     def _step(self, core: NewCore, values: list[Any], due: float | None) -> float | None:
@@ -88,6 +98,7 @@ class Comparison:
             case ["in", now, line]:
                 self._wake(core, due, now)
                 self._now = now
+                self._story.took_in(line, now=now)
                 self._began = now if self._began is None else self._began
                 self.result.inputs += 1
                 core.feed(line, now=now)
@@ -116,26 +127,46 @@ class Comparison:
     def _compare(self, core: NewCore) -> None:
         new = core.end_instant(self._new, now=self._now)
         old, self._sent = self._sent, []
-        self.result.packets += len(old)
-        self.result.seconds = self._now - (self._began if self._began is not None else self._now)
-        if self._is_over or not (old or new):
+        now = self._now
+        if self._is_over:
             return
-        self._judge(differences(old, new, now=self._now, counts_numbers=self._counts_numbers))
+        self._motion.old(old, now=now)
+        if self._is_split:
+            self.result.left_out += len(old)
+            for sent in self._motion.unmatched(new, now=now):
+                self._fail(Difference(Kind.ADDED, now, None, sent, MOVES))
+                return
+            return
+        self.result.packets += len(old)
+        self.result.seconds = now - (self._began if self._began is not None else now)
+        if old or new:
+            numbers = self._counts_numbers
+            self._judge(differences(old, new, now=now, counts_numbers=numbers, story=self._story))
+            self._story.sent(old, new, now=now)
+        if not self._is_over and not self._is_split:
+            for difference in self._ledger.overdue(now):
+                self._fail(difference)
+                return
 
     def _judge(self, found: list[Difference]) -> None:
         for difference in found:
             entry = next((each for each in self._table if each.matches(difference)), None)
             if entry is None:
-                self.result.unexplained = list(difference.lines())
-                self._is_over = True
+                self._fail(difference)
                 return
             self.result.intended[entry.name] += 1
             if difference.kind is not Kind.CHANGED:
                 self._counts_numbers = False
+            if entry.after is After.MOVED and can_move(difference):
+                self._ledger.note(difference, entry)
             if entry.after is After.DIVERGES:
                 self.result.diverged = f"{entry.name}, from {difference.now:.3f} s on"
-                self._is_over = True
+                self._is_split = True
                 return
+
+    def _fail(self, difference: Difference) -> None:
+        self.result.unexplained = list(difference.lines())
+        self._is_over = True
 
     def _end(self, said: str) -> None:
         """The old core's own replay may fail late: then nothing that was found counts."""

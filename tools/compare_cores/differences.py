@@ -5,11 +5,12 @@ numbers count only as long as both cores have sent as many packets before.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from difflib import SequenceMatcher
 from enum import Enum
 from typing import Any
 
+from .story import Moment, Story
 from .wire import Sent
 
 ABSENT = "(no such field)"
@@ -35,6 +36,8 @@ class Difference:
     old: Sent | None
     new: Sent | None
     text: str = ""
+    #: all that was sent at this instant, and what led to it
+    moment: Moment = field(default_factory=Moment, compare=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -63,7 +66,12 @@ class Difference:
 
 
 def differences(
-    old: Sequence[Sent], new: Sequence[Sent], *, now: float, counts_numbers: bool
+    old: Sequence[Sent],
+    new: Sequence[Sent],
+    *,
+    now: float,
+    counts_numbers: bool,
+    story: Story | None = None,
 ) -> list[Difference]:
     """Give how the packets of one instant differ; ``counts_numbers``: sequence numbers do, too."""
     if [(s.way, s.data, s.is_first) for s in old] == [(s.way, s.data, s.is_first) for s in new]:
@@ -76,7 +84,8 @@ def differences(
     if not found and [(s.way, s.content) for s in old] != [(s.way, s.content) for s in new]:
         orders = " / ".join(", ".join(s.name for s in each) for each in (old, new))
         found.append(Difference(Kind.REORDERED, now, old[0], new[0], orders))
-    return found
+    moment = Moment(old, new) if story is None else Moment(old, new, story)
+    return [replace(each, moment=moment) for each in found]
 
 
 def _of_way(

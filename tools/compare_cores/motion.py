@@ -1,0 +1,54 @@
+"""What moves a rover, and whether the new core moves one that the old core leaves alone.
+
+After an intended difference the rover of the record does not do what the new core says, and the
+packets of the two runs cannot be compared any more. That the new core drives, arms or lets go no
+rover which stands in the record can be seen all the same.
+"""
+
+from collections.abc import Iterable, Iterator
+from math import isfinite
+
+from .wire import Sent
+
+#: s after the last packet of the old core that moves a rover: so much later the new one may be
+LATER = 5.0
+HOLD_MODES = ((4, 0), (4, 3), (1, 0))  # ArduPilot's HOLD, PX4's; see moves
+SETPOINTS = ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT")
+ARM, SET_MODE = 400, 176
+
+
+def moves(sent: Sent) -> bool:
+    """Whether a packet to a rover drives it, arms it, or sets a mode in which it may drive."""
+    values = sent.fields
+    if sent.name in SETPOINTS:
+        speeds = (values["vx"], values["vy"], values["yaw_rate"])
+        return any(isfinite(speed) and speed for speed in speeds)
+    if sent.name in ("COMMAND_LONG", "COMMAND_INT"):
+        if values["command"] == ARM:
+            return bool(values["param1"])
+        if values["command"] == SET_MODE:
+            return (values["param2"], values["param3"]) not in HOLD_MODES
+    return False
+
+
+class MotionWatch:
+    """Sees to it, after a split, that the new core moves only what the old one moves as well."""
+
+    def __init__(self) -> None:
+        self._moved_at: dict[object, float] = {}
+
+    def old(self, packets: Iterable[Sent], *, now: float) -> None:
+        """Note what the old core sends, also before the split."""
+        for sent in packets:
+            if moves(sent):
+                self._moved_at[_rover(sent)] = now
+
+    def unmatched(self, packets: Iterable[Sent], *, now: float) -> Iterator[Sent]:
+        """Give what the new core sends to a rover that the old one does not move."""
+        for sent in packets:
+            if moves(sent) and now - self._moved_at.get(_rover(sent), -LATER) > LATER:
+                yield sent
+
+
+def _rover(sent: Sent) -> object:
+    return sent.way, sent.fields["target_system"]
