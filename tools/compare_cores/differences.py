@@ -101,11 +101,21 @@ def _of_way(
             yield from _replaced(old[a:b], new[c:d], now=now)
 
 
+def _subject(sent: Sent) -> tuple[Any, ...]:
+    """Give what a packet is about: two that differ here are no change of each other."""
+    subject: tuple[Any, ...] = sent.message_id, sent.source
+    if sent.name in ("COMMAND_LONG", "COMMAND_INT"):
+        subject += (sent.fields["command"], sent.fields["param1"])
+    elif sent.name in ("COMMAND_ACK", "TASK_STATUS"):
+        subject += (sent.fields.get("command"), sent.fields.get("task_id"))
+    return subject
+
+
 def _replaced(old: Sequence[Sent], new: Sequence[Sent], *, now: float) -> Iterator[Difference]:
     """Pair packets of one kind and source; what is left over is missing or added."""
     left = list(new)
     for one in old:
-        same = (s for s in left if (s.message_id, s.source) == (one.message_id, one.source))
+        same = (s for s in left if _subject(s) == _subject(one))
         other = next(same, None)
         if other is None:
             yield Difference(Kind.MISSING, now, one, None)

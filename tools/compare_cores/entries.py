@@ -31,6 +31,8 @@ class Intended:
     matches: Condition
     after: After = After.COMPARED
     within: float = 0.0  # s, of what is MOVED
+    #: what is MOVED and must be found again: what only the old core has sent, only the new, or both
+    owes: tuple[Kind, ...] = (Kind.MISSING, Kind.ADDED)
 
 
 def grew(message: str, field: str) -> Condition:

@@ -36,6 +36,24 @@ def _asks_wished_rate(difference: Difference) -> bool:
     return sent.source == OURS and (needed is None or interval < needed)
 
 
+def _asks_own_rate(difference: Difference) -> bool:
+    """What the server needs is asked for as such where a client's wish for more comes later."""
+    sent, story = difference.new, difference.moment.story
+    if difference.kind is not Kind.ADDED or difference.name != "COMMAND_LONG" or sent is None:
+        return False
+    number, interval = sent.fields["param1"], sent.fields["param2"] / MICRO
+    if sent.fields["command"] != SET_MESSAGE_INTERVAL or WANTED.get(int(number)) != interval:
+        return False
+    wished = [*difference.moment.old, *(s for _, s in story.old("COMMAND_LONG"))]
+    return any(
+        s.fields.get("command") == SET_MESSAGE_INTERVAL
+        and s.fields["param1"] == number
+        and s.fields["param2"] / MICRO < interval
+        for s in wished
+        if s.name == "COMMAND_LONG"
+    )
+
+
 TABLE = (
     Intended(
         "TIMESYNC beside our heartbeats",
@@ -48,5 +66,11 @@ TABLE = (
         _asks_wished_rate,
         After.MOVED,
         within=30.0,
+        owes=(Kind.MISSING,),
+    ),
+    Intended(
+        "rates that we need come before clients' wishes",
+        "Nobody's wish keeps back what the server drives by.",
+        _asks_own_rate,
     ),
 )

@@ -1,7 +1,13 @@
 """Intended differences: what is said to clients, in texts and in statuses."""
 
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
 from .differences import ABSENT, Difference, Kind
 from .entries import Condition, Intended, grew
+from .wire import Sent
 
 STATUS = "TASK_QUEUE_STATUS"
 
@@ -16,20 +22,80 @@ def _counts_halts(difference: Difference) -> bool:
     return bool(fields["halt_epoch"][0] == ABSENT and 0 < new - old <= max(behind, 0) * 2)
 
 
-def reworded(old: bytes, new: bytes) -> Condition:
-    """Match a text that begins with ``old`` and was told in other words, beginning with ``new``."""
+class Reworded(NamedTuple):
+    """What was said before, and what is said instead: patterns; groups stand for the same."""
+
+    old: str
+    new: str
+
+    def is_it(self, old: str, new: str) -> bool:
+        """Whether these two texts are it."""
+        before = re.fullmatch(self.old, old)
+        after = re.fullmatch(self.new, new)
+        if before is None or after is None:
+            return False
+        named, now_named = before.groupdict(), after.groupdict()
+        return all(named[name] == now_named[name] for name in named.keys() & now_named.keys())
+
+
+ROLE = r"role (?P<role>\w+) may not .*, (?P<least>\w+) may"
+REWORDED = (
+    Reworded(ROLE, ROLE),
+    Reworded(
+        r"Task (?P<id>\d+) waits: wrong mode, set HOLD",
+        r"Task (?P<id>\d+) waits: wrong mode; set HOLD, then continue",
+    ),
+    Reworded(r"cannot go on: wrong mode, set HOLD", r"cannot go on: wrong mode; set HOLD.*"),
+)
+#: what is an operator's no more: restarts, tests of motors, calibration
+OF_SAFETY = Reworded(
+    r"role (?P<role>\w+) may not .*, operator may", r"role (?P<role>\w+) may not .*, safety may"
+)
+
+
+def texts(packets: Sequence[Sent], way: tuple[str, str]) -> list[str]:
+    """Give the texts that go one way, each put together of its pieces."""
+    found: list[tuple[int, str]] = []
+    for sent in (each for each in packets if each.name == "STATUSTEXT" and each.way == way):
+        number, text = sent.fields.get("id", 0), sent.fields["text"].decode("utf-8", "replace")
+        if number and found and found[-1][0] == number:
+            found[-1] = number, found[-1][1] + text
+        else:
+            found.append((number, text))
+    return [text for _, text in found]
+
+
+def reworded(*patterns: Reworded) -> Condition:
+    """Match a text that is told in other words; so must be all others of its instant."""
 
     def matches(difference: Difference) -> bool:
-        fields = difference.fields
-        return (
-            difference.kind is Kind.CHANGED
-            and difference.name == "STATUSTEXT"
-            and set(fields) == {"text"}
-            and fields["text"][0].startswith(old)
-            and fields["text"][1].startswith(new)
+        sent = difference.new or difference.old
+        if difference.name != "STATUSTEXT" or sent is None:
+            return False
+        old = Counter(texts(difference.moment.old, sent.way))
+        new = Counter(texts(difference.moment.new, sent.way))
+        gone, come = list((old - new).elements()), list((new - old).elements())
+        return len(gone) == len(come) > 0 and all(
+            any(each.is_it(one, other) for each in patterns)
+            for one, other in zip(gone, come, strict=True)
         )
 
     return matches
+
+
+def _is_renumbered(difference: Difference) -> bool:
+    """The number of a text in pieces counts texts: one more or less was told before."""
+    fields = difference.fields
+    return difference.name == "STATUSTEXT" and set(fields) == {"id"} and all(fields["id"])
+
+
+def _tells_of_mode(difference: Difference) -> bool:
+    """SET_MODE is told of as DO_SET_MODE is."""
+    new, now = difference.new, difference.now
+    if difference.kind is not Kind.ADDED or difference.name != "STATUSTEXT" or new is None:
+        return False
+    is_asked = any(True for _ in difference.moment.story.heard("SET_MODE", since=now))
+    return is_asked and b"begins now: return home" in new.fields["text"]
 
 
 TABLE = (
@@ -47,5 +113,25 @@ TABLE = (
         "TASK_QUEUE_STATUS counts halts, too",
         "Each halt is an event of the store; a version only has to grow.",
         _counts_halts,
+    ),
+    Intended(
+        "texts in other words",
+        "A refusal names the command by its name; a task that waits says all that is to be done.",
+        reworded(*REWORDED),
+    ),
+    Intended(
+        "what works on a rover is for the role safety",
+        "Restarts, tests of motors and calibration bound a rover, or what holds it.",
+        reworded(OF_SAFETY),
+    ),
+    Intended(
+        "the number of a text in pieces",
+        "It counts texts, and there were more or fewer before.",
+        _is_renumbered,
+    ),
+    Intended(
+        "SET_MODE is told of as DO_SET_MODE is",
+        "Both are one request; everybody is told that the return begins.",
+        _tells_of_mode,
     ),
 )

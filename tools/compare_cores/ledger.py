@@ -24,11 +24,11 @@ class Ledger:
         """Take a packet that only one core has sent: it is owed, or pays for an earlier one."""
         sent = difference.new or difference.old
         assert sent is not None
-        key = entry.name, sent.way, sent.content
+        key = entry.name, sent.way, sent.content[:3]  # whatever waits before it
         owed = self._owed.setdefault(key, [])
         if owed and owed[0].difference.kind is not difference.kind:
             del owed[0]
-        else:
+        elif difference.kind in entry.owes:
             owed.append(Owed(difference, difference.now + entry.within))
         if not owed:
             del self._owed[key]

@@ -12,7 +12,9 @@ from .wire import Sent
 
 #: s after the last packet of the old core that moves a rover: so much later the new one may be
 LATER = 5.0
-HOLD_MODES = ((4, 0), (4, 3), (1, 0))  # ArduPilot's HOLD, PX4's; see moves
+#: m/s and rad/s: a set-point that means "stand" may name as much, lest it be taken for none
+STANDING = 0.002
+HOLD_MODES = ((4.0, 0.0), (4.0, 3.0))  # param2 and param3 of ArduPilot's HOLD and of PX4's
 SETPOINTS = ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT")
 ARM, SET_MODE = 400, 176
 
@@ -22,13 +24,25 @@ def moves(sent: Sent) -> bool:
     values = sent.fields
     if sent.name in SETPOINTS:
         speeds = (values["vx"], values["vy"], values["yaw_rate"])
-        return any(isfinite(speed) and speed for speed in speeds)
+        return any(isfinite(speed) and abs(speed) > STANDING for speed in speeds)
     if sent.name in ("COMMAND_LONG", "COMMAND_INT"):
         if values["command"] == ARM:
             return bool(values["param1"])
-        if values["command"] == SET_MODE:
-            return (values["param2"], values["param3"]) not in HOLD_MODES
+        return bool(values["command"] == SET_MODE) and not asks_hold(sent)
     return False
+
+
+def asks_hold(sent: Sent) -> bool:
+    """Whether a packet to a rover asks for HOLD."""
+    values = sent.fields
+    if sent.name != "COMMAND_LONG" or values["command"] != SET_MODE:
+        return False
+    return (values["param2"], values["param3"]) in HOLD_MODES
+
+
+def stands(sent: Sent) -> bool:
+    """Whether a packet to a rover lets it stand: a set-point that means so, or HOLD."""
+    return asks_hold(sent) or (sent.name in SETPOINTS and not moves(sent))
 
 
 class MotionWatch:

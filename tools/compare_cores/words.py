@@ -1,10 +1,11 @@
 """Clients' words at one instant of a record, and how both cores answered each of them."""
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from .differences import Difference, Kind
+from .motion import asks_hold
 from .story import Heard, Story
 from .wire import Sent
 
@@ -16,49 +17,50 @@ STALE, NOT_ALLOWED, RATE_LIMITED, VEHICLE_SILENT = 114, 108, 113, 9
 STOP, PAUSE_CONTINUE, SET_MODE, ARM = 54003, 193, 176, 400
 CANCEL, CLEAR, RELEASE, MISSION_START, REPOSITION = 54010, 54011, 54013, 300, 192
 COPIED = 3.5  # s after a copy in which the next one comes: the contract
+AHEAD = 32  # packets: what seems further ahead may be seconds behind: the contract
 RESTARTED = 3.5  # s after the server's start in which a word may be a copy: the contract
 
 
-@dataclass(frozen=True, slots=True)
-class Answered:
-    """A word, and the answers of both cores to it at the instant at which it came."""
+class Refusals(NamedTuple):
+    """Words of one client and one number that the new core refuses as the old one did not."""
 
-    word: Heard
-    old: Sent | None
-    new: Sent | None
-
-    @property
-    def command(self) -> int:
-        """Give its number."""
-        return int(self.word.of("command"))
+    words: list[Heard]
+    did_something: bool  # in the old core: obeyed, or passed on to the rover
 
 
-def answered(difference: Difference) -> Iterator[Answered]:
-    """Give each command that the new core answers at this instant, if it came at it, too."""
+def refusals(difference: Difference, result: int, reason: int) -> Iterator[Refusals]:
+    """Give what only the new core answers so at this instant, whatever else is in it.
+
+    Both cores may see to the words of an instant in another order: answers are counted.
+    """
     moment = difference.moment
-    words = [heard for heard in moment.story.heard(*COMMANDS, since=difference.now)]
-    for ack in moment.new:
-        if ack.name != ACK:
+    for key in dict.fromkeys(_to(ack) for ack in moment.new if ack.name == ACK):
+        old, new = (
+            Counter(result_of(ack) for ack in packets if ack.name == ACK and _to(ack) == key)
+            for packets in (moment.old, moment.new)
+        )
+        added = new - old
+        if set(added) != {(result, reason)}:
             continue
-        word = next((each for each in words if _is_of(ack, each)), None)
-        if word is None:
-            continue
-        old = (each for each in moment.old if each.name == ACK and _is_of(each, word))
-        yield Answered(word, next(old, None), ack)
+        words = [w for w in moment.story.heard(*COMMANDS, since=difference.now) if _from(w) == key]
+        gone = old - new
+        obeyed = any(each[0] == ACCEPTED for each in gone)
+        if words:
+            yield Refusals(words, obeyed or gone.total() < added.total())
 
 
-def _is_of(ack: Sent, word: Heard) -> bool:
+def _to(ack: Sent) -> tuple[Any, ...]:
     to = ack.fields.get("target_system"), ack.fields.get("target_component")
-    return (
-        ack.way == word.packet.way
-        and to == word.packet.source
-        and ack.fields["command"] == word.of("command")
-    )
+    return ack.way, to, ack.fields["command"]
 
 
-def result_of(ack: Sent | None) -> tuple[int, int] | None:
+def _from(word: Heard) -> tuple[Any, ...]:
+    return word.packet.way, word.packet.source, word.of("command")
+
+
+def result_of(ack: Sent) -> tuple[int, int]:
     """Give result and reason of an answer."""
-    return None if ack is None else (ack.fields["result"], ack.fields.get("result_param2", 0))
+    return ack.fields["result"], ack.fields.get("result_param2", 0)
 
 
 def is_halt(heard: Heard) -> bool:
@@ -74,7 +76,7 @@ def is_halt(heard: Heard) -> bool:
         case _ if number in (PAUSE_CONTINUE, ARM):
             return bool(first == 0.0)
         case _ if number == SET_MODE:
-            return (heard.of("param2"), heard.of("param3")) in ((4.0, 0.0), (4.0, 3.0))
+            return asks_hold(heard.packet)
         case _ if number == REPOSITION:
             return True  # without a place it is a pause
         case _:
@@ -101,13 +103,18 @@ def why_older(word: Heard, story: Story) -> str:
 
 
 def _is_overtaken(word: Heard, story: Story) -> bool:
-    """Whether later packets of its sender came before it, or it is far ahead of those heard."""
-    line = [each for each in story.heard() if _same_sender(each, word) and each is not word]
-    if not line:
+    """Whether later packets of its sender were seen to before it, or it is far ahead of them.
+
+    Of what came at one instant, halts are seen to first.
+    """
+    heard = [each for each in story.heard() if _same_sender(each, word)]
+    at = next((n for n, each in enumerate(heard) if each is word), len(heard))
+    before = heard[at + 1 :] + [each for each in heard[:at] if is_halt(each)]
+    if not before:
         return True  # its first packet: nothing tells how old it is
-    ahead = max(each.packet.seq - word.packet.seq & 0xFF for each in line[:1])
-    behind = word.packet.seq - line[0].packet.seq & 0xFF
-    return 0 < ahead < 0x80 or behind > 32
+    if any(0 < (each.packet.seq - word.packet.seq & 0xFF) < 0x80 for each in before[:64]):
+        return True
+    return (word.packet.seq - before[0].packet.seq & 0xFF) > AHEAD
 
 
 def _copies_before_halt(word: Heard, story: Story) -> bool:
@@ -137,23 +144,13 @@ def _values(heard: Heard) -> list[tuple[str, Any]]:
     return [(k, repr(v)) for k, v in heard.packet.fields.items() if k != "confirmation"]
 
 
-def rejected_as(difference: Difference, result: int, reason: int) -> list[Answered]:
-    """Give the words of this instant that the new core refuses so, and the old one did not."""
-    wanted = result, reason
-    found = list(answered(difference))
-    return [e for e in found if result_of(e.new) == wanted and result_of(e.old) != wanted]
-
-
-def is_about(difference: Difference, each: Answered) -> bool:
-    """Whether a difference is the answer to a word, the text beside it, or that it went on."""
+def is_about(difference: Difference, word: Heard) -> bool:
+    """Whether a difference is the answer to a word, a text beside it, or that it went on."""
     sent = difference.new or difference.old
     if sent is None:
         return False
-    if difference.name == ACK:
-        return sent in (each.old, each.new)
-    if difference.name == "STATUSTEXT":
-        return sent.way == each.word.packet.way
-    went_on = difference.kind is Kind.MISSING and sent.source == each.word.packet.source
-    return went_on and sent.content[2] == each.word.packet.payload
-
-
+    if sent.name == ACK:
+        return _to(sent) == _from(word)
+    if sent.name == "STATUSTEXT":
+        return sent.way == word.packet.way
+    return difference.kind is Kind.MISSING and sent.source == word.packet.source

@@ -1,0 +1,65 @@
+"""What a record shows of a rover up to a moment, and what both cores have asked of it."""
+
+from math import inf
+
+from .motion import asks_hold, stands
+from .story import Heard, Story
+from .wire import Sent
+
+OURS = (250, 191)
+AUTOPILOT = 1
+ARMED = 128  # in base_mode
+ARM, SET_MODE, REQUEST_MESSAGE = 400, 176, 512
+MEASURES = ("ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+LATE = 0.3  # s: what is older steers nothing
+JITTER = 0.005  # s: whole ms, and several messages of one moment
+
+
+def is_to_rover(sent: Sent | None) -> bool:
+    """Whether the server itself says this to a rover."""
+    return sent is not None and sent.source == OURS
+
+
+def heartbeat(sent: Sent, story: Story) -> Heard | None:
+    """Give the last heartbeat of the rover to which a packet goes."""
+    source = sent.fields["target_system"], AUTOPILOT
+    return next((each for each in story.heard("HEARTBEAT") if each.packet.source == source), None)
+
+
+def is_armed(beat: Heard | None) -> bool:
+    """Whether a heartbeat shows that a rover is armed."""
+    return beat is not None and bool(beat.of("base_mode") & ARMED)
+
+
+def is_hold(sent: Sent) -> bool:
+    """Whether it lets a rover stand, or asks for the heartbeat that shows it."""
+    return stands(sent) or asks_heartbeat(sent)
+
+
+def asks_heartbeat(sent: Sent) -> bool:
+    """Whether it asks a rover to show its mode and arming."""
+    if sent.name != "COMMAND_LONG" or sent.fields["command"] != REQUEST_MESSAGE:
+        return False
+    return sent.source == OURS and sent.fields["param1"] == 0.0
+
+
+def arms_or_takes(sent: Sent) -> bool:
+    """Whether the server arms a rover, or asks for the mode in which it drives it."""
+    if sent.name != "COMMAND_LONG" or sent.source != OURS:
+        return False
+    number = sent.fields["command"]
+    return bool(
+        (number == ARM and sent.fields["param1"] == 1.0)
+        or (number == SET_MODE and not asks_hold(sent))
+    )
+
+
+def delays(system: int, story: Story, *, since: float = -inf) -> list[float]:
+    """Give by how much measures were late, the last first, besides what all of them are."""
+    found = [
+        each.at - each.of("time_boot_ms") / 1000
+        for each in story.heard(*MEASURES, since=since)
+        if each.packet.source == (system, AUTOPILOT)
+    ]
+    least = min(found, default=0.0)
+    return [each - least for each in found]
