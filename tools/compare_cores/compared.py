@@ -3,19 +3,21 @@
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .differences import Difference, Kind, differences
 from .entries import After, Intended
 from .intended import INTENDED
-from .ledger import Ledger, can_move
+from .ledger import Ledger
 from .motion import MotionWatch
 from .new_core import NewCore, sent_of
 from .story import Story
 from .wire import Layouts, Sent
 
 MOST_WAKE_UPS = 1_000  # that only the new core wants, between two inputs
+BOTH = (Kind.MISSING, Kind.ADDED)
+NOT_SAID = "and the other core does not say it in time"
 MOVES = "after the runs had split, to a rover that the old core does not move"
 
 
@@ -59,6 +61,8 @@ class Comparison:
         self._is_split = False  # packets are not compared any more
         self._story = Story(new, is_restart=False)
         self._ledger = Ledger()
+        self._promised = Ledger()  # what one core has said at a split, and the other will
+        self._may_move = False
         self._motion = MotionWatch()
         self._began: float | None = None
         self._now = 0.0
@@ -132,10 +136,7 @@ class Comparison:
             return
         self._motion.old(old, now=now)
         if self._is_split:
-            self.result.left_out += len(old)
-            for sent in self._motion.unmatched(new, now=now):
-                self._fail(Difference(Kind.ADDED, now, None, sent, MOVES))
-                return
+            self._look_on(old, new)
             return
         self.result.packets += len(old)
         self.result.seconds = now - (self._began if self._began is not None else now)
@@ -148,6 +149,20 @@ class Comparison:
                 self._fail(difference)
                 return
 
+    def _look_on(self, old: list[Sent], new: list[Sent]) -> None:
+        """After a split, see that nothing is moved, and that both say what they are to say."""
+        now = self._now
+        self.result.left_out += len(old)
+        moved = () if self._may_move else self._motion.unmatched(new, now=now)
+        for sent in moved:
+            self._fail(Difference(Kind.ADDED, now, None, sent, MOVES))
+            return
+        self._promised.pay(old, Kind.MISSING, by="")
+        self._promised.pay(new, Kind.ADDED, by="")
+        for difference in self._promised.overdue(now):
+            self._fail(replace(difference, text=NOT_SAID))
+            return
+
     def _judge(self, found: list[Difference]) -> None:
         for difference in found:
             entry = next((each for each in self._table if each.matches(difference)), None)
@@ -157,12 +172,19 @@ class Comparison:
             self.result.intended[entry.name] += 1
             if difference.kind is not Kind.CHANGED:
                 self._counts_numbers = False
-            if entry.after is After.MOVED and can_move(difference):
-                self._ledger.note(difference, entry)
+            if entry.after is After.MOVED:
+                self._ledger.note(difference, by=entry.name, within=entry.within, owes=entry.owes)
             if entry.after is After.DIVERGES:
-                self.result.diverged = f"{entry.name}, from {difference.now:.3f} s on"
-                self._is_split = True
+                self._split(entry, found)
                 return
+
+    def _split(self, entry: Intended, found: list[Difference]) -> None:
+        self.result.diverged = f"{entry.name}, from {self._now:.3f} s on"
+        self._is_split = True
+        self._may_move = entry.may_move
+        for difference in found if entry.told_within else ():
+            if difference.name == "STATUSTEXT" and difference.kind is not Kind.RENUMBERED:
+                self._promised.note(difference, by="", within=entry.told_within, owes=BOTH)
 
     def _fail(self, difference: Difference) -> None:
         self.result.unexplained = list(difference.lines())

@@ -14,6 +14,7 @@ from .story import Moment, Story
 from .wire import Sent
 
 ABSENT = "(no such field)"
+SET_MESSAGE_INTERVAL = 511
 
 
 class Kind(Enum):
@@ -80,12 +81,35 @@ def differences(
     for way in dict.fromkeys(s.way for s in (*old, *new)):
         ours = [s for s in old if s.way == way]
         theirs = [s for s in new if s.way == way]
-        found += _of_way(ours, theirs, now=now, counts_numbers=counts_numbers)
+        found += _in_place(
+            list(_of_way(ours, theirs, now=now, counts_numbers=counts_numbers)), now=now
+        )
     if not found and [(s.way, s.content) for s in old] != [(s.way, s.content) for s in new]:
         orders = " / ".join(", ".join(s.name for s in each) for each in (old, new))
         found.append(Difference(Kind.REORDERED, now, old[0], new[0], orders))
     moment = Moment(old, new) if story is None else Moment(old, new, story)
     return [replace(each, moment=moment) for each in found]
+
+
+def _in_place(found: list[Difference], *, now: float) -> list[Difference]:
+    """Make of what is missing at one place and added at another of an instant: reordered."""
+    missing = [each for each in found if each.kind is Kind.MISSING]
+    kept = [each for each in found if each.kind is not Kind.MISSING]
+    for one in missing:
+        assert one.old is not None
+        other = next(
+            (
+                each
+                for each in kept
+                if each.kind is Kind.ADDED and each.new and each.new.content == one.old.content
+            ),
+            None,
+        )
+        if other is None:
+            kept.append(one)
+        else:
+            kept[kept.index(other)] = Difference(Kind.REORDERED, now, one.old, other.new)
+    return kept
 
 
 def _of_way(
@@ -106,6 +130,8 @@ def _subject(sent: Sent) -> tuple[Any, ...]:
     subject: tuple[Any, ...] = sent.message_id, sent.source
     if sent.name in ("COMMAND_LONG", "COMMAND_INT"):
         subject += (sent.fields["command"], sent.fields["param1"])
+        if sent.fields["command"] == SET_MESSAGE_INTERVAL:
+            subject += (sent.fields["param2"],)
     elif sent.name in ("COMMAND_ACK", "TASK_STATUS"):
         subject += (sent.fields.get("command"), sent.fields.get("task_id"))
     return subject

@@ -33,6 +33,10 @@ class Intended:
     within: float = 0.0  # s, of what is MOVED
     #: what is MOVED and must be found again: what only the old core has sent, only the new, or both
     owes: tuple[Kind, ...] = (Kind.MISSING, Kind.ADDED)
+    #: s after a split in which the other core says the same texts; 0: it need not
+    told_within: float = 0.0
+    #: after a split the new core may move the rover: it has obeyed a word that the old one refused
+    may_move: bool = False
 
 
 def grew(message: str, field: str) -> Condition:

@@ -54,6 +54,18 @@ def _asks_own_rate(difference: Difference) -> bool:
     )
 
 
+def _asks_rates_after_restart(difference: Difference) -> bool:
+    """What the server needs is asked for again when a restart is seen: at another moment."""
+    sent, now, story = difference.new or difference.old, difference.now, difference.moment.story
+    if difference.kind not in (Kind.MISSING, Kind.ADDED) or sent is None:
+        return False
+    if sent.name != "COMMAND_LONG" or sent.fields["command"] != SET_MESSAGE_INTERVAL:
+        return False
+    told = [*story.old("STATUSTEXT", since=now - 6.0), *story.new("STATUSTEXT", since=now - 6.0)]
+    is_told = any(s.fields["text"].endswith(b" restarted") for _, s in told)
+    return is_told and WANTED.get(int(sent.fields["param1"])) == sent.fields["param2"] / MICRO
+
+
 TABLE = (
     Intended(
         "TIMESYNC beside our heartbeats",
@@ -65,12 +77,20 @@ TABLE = (
         "Wishes are taken all together, and 16 at once, then one a second leave.",
         _asks_wished_rate,
         After.MOVED,
-        within=30.0,
+        within=120.0,
         owes=(Kind.MISSING,),
     ),
     Intended(
         "rates that we need come before clients' wishes",
         "Nobody's wish keeps back what the server drives by.",
         _asks_own_rate,
+    ),
+    Intended(
+        "rates that we need, asked for again at another time after a restart",
+        "The restart was seen at another message.",
+        _asks_rates_after_restart,
+        After.MOVED,
+        within=6.0,
+        owes=(Kind.MISSING,),
     ),
 )

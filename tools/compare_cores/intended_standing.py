@@ -1,29 +1,44 @@
 """Intended differences: how a rover is made to stand, and how it is taken."""
 
 import re
+from itertools import pairwise
 
 from .differences import Difference, Kind
 from .entries import After, Intended
-from .motion import HOLD_MODES, asks_hold, moves, stands
+from .ledger import said
+from .motion import HOLD_MODES, asks_hold, moves
 from .rovers import (
+    ARM,
     JITTER,
     LATE,
     arms_or_takes,
     asks_heartbeat,
+    asks_identity,
     delays,
     heartbeat,
     is_armed,
     is_hold,
     is_to_rover,
 )
+from .story import Story
+from .wire import Sent
+from .words import CLEAR, REPOSITION
 
 GAP = 1.5  # s without a heartbeat: one was lost
 GAP_ENDS = 6.0  # s after which HOLD is asked for at the latest
+REPEATS = 0.35  # s after which HOLD is repeated
 SHOWN = 3.0  # s in which what was asked for shows
+LATE_MODE = 5.0  # s in which a mode or an arming may show that has left before a halt
 ASKED = 60.0  # s in which a mode may show that only the old core has asked for
 RESTARTS = 35.0  # s in which a rover that restarts is asked for HOLD, 30 times
+JITTERS = 4.0  # s in which a rover comes to stand
 STATUS = ("STATUSTEXT", "TASK_STATUS", "TASK_QUEUE_STATUS", "MISSION_CURRENT")
 TAKEN = re.compile(rb"taken over: mode is (\w+)")
+NEWS = re.compile(
+    rb"Task \d+ (started|done|paused: position lost|waits: no position|held: .*)|"
+    rb"Rover \d+ moves though .*|Rover \d+ did not stand.*"
+)
+ENDS = re.compile(rb"Task \d+ (started|done)")
 
 
 def _only_one(difference: Difference) -> bool:
@@ -38,8 +53,29 @@ def _in_gap(difference: Difference) -> bool:
     if difference.kind is Kind.MISSING:
         beat = heartbeat(sent, story)
         return beat is None or now - beat.at > GAP
-    before = story.old(sent.name, since=now - GAP_ENDS)
-    return any(s.content[:3] == sent.content[:3] for _, s in before)
+    was_asked = any(said(s) == said(sent) for _, s in story.old(sent.name, since=now - GAP_ENDS))
+    return was_asked and _had_gap(sent, story, now=now)
+
+
+def _had_gap(sent: Sent, story: Story, *, now: float) -> bool:
+    source = sent.fields["target_system"], 1
+    beats = [b.at for b in story.heard("HEARTBEAT", since=now - 30.0) if b.packet.source == source]
+    ends = [now, *beats]
+    return (
+        any(one - other > GAP for one, other in pairwise(ends) if now - one <= GAP_ENDS)
+        or not beats
+    )
+
+
+def _shifted(difference: Difference) -> bool:
+    """HOLD and standing set-points that both cores repeat, each from its own first one on."""
+    sent, now, story = difference.new or difference.old, difference.now, difference.moment.story
+    if sent is None or not _only_one(difference) or not is_to_rover(sent) or not is_hold(sent):
+        return False
+    others = story.new if difference.kind is Kind.MISSING else story.old
+    if asks_heartbeat(sent):  # once HOLD was answered
+        return any(asks_hold(s) for _, s in story.new("COMMAND_LONG", since=now - SHOWN))
+    return any(said(s) == said(sent) for _, s in others(sent.name, since=now - REPEATS))
 
 
 def _taken_as_asked(difference: Difference) -> bool:
@@ -65,30 +101,127 @@ def _taken_as_asked(difference: Difference) -> bool:
     return bool(old - ours)
 
 
+def _own_mode_late(difference: Difference) -> bool:
+    """Our mode shows late, after we have asked for HOLD: in doubt it is a person's."""
+    now, moment = difference.now, difference.moment
+    if not any(TAKEN.search(text) for text in _texts(difference)):
+        return False
+    sent = [s for _, s in moment.story.new("COMMAND_LONG", since=now - LATE_MODE)]
+    asks = [s for s in sent if is_to_rover(s) and (asks_hold(s) or arms_or_takes(s))]
+    return bool(asks) and asks_hold(asks[0]) and any(arms_or_takes(s) for s in asks)
+
+
+def _parked(difference: Difference) -> bool:
+    """A person drove an armed rover while tasks waited, and shows HOLD now: parked, it stays."""
+    now, story = difference.now, difference.moment.story
+    if b"Queue paused: takeover" not in _texts(difference):
+        return False
+    beats = [each for each in story.heard("HEARTBEAT", since=now - 5.0) if each.of("autopilot") < 8]
+    modes = {each.of("custom_mode") for each in beats}
+    is_ours = any(is_to_rover(s) and moves(s) for _, s in story.new(since=now - 1.0))
+    return len(modes) > 1 and any(map(is_armed, beats)) and not is_ours
+
+
+def _late_arming(difference: Difference) -> bool:
+    """A rover shows armed by what had left before it was to be disarmed: disarmed again."""
+    now, story = difference.now, difference.moment.story
+    disarms = any(
+        each.of("command") == ARM and each.of("param1") == 0.0
+        for each in story.heard("COMMAND_LONG", "COMMAND_INT", since=now - LATE_MODE - 1.0)
+    )
+    return disarms and any(b"is armed by a word from before" in t for t in _texts(difference))
+
+
+def _texts(difference: Difference) -> list[bytes]:
+    return [s.fields["text"] for s in difference.moment.new if s.name == "STATUSTEXT"]
+
+
+def _clears_driven(difference: Difference) -> bool:
+    """A queue is cleared while a client drives by set-points: HOLD, not zeros alone."""
+    now, moment = difference.now, difference.moment
+    cleared = any(
+        each.of("command") == CLEAR for each in moment.story.heard("COMMAND_LONG", since=now)
+    )
+    holds = any(asks_hold(s) for s in moment.new if is_to_rover(s))
+    return bool(cleared and holds)
+
+
 def _late_measures(difference: Difference) -> bool:
     """What a rover does, it says with a delay: the new core counts that, and waits or stands."""
-    sent = difference.new or difference.old
-    if sent is None or difference.kind is Kind.REORDERED:
+    moment = difference.moment
+    if not _is_of_standing(difference):
         return False
-    system = sent.fields.get("target_system", 0) if is_to_rover(sent) else sent.source[0]
-    if not (is_to_rover(sent) and is_hold(sent)) and difference.name not in STATUS:
-        return False
-    late = delays(int(system), difference.moment.story, since=difference.now - 20.0)
-    return bool(late) and max(late[:3]) > LATE
+    systems = {int(s.fields["target_system"]) for s in _to_rovers(difference)}
+    systems |= {s.source[0] for s in (*moment.old, *moment.new) if s.name == "STATUSTEXT"}
+    for system in systems:
+        late = delays(system, moment.story, since=difference.now - 20.0)
+        if late and max(late[:3]) > LATE:
+            return True
+    return False
 
 
 def _jitter(difference: Difference) -> bool:
     """When a rover stands is told by its own clock: a task ends some ticks earlier or later."""
     moment, now = difference.moment, difference.now
-    ours = [s for s in (*moment.old, *moment.new) if is_to_rover(s)]
-    if not ours or any(moves(s) for s in moment.new if is_to_rover(s)):
+    if not _is_of_standing(difference) or difference.kind is Kind.CHANGED:
         return False
+    told = [s for s in (*moment.old, *moment.new) if s.name == "STATUSTEXT"]
+    if any(NEWS.fullmatch(s.fields["text"]) and not ENDS.fullmatch(s.fields["text"]) for s in told):
+        return False
+    for sent in (*moment.old, *moment.new):
+        if sent.name in STATUS or is_to_rover(sent):
+            system = int(sent.fields.get("target_system", 0)) or sent.source[0]
+            if sent.name in STATUS:
+                system = sent.source[0]
+            late = delays(system, moment.story, since=now - JITTERS)
+            if len(late) > 1 and max(late) - min(late) > JITTER:
+                return True
+    return False
+
+
+def _is_of_standing(difference: Difference) -> bool:
+    """Whether a difference is a packet that lets a rover stand, or news of how a task goes on."""
     sent = difference.new or difference.old
-    if sent is None or not (stands(sent) if is_to_rover(sent) else difference.name in STATUS):
+    if sent is None or difference.kind is Kind.REORDERED:
         return False
-    system = int(ours[0].fields.get("target_system", 0))
-    late = delays(system, moment.story, since=now - 2.0)
-    return bool(late) and max(late) - min(late) > JITTER
+    if is_to_rover(sent):
+        return is_hold(sent)
+    moment = difference.moment
+    told = [s for s in (*moment.old, *moment.new) if s.name == "STATUSTEXT"]
+    news = any(NEWS.fullmatch(s.fields["text"]) for s in told)
+    if difference.name == "STATUSTEXT":
+        return NEWS.fullmatch(sent.fields["text"]) is not None
+    return difference.name in STATUS and news
+
+
+def _to_rovers(difference: Difference) -> list[Sent]:
+    moment = difference.moment
+    found = [s for s in (*moment.old, *moment.new) if is_to_rover(s)]
+    return [s for s in found if "target_system" in s.fields]
+
+
+def _restart_seen(difference: Difference) -> bool:
+    """A restart is seen by its clock, and not with the first measure: at another message of it."""
+    sent = difference.new or difference.old
+    if sent is None or not _only_one(difference):
+        return False
+    if difference.name == "STATUSTEXT":
+        return bool(sent.fields["text"].endswith(b" restarted"))
+    return is_to_rover(sent) and sent.name == "COMMAND_LONG" and asks_identity(sent)
+
+
+def _stays_disarmed(difference: Difference) -> bool:
+    """A rover that has restarted counts as disarmed: it is not told to stay at its place."""
+    old, story, now = difference.old, difference.moment.story, difference.now
+    if difference.kind is not Kind.MISSING or old is None or old.name != "COMMAND_INT":
+        return False
+    if not is_to_rover(old) or old.fields["command"] != REPOSITION:
+        return False
+    is_told = any(
+        s.fields["text"].endswith(b"restarted")
+        for _, s in story.new("STATUSTEXT", since=now - RESTARTS)
+    )
+    return is_told or not is_armed(heartbeat(old, story))
 
 
 def _shown_unasked(difference: Difference) -> bool:
@@ -126,8 +259,7 @@ def _insists(difference: Difference) -> bool:
     if not is_to_rover(new) or not is_hold(new):
         return False
     asked = any(
-        asks_hold(s) and s.way == new.way
-        for _, s in story.new("COMMAND_LONG", since=now - SHOWN)
+        asks_hold(s) and s.way == new.way for _, s in story.new("COMMAND_LONG", since=now - SHOWN)
     )
     hold = [s for _, s in story.old("COMMAND_LONG") if asks_hold(s) and s.way == new.way]
     return asked and bool(hold) and not _shows_hold(difference)
@@ -144,6 +276,15 @@ def _shows_hold(difference: Difference) -> bool:
     return (float(main), float(sub)) in HOLD_MODES
 
 
+def _goes_first(difference: Difference) -> bool:
+    """While HOLD is asked for, commands leave before set-points that wait."""
+    new, now, story = difference.new, difference.now, difference.moment.story
+    if difference.kind is not Kind.CHANGED or new is None or difference.fields:
+        return False
+    asked = any(asks_hold(s) for _, s in story.new("COMMAND_LONG", since=now - RESTARTS))
+    return is_to_rover(new) and new.is_first and asked
+
+
 TABLE = (
     Intended(
         "HOLD waits for a heartbeat after a gap",
@@ -158,6 +299,52 @@ TABLE = (
         "The rover of the record obeys the old core: to the new one it is somebody's takeover.",
         _taken_as_asked,
         After.DIVERGES,
+    ),
+    Intended(
+        "HOLD is repeated at other ticks",
+        "Both cores have just asked for it, and repeat it until it shows.",
+        _shifted,
+    ),
+    Intended(
+        "our own mode that shows late is taken for a person's",
+        "HOLD was asked for since; which came first is in doubt, and doubts are for standing still.",
+        _own_mode_late,
+        After.DIVERGES,
+    ),
+    Intended(
+        "commands leave first while HOLD is asked for",
+        "One that restarts while it is asked for HOLD is asked on, before whatever waits.",
+        _goes_first,
+    ),
+    Intended(
+        "parked by a person while tasks wait: the queue is paused",
+        "Who drove the rover and sets HOLD parks it; it does not drive off before a continue.",
+        _parked,
+        After.DIVERGES,
+    ),
+    Intended(
+        "armed by a word from before a disarming: disarmed again",
+        "What had left before a disarming arms nothing after it.",
+        _late_arming,
+        After.DIVERGES,
+    ),
+    Intended(
+        "a client drives while a queue is cleared: HOLD",
+        "A set-point of it that comes late would drive the rover on.",
+        _clears_driven,
+        After.DIVERGES,
+    ),
+    Intended(
+        "a restart is seen by the rover's clock",
+        "A measure that is older than the last is a late copy, or a restart: two are asked for.",
+        _restart_seen,
+        After.MOVED,
+        within=6.0,
+    ),
+    Intended(
+        "a rover that is not armed is not told to stay at its place",
+        "A restart disarms; what was shown before proves nothing any more.",
+        _stays_disarmed,
     ),
     Intended(
         "a rover whose measures come late",
@@ -185,5 +372,6 @@ TABLE = (
         "The delay of a net does not count as the rover's: it stands when its clock says so.",
         _jitter,
         After.DIVERGES,
+        told_within=1.5,
     ),
 )

@@ -3,9 +3,9 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from .differences import ABSENT, Difference, Kind
+from .differences import Difference, Kind
 from .entries import Condition, Intended, grew
 from .wire import Sent
 
@@ -13,13 +13,17 @@ STATUS = "TASK_QUEUE_STATUS"
 
 
 def _counts_halts(difference: Difference) -> bool:
-    """The version of a queue counts all events of the store, halts too: it is never behind."""
-    fields = difference.fields
-    if difference.name != STATUS or set(fields) != {"version", "halt_epoch"}:
+    """The version of a queue counts all events of the store, halts of all rovers, too."""
+    fields, new = difference.fields, difference.new
+    if difference.name != STATUS or new is None or set(fields) != {"version", "halt_epoch"}:
         return False
-    old, new = fields["version"]
-    behind = fields["halt_epoch"][1] - 1
-    return bool(fields["halt_epoch"][0] == ABSENT and 0 < new - old <= max(behind, 0) * 2)
+    before = (
+        sent.fields["version"]
+        for _, sent in difference.moment.story.new(STATUS)
+        if (sent.way, sent.source) == (new.way, new.source)
+    )
+    older, version = fields["version"]
+    return bool(older < version <= 2 * older + 10 and version >= next(before, 0))
 
 
 class Reworded(NamedTuple):
@@ -45,6 +49,7 @@ REWORDED = (
         r"Task (?P<id>\d+) waits: wrong mode, set HOLD",
         r"Task (?P<id>\d+) waits: wrong mode; set HOLD, then continue",
     ),
+    Reworded(r"STOP is latched: continue first", r".* came since: if you still mean it, .*"),
     Reworded(r"cannot go on: wrong mode, set HOLD", r"cannot go on: wrong mode; set HOLD.*"),
 )
 #: what is an operator's no more: restarts, tests of motors, calibration
@@ -89,13 +94,49 @@ def _is_renumbered(difference: Difference) -> bool:
     return difference.name == "STATUSTEXT" and set(fields) == {"id"} and all(fields["id"])
 
 
+#: what is told when a plan or the return is started
+OF_MODE = re.compile(rb"Task \d+ (begins now: return home|queued: plan of \d+ items?)")
+ACK = "COMMAND_ACK"
+
+
 def _tells_of_mode(difference: Difference) -> bool:
     """SET_MODE is told of as DO_SET_MODE is."""
     new, now = difference.new, difference.now
-    if difference.kind is not Kind.ADDED or difference.name != "STATUSTEXT" or new is None:
-        return False
     is_asked = any(True for _ in difference.moment.story.heard("SET_MODE", since=now))
-    return is_asked and b"begins now: return home" in new.fields["text"]
+    if difference.kind is not Kind.ADDED or new is None:
+        return False
+    if difference.name == "TASK_STATUS":  # to who asked, if it reads these
+        return is_asked and new.fields["version"] == 1
+    if difference.name != "STATUSTEXT":
+        return False
+    return is_asked and OF_MODE.fullmatch(new.fields["text"]) is not None
+
+
+def _checked_first(difference: Difference) -> bool:
+    """Of a go-to with a wrong speed and no place, the speed is told; it is refused all the same."""
+    sent = difference.new or difference.old
+    if difference.name != "STATUSTEXT" or sent is None:
+        return False
+    old = Counter(texts(difference.moment.old, sent.way))
+    new = Counter(texts(difference.moment.new, sent.way))
+    return (
+        set(old - new) == {"latitude and longitude are 0: no place is given"}
+        and all(re.fullmatch(r"param1 speed \S+ not in \S+", each) for each in new - old)
+        and _answers(difference, is_new=False) == _answers(difference, is_new=True)
+    )
+
+
+def _among_texts(difference: Difference) -> bool:
+    """Answers stand at another place among texts, and in the same order among themselves."""
+    is_reordered = difference.kind is Kind.REORDERED and difference.name in (ACK, "STATUSTEXT")
+    told = {each.name for each in (*difference.moment.old, *difference.moment.new)}
+    same = _answers(difference, is_new=False) == _answers(difference, is_new=True)
+    return is_reordered and "STATUSTEXT" in told and same
+
+
+def _answers(difference: Difference, *, is_new: bool) -> list[tuple[Any, ...]]:
+    packets = difference.moment.new if is_new else difference.moment.old
+    return [(each.way, each.content) for each in packets if each.name == ACK]
 
 
 TABLE = (
@@ -133,5 +174,15 @@ TABLE = (
         "SET_MODE is told of as DO_SET_MODE is",
         "Both are one request; everybody is told that the return begins.",
         _tells_of_mode,
+    ),
+    Intended(
+        "of two faults of a go-to another one is told",
+        "All parameters are read before the place is looked at.",
+        _checked_first,
+    ),
+    Intended(
+        "answers among texts",
+        "Texts came or went; the answers are the same.",
+        _among_texts,
     ),
 )

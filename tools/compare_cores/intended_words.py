@@ -8,25 +8,33 @@ from mav_tasks.engine.policy import row_of_message
 
 from .differences import Difference, Kind
 from .entries import After, Intended
-from .rovers import OURS, REQUEST_MESSAGE
+from .rovers import OURS, REQUEST_MESSAGE, is_of_rover, is_to_rover
 from .wire import Sent
 from .words import (
     ACK,
+    CLEAR,
     COMMANDS,
     DENIED,
     NOT_ALLOWED,
+    PAUSE_CONTINUE,
     RATE_LIMITED,
     RELEASE,
     STALE,
+    STOOD_STILL,
     TEMPORARILY_REJECTED,
+    UNSUPPORTED,
     VEHICLE_SILENT,
     Refusals,
     is_about,
     is_halt,
     refusals,
+    result_of,
     why_older,
 )
 
+DENIED_PLAN = 14  # a MISSION_ACK's type
+WINDOW = 60.0  # s: signing.window
+KEPT = 61.0  # s for which a wall clock of the record may be old
 ANSWERS = 3.0  # s in which a rover answers
 
 #: of which the policy table says "not beside a task", and the former lists did not
@@ -42,6 +50,18 @@ def _older(difference: Difference) -> list[Refusals]:
 
 def _older_than_halt(difference: Difference) -> bool:
     return any(each.did_something for each in _older(difference))
+
+
+def _continued_nothing(difference: Difference) -> bool:
+    """A continue is refused as STALE that had let nothing go: the queue was not paused."""
+    found, moment = _older(difference), difference.moment
+    if len(found) != 1 or found[0].words[0].of("command") != PAUSE_CONTINUE:
+        return False
+    word = found[0].words[0]
+    texts = [s.fields["text"] for s in moment.old if s.name == "STATUSTEXT"]
+    obeyed = [s for s in moment.old if is_to_rover(s) and s not in moment.new]
+    only = difference.name in (ACK, "STATUSTEXT") and is_about(difference, word)
+    return only and not obeyed and b"Queue continued" not in texts
 
 
 def _older_than_halt_and_refused_before(difference: Difference) -> bool:
@@ -106,7 +126,7 @@ def _shared_question(difference: Difference) -> bool:
 def _halts_first(difference: Difference) -> bool:
     """The same packets in another order, at an instant at which a halt came after other words."""
     moment = difference.moment
-    heard = [*moment.story.heard(*COMMANDS, "SET_MODE", since=difference.now)][::-1]
+    heard = [*moment.story.heard(since=difference.now)][::-1]
     first = next((n for n, each in enumerate(heard) if not is_halt(each)), len(heard))
     comes_later = any(is_halt(each) for each in heard[first:])
     return comes_later and _told(moment.old) == _told(moment.new)
@@ -146,27 +166,127 @@ def _is_policy(difference: Difference) -> bool:
 def _borrowed(difference: Difference) -> bool:
     """Who calls itself the server or a rover is not heard, so nothing is shown to it either."""
     old, story = difference.old, difference.moment.story
-    if difference.kind is not Kind.MISSING or old is None:
+    sent = old or difference.new  # its wishes for fewer messages do not count either
+    if sent is None or difference.kind is Kind.CHANGED or not is_of_rover(sent):
         return False
-    said = [each for each in story.heard() if each.packet.way == old.way]
-    borrowed = [each for each in said if each.packet.source in (OURS, (1, 1), (1, 191))]
+    said = [each for each in story.heard() if each.packet.way == sent.way]
+    borrowed = [each for each in said if is_borrowed(each.packet)]
     return bool(said) and len(said) == len(borrowed)
 
 
 def _busy(difference: Difference) -> bool:
     """An unsent command: its asker is told that the rover is busy, not that it is silent."""
-    fields = difference.fields
-    if difference.name == ACK:
-        return fields == {"result_param2": (VEHICLE_SILENT, RATE_LIMITED)}
-    if difference.name != "STATUSTEXT" or set(fields) - {"severity", "text", "id"}:
+    sent = difference.new or difference.old
+    if sent is None or difference.kind is Kind.REORDERED:
         return False
-    old, new = fields.get("text", (b"", b""))
-    return bytes(old).partition(b": no answer")[0] == bytes(new).partition(b": rover")[0] and bytes(
-        new
-    ).endswith(b"is busy, ask again")
+    old, new = (
+        Counter(_answer(each) for each in packets if each.way == sent.way)
+        for packets in (difference.moment.old, difference.moment.new)
+    )
+    gone, come = set(old - new) - {""}, set(new - old) - {""}
+    is_it = difference.name in (ACK, "STATUSTEXT") and bool(come | gone)
+    return is_it and gone <= {"silent", "unsupported"} and come <= {"busy"}
+
+
+def _answer(sent: Sent) -> str:
+    if sent.name == ACK:
+        number = sent.fields["command"]
+        if result_of(sent) == (TEMPORARILY_REJECTED, RATE_LIMITED):
+            return "busy"
+        if result_of(sent) == (TEMPORARILY_REJECTED, VEHICLE_SILENT):
+            return "silent"
+        is_question = number == REQUEST_MESSAGE
+        return "unsupported" if is_question and result_of(sent) == (UNSUPPORTED, 0) else "other"
+    if sent.name != "STATUSTEXT":
+        return ""
+    if sent.fields["text"].endswith(b"is busy, ask again"):
+        return "busy"
+    return "silent" if b"no answer from vehicle" in sent.fields["text"] else "other"
+
+
+def _not_queued(difference: Difference) -> bool:
+    """A command that the old core had let wait, and the new one has answered: busy."""
+    old, now = difference.old, difference.now
+    if difference.kind is not Kind.MISSING or old is None or old.name not in COMMANDS:
+        return False
+    busy = TEMPORARILY_REJECTED, RATE_LIMITED
+    return old.source != OURS and any(
+        result_of(sent) == busy
+        and sent.fields["command"] == old.fields["command"]
+        and (sent.fields["target_system"], sent.fields["target_component"]) == old.source
+        for _, sent in difference.moment.story.new(ACK, since=now - ANSWERS)
+    )
+
+
+def _borrowed_word(difference: Difference) -> bool:
+    """Who calls itself the server or a rover is denied what it asks for."""
+    return any(
+        is_borrowed(each.words[0].packet) and is_about(difference, each.words[0])
+        for each in refusals(difference, DENIED, NOT_ALLOWED)
+    )
+
+
+def is_borrowed(sent: Sent) -> bool:
+    """Whether a client's packet claims the address of the server or of a rover."""
+    return sent.source in (OURS, (1, 1), (1, 191))
+
+
+def _late_stick(difference: Difference) -> bool:
+    """What moves a rover, and waited while the server stood still, is not passed on."""
+    moment = difference.moment
+    stood = moment.story.silence > STOOD_STILL
+    return stood and any(
+        row_of_message(s.message_id).kind in (PolicyKind.MOTION, PolicyKind.STICKS)
+        for s in moment.old
+        if s.source != OURS and s not in moment.new and not is_of_rover(s)
+    )
+
+
+def _overtaken_upload(difference: Difference) -> bool:
+    """An upload during which a halt came is refused: what it brings would drive."""
+    new = difference.moment.new
+    is_told = any(b" came during the upload: " in s.fields.get("text", b"") for s in new)
+    return is_told and any(s.name == "MISSION_ACK" and s.fields["type"] == DENIED_PLAN for s in new)
+
+
+def _other_plan(difference: Difference) -> bool:
+    """Who uploads a mission keeps others from missions, not from fences and rally points."""
+    story, now = difference.moment.story, difference.now
+    counts = list(story.heard("MISSION_COUNT", since=now - 10.0))
+    if not counts or counts[0].at != now or counts[0].of("mission_type") == 0:
+        return False
+    refused = [s for s in difference.moment.old if s.name == "MISSION_ACK"]
+    return any(
+        s.fields["type"] == DENIED_PLAN and s.fields["mission_type"] != 0 for s in refused
+    ) and any(each.of("mission_type") == 0 for each in counts[1:])
+
+
+def _signed_ahead(difference: Difference) -> bool:
+    """Who signs with a clock that is more than a minute ahead is not heard, nor shown anything."""
+    old, story = difference.old, difference.moment.story
+    if difference.kind is not Kind.MISSING or old is None or story.wall_clock is None:
+        return False
+    said = [each for each in story.heard() if each.packet.signed_at is not None]
+    ahead = [e for e in said if (e.packet.signed_at or 0.0) > story.wall_clock + WINDOW + KEPT]
+    is_shown = any(each.packet.way == old.way for each in ahead)
+    return is_shown or any(each.packet.content[:3] == old.content[:3] for each in ahead)
+
+
+def _cleared_at_once(difference: Difference) -> bool:
+    """What is called off and stands is over at once."""
+    now, moment = difference.now, difference.moment
+    heard = moment.story.heard(*COMMANDS, "MISSION_CLEAR_ALL", since=now)
+    is_cleared = any(e.name == "MISSION_CLEAR_ALL" or e.of("command") == CLEAR for e in heard)
+    texts = [s.fields["text"] for s in (*moment.new, *moment.old) if s.name == "STATUSTEXT"]
+    return is_cleared and any(text.endswith(b"cancelled: cleared") for text in texts)
 
 
 TABLE = (
+    Intended(
+        "a continue of what runs is refused, STALE",
+        "A word older than a halt is refused also where it would have changed nothing.",
+        _continued_nothing,
+    ),
     Intended(
         "a word older than a halt is refused, STALE",
         "What holds beats every older word that lets go; the rover goes on standing.",
@@ -183,6 +303,32 @@ TABLE = (
         "A release, also a submitter's, does not undo what somebody else has paused.",
         _released_waits,
         After.DIVERGES,
+        may_move=True,  # once it is continued; the old core had refused the release
+    ),
+    Intended(
+        "an upload is overtaken by a halt",
+        "What was under way when somebody let the rover stand is not queued to drive.",
+        _overtaken_upload,
+        After.DIVERGES,
+    ),
+    Intended(
+        "an upload keeps others from plans of its type only",
+        "Fences and rally points are separate plans; they do not wait for a mission.",
+        _other_plan,
+        After.DIVERGES,
+    ),
+    Intended(
+        "what moves a rover and waited while the server stood still",
+        "Sticks and set-points of a backlog are old: nobody holds them any more.",
+        _late_stick,
+        After.DIVERGES,
+    ),
+    Intended(
+        "what is cleared and stands is over at once",
+        "A task that does not move its rover need not be seen to stand.",
+        _cleared_at_once,
+        After.DIVERGES,
+        told_within=10.0,
     ),
     Intended(
         "no command of its own meaning beside a task",
@@ -198,6 +344,17 @@ TABLE = (
         "nothing is shown to who borrows an address",
         "Who calls itself the server or a rover is heeded by nobody.",
         _borrowed,
+    ),
+    Intended(
+        "who borrows an address is denied",
+        "Who calls itself the server or a rover is heeded by nobody.",
+        _borrowed_word,
+    ),
+    Intended(
+        "nobody signs ahead of the clock",
+        "Who signs more than a minute ahead could keep right clocks out.",
+        _signed_ahead,
+        After.DIVERGES,
     ),
     Intended(
         "the rover's answer to what was not passed on",
@@ -218,5 +375,10 @@ TABLE = (
         "a command that never left is answered: busy",
         "The rover was not asked, so it cannot be said to be silent.",
         _busy,
+    ),
+    Intended(
+        "four commands of one client wait for a rover, not sixteen",
+        "So that one client alone does not fill the lane of a command; the others are told: busy.",
+        _not_queued,
     ),
 )

@@ -7,17 +7,24 @@ from .story import Heard, Story
 from .wire import Sent
 
 OURS = (250, 191)
-AUTOPILOT = 1
+AUTOPILOT, TASK_SERVER = 1, 191
 ARMED = 128  # in base_mode
 ARM, SET_MODE, REQUEST_MESSAGE = 400, 176, 512
 MEASURES = ("ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+AUTOPILOT_VERSION = 148
 LATE = 0.3  # s: what is older steers nothing
+RESTART = 1.0  # s by which its clock goes back
 JITTER = 0.005  # s: whole ms, and several messages of one moment
 
 
 def is_to_rover(sent: Sent | None) -> bool:
     """Whether the server itself says this to a rover."""
     return sent is not None and sent.source == OURS
+
+
+def is_of_rover(sent: Sent) -> bool:
+    """Whether a rover, or the task server as a part of it, says this to a client."""
+    return sent.source != OURS and sent.source[1] in (AUTOPILOT, TASK_SERVER)
 
 
 def heartbeat(sent: Sent, story: Story) -> Heard | None:
@@ -34,6 +41,13 @@ def is_armed(beat: Heard | None) -> bool:
 def is_hold(sent: Sent) -> bool:
     """Whether it lets a rover stand, or asks for the heartbeat that shows it."""
     return stands(sent) or asks_heartbeat(sent)
+
+
+def asks_identity(sent: Sent) -> bool:
+    """Whether it asks a rover which one it is, as after a restart."""
+    return bool(
+        sent.fields["command"] == REQUEST_MESSAGE and sent.fields["param1"] == AUTOPILOT_VERSION
+    )
 
 
 def asks_heartbeat(sent: Sent) -> bool:
@@ -56,10 +70,15 @@ def arms_or_takes(sent: Sent) -> bool:
 
 def delays(system: int, story: Story, *, since: float = -inf) -> list[float]:
     """Give by how much measures were late, the last first, besides what all of them are."""
-    found = [
-        each.at - each.of("time_boot_ms") / 1000
-        for each in story.heard(*MEASURES, since=since)
-        if each.packet.source == (system, AUTOPILOT)
-    ]
+    found: list[float] = []
+    later = inf
+    for each in story.heard(*MEASURES, since=since):
+        if each.packet.source != (system, AUTOPILOT):
+            continue
+        boot = each.of("time_boot_ms") / 1000
+        if boot > later + RESTART:
+            break  # it has restarted since
+        later = min(later, boot)
+        found.append(each.at - boot)
     least = min(found, default=0.0)
     return [each - least for each in found]

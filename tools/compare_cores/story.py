@@ -43,6 +43,9 @@ class Story:
         """``is_restart``: the server has run before."""
         self.is_restart = is_restart
         self.began: float | None = None
+        self.silence = 0.0  # s, before this instant, in which nothing at all came in
+        self.wall_clock: float | None = None  # s since 1970, as of the last word of it
+        self._now = 0.0
         self._layouts = layouts
         self._inputs: deque[tuple[float, Sequence[Any]]] = deque()
         self._decoded: dict[int, list[Heard]] = {}  # by the identity of the line, which is kept
@@ -52,7 +55,11 @@ class Story:
     def took_in(self, line: Sequence[Any], *, now: float) -> None:
         """Note an input as it stands in the record."""
         if self.began is None:
-            self.began = now
+            self.began = self._now = now
+        if now > self._now:
+            self.silence, self._now = now - self._now, now
+        if line[0] == "wall clock":
+            self.wall_clock = float(line[2])
         if line[0] in OF_PACKETS:
             self._inputs.append((now, line))
             while self._inputs[0][0] < now - KEPT:

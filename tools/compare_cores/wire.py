@@ -8,6 +8,7 @@ from typing import Any
 
 HEADER_V1, HEADER_V2, MAGIC_V2 = 6, 10, 0xFD
 SIGNED = 1  # incompatibility flag
+SIGNING_EPOCH, SIGNING_TICKS = 1_420_070_400, 100_000.0  # 2015, and ticks of 10 µs
 _HEAD = Struct("<BBBBBB")
 
 #: by message id: name, struct format, field names in wire order, numbers of values
@@ -51,6 +52,13 @@ class Sent:
         """Give the payload, perhaps without trailing zeros."""
         start = HEADER_V2 if self.data[0] == MAGIC_V2 else HEADER_V1
         return self.data[start : start + self.data[1]]
+
+    @property
+    def signed_at(self) -> float | None:
+        """Give when it was signed, in s since 1970, by its signature; None: it is not signed."""
+        if self.data[0] != MAGIC_V2 or not self.data[2] & SIGNED:
+            return None
+        return int.from_bytes(self.data[-12:-6], "little") / SIGNING_TICKS + SIGNING_EPOCH
 
     @cached_property
     def content(self) -> tuple[Any, ...]:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from math import isfinite
 from typing import Any, NamedTuple
 
 from .differences import Difference, Kind
@@ -16,7 +17,11 @@ STALE, NOT_ALLOWED, RATE_LIMITED, VEHICLE_SILENT = 114, 108, 113, 9
 
 STOP, PAUSE_CONTINUE, SET_MODE, ARM = 54003, 193, 176, 400
 CANCEL, CLEAR, RELEASE, MISSION_START, REPOSITION = 54010, 54011, 54013, 300, 192
+BUSY = TEMPORARILY_REJECTED, RATE_LIMITED
 COPIED = 3.5  # s after a copy in which the next one comes: the contract
+DOUBLED = 30.0  # s in which the very same packet is a copy: the contract
+STOOD_STILL = 0.5  # s without any input, while rovers stream: the server stood still
+EPOCH_IN = {PAUSE_CONTINUE: "param2", RELEASE: "param3", MISSION_START: "param3"}
 AHEAD = 32  # packets: what seems further ahead may be seconds behind: the contract
 RESTARTED = 3.5  # s after the server's start in which a word may be a copy: the contract
 
@@ -40,7 +45,7 @@ def refusals(difference: Difference, result: int, reason: int) -> Iterator[Refus
             for packets in (moment.old, moment.new)
         )
         added = new - old
-        if set(added) != {(result, reason)}:
+        if (result, reason) not in added or set(added) - {(result, reason), BUSY}:
             continue
         words = [w for w in moment.story.heard(*COMMANDS, since=difference.now) if _from(w) == key]
         gone = old - new
@@ -91,8 +96,12 @@ def why_older(word: Heard, story: Story) -> str:
     now = word.at
     if story.is_restart and story.began is not None and now - story.began <= RESTARTED:
         return "restart"
-    if word.kind != "packets":
+    if word.kind != "packets" or story.silence > STOOD_STILL:
         return "waited"
+    if _names_epoch(word):
+        return "another epoch"
+    if _twin(word, story):
+        return "the same packet from elsewhere"
     if any(is_halt(each) and each is not word for each in story.heard(since=now)):
         return "same moment"
     if _is_overtaken(word, story):
@@ -100,6 +109,20 @@ def why_older(word: Heard, story: Story) -> str:
     if _copies_before_halt(word, story):
         return "copy"
     return ""
+
+
+def _names_epoch(word: Heard) -> bool:
+    place = EPOCH_IN.get(word.of("command"))
+    value = 0.0 if place is None else word.of(place)
+    return bool(isfinite(value) and value >= 1.0)
+
+
+def _twin(word: Heard, story: Story) -> bool:
+    """Whether the very same packet came from another socket."""
+    same = (each for each in story.heard(word.name, since=word.at - DOUBLED) if each is not word)
+    return any(
+        each.packet.data == word.packet.data and each.packet.way != word.packet.way for each in same
+    )
 
 
 def _is_overtaken(word: Heard, story: Story) -> bool:
