@@ -10,12 +10,19 @@ narrow: message, fields, values, and what led to it (``story``); an entry that m
 hides the next mistake.
 """
 
-from . import intended_asks, intended_standing, intended_texts, intended_words
+from . import (
+    intended_asks,
+    intended_measures,
+    intended_standing,
+    intended_texts,
+    intended_words,
+)
 from .entries import Intended
 
 INTENDED: tuple[Intended, ...] = (
     *intended_words.TABLE,
     *intended_asks.TABLE,
     *intended_standing.TABLE,
+    *intended_measures.TABLE,
     *intended_texts.TABLE,
 )

@@ -6,15 +6,12 @@ from itertools import pairwise
 from .differences import Difference, Kind
 from .entries import After, Intended
 from .ledger import said
-from .motion import HOLD_MODES, asks_hold, moves
+from .motion import HOLD_MODES, asks_hold, moves, stands
 from .rovers import (
     ARM,
-    JITTER,
-    LATE,
+    PX4,
     arms_or_takes,
     asks_heartbeat,
-    asks_identity,
-    delays,
     heartbeat,
     is_armed,
     is_hold,
@@ -22,7 +19,7 @@ from .rovers import (
 )
 from .story import Story
 from .wire import Sent
-from .words import CLEAR, REPOSITION
+from .words import CLEAR, STOOD_STILL
 
 GAP = 1.5  # s without a heartbeat: one was lost
 GAP_ENDS = 6.0  # s after which HOLD is asked for at the latest
@@ -31,24 +28,17 @@ SHOWN = 3.0  # s in which what was asked for shows
 LATE_MODE = 5.0  # s in which a mode or an arming may show that has left before a halt
 ASKED = 60.0  # s in which a mode may show that only the old core has asked for
 RESTARTS = 35.0  # s in which a rover that restarts is asked for HOLD, 30 times
-JITTERS = 4.0  # s in which a rover comes to stand
-STATUS = ("STATUSTEXT", "TASK_STATUS", "TASK_QUEUE_STATUS", "MISSION_CURRENT")
 TAKEN = re.compile(rb"taken over: mode is (\w+)")
-NEWS = re.compile(
-    rb"Task \d+ (started|done|paused: position lost|waits: no position|held: .*)|"
-    rb"Rover \d+ moves though .*|Rover \d+ did not stand.*"
-)
-ENDS = re.compile(rb"Task \d+ (started|done)")
 
 
-def _only_one(difference: Difference) -> bool:
+def only_one(difference: Difference) -> bool:
     return difference.kind in (Kind.MISSING, Kind.ADDED)
 
 
 def _in_gap(difference: Difference) -> bool:
     """HOLD that the old core asks for in a gap, and the new one once a heartbeat has come."""
     sent, now, story = difference.new or difference.old, difference.now, difference.moment.story
-    if sent is None or not _only_one(difference) or not is_to_rover(sent) or not is_hold(sent):
+    if sent is None or not only_one(difference) or not is_to_rover(sent) or not is_hold(sent):
         return False
     if difference.kind is Kind.MISSING:
         beat = heartbeat(sent, story)
@@ -70,7 +60,7 @@ def _had_gap(sent: Sent, story: Story, *, now: float) -> bool:
 def _shifted(difference: Difference) -> bool:
     """HOLD and standing set-points that both cores repeat, each from its own first one on."""
     sent, now, story = difference.new or difference.old, difference.now, difference.moment.story
-    if sent is None or not _only_one(difference) or not is_to_rover(sent) or not is_hold(sent):
+    if sent is None or not only_one(difference) or not is_to_rover(sent) or not is_hold(sent):
         return False
     others = story.new if difference.kind is Kind.MISSING else story.old
     if asks_heartbeat(sent):  # once HOLD was answered
@@ -146,84 +136,6 @@ def _clears_driven(difference: Difference) -> bool:
     return bool(cleared and holds)
 
 
-def _late_measures(difference: Difference) -> bool:
-    """What a rover does, it says with a delay: the new core counts that, and waits or stands."""
-    moment = difference.moment
-    if not _is_of_standing(difference):
-        return False
-    systems = {int(s.fields["target_system"]) for s in _to_rovers(difference)}
-    systems |= {s.source[0] for s in (*moment.old, *moment.new) if s.name == "STATUSTEXT"}
-    for system in systems:
-        late = delays(system, moment.story, since=difference.now - 20.0)
-        if late and max(late[:3]) > LATE:
-            return True
-    return False
-
-
-def _jitter(difference: Difference) -> bool:
-    """When a rover stands is told by its own clock: a task ends some ticks earlier or later."""
-    moment, now = difference.moment, difference.now
-    if not _is_of_standing(difference) or difference.kind is Kind.CHANGED:
-        return False
-    told = [s for s in (*moment.old, *moment.new) if s.name == "STATUSTEXT"]
-    if any(NEWS.fullmatch(s.fields["text"]) and not ENDS.fullmatch(s.fields["text"]) for s in told):
-        return False
-    for sent in (*moment.old, *moment.new):
-        if sent.name in STATUS or is_to_rover(sent):
-            system = int(sent.fields.get("target_system", 0)) or sent.source[0]
-            if sent.name in STATUS:
-                system = sent.source[0]
-            late = delays(system, moment.story, since=now - JITTERS)
-            if len(late) > 1 and max(late) - min(late) > JITTER:
-                return True
-    return False
-
-
-def _is_of_standing(difference: Difference) -> bool:
-    """Whether a difference is a packet that lets a rover stand, or news of how a task goes on."""
-    sent = difference.new or difference.old
-    if sent is None or difference.kind is Kind.REORDERED:
-        return False
-    if is_to_rover(sent):
-        return is_hold(sent)
-    moment = difference.moment
-    told = [s for s in (*moment.old, *moment.new) if s.name == "STATUSTEXT"]
-    news = any(NEWS.fullmatch(s.fields["text"]) for s in told)
-    if difference.name == "STATUSTEXT":
-        return NEWS.fullmatch(sent.fields["text"]) is not None
-    return difference.name in STATUS and news
-
-
-def _to_rovers(difference: Difference) -> list[Sent]:
-    moment = difference.moment
-    found = [s for s in (*moment.old, *moment.new) if is_to_rover(s)]
-    return [s for s in found if "target_system" in s.fields]
-
-
-def _restart_seen(difference: Difference) -> bool:
-    """A restart is seen by its clock, and not with the first measure: at another message of it."""
-    sent = difference.new or difference.old
-    if sent is None or not _only_one(difference):
-        return False
-    if difference.name == "STATUSTEXT":
-        return bool(sent.fields["text"].endswith(b" restarted"))
-    return is_to_rover(sent) and sent.name == "COMMAND_LONG" and asks_identity(sent)
-
-
-def _stays_disarmed(difference: Difference) -> bool:
-    """A rover that has restarted counts as disarmed: it is not told to stay at its place."""
-    old, story, now = difference.old, difference.moment.story, difference.now
-    if difference.kind is not Kind.MISSING or old is None or old.name != "COMMAND_INT":
-        return False
-    if not is_to_rover(old) or old.fields["command"] != REPOSITION:
-        return False
-    is_told = any(
-        s.fields["text"].endswith(b"restarted")
-        for _, s in story.new("STATUSTEXT", since=now - RESTARTS)
-    )
-    return is_told or not is_armed(heartbeat(old, story))
-
-
 def _shown_unasked(difference: Difference) -> bool:
     """What shows is not asked for again, though its answer was lost."""
     old, now, story = difference.old, difference.now, difference.moment.story
@@ -276,6 +188,16 @@ def _shows_hold(difference: Difference) -> bool:
     return (float(main), float(sub)) in HOLD_MODES
 
 
+def _slept(difference: Difference) -> bool:
+    """After the machine has slept a PX4 gets no zero: it would end its failsafe's HOLD."""
+    old, moment = difference.old, difference.moment
+    if difference.kind is not Kind.MISSING or old is None or not is_to_rover(old):
+        return False
+    beat = heartbeat(old, moment.story) if stands(old) else None
+    is_px4 = beat is not None and beat.of("autopilot") == PX4
+    return is_px4 and moment.story.silence > STOOD_STILL
+
+
 def _goes_first(difference: Difference) -> bool:
     """While HOLD is asked for, commands leave before set-points that wait."""
     new, now, story = difference.new, difference.now, difference.moment.story
@@ -307,7 +229,7 @@ TABLE = (
     ),
     Intended(
         "our own mode that shows late is taken for a person's",
-        "HOLD was asked for since; which came first is in doubt, and doubts are for standing still.",
+        "HOLD was asked for since; which came first is in doubt, and doubt lets a rover stand.",
         _own_mode_late,
         After.DIVERGES,
     ),
@@ -315,6 +237,11 @@ TABLE = (
         "commands leave first while HOLD is asked for",
         "One that restarts while it is asked for HOLD is asked on, before whatever waits.",
         _goes_first,
+    ),
+    Intended(
+        "no zero for a PX4 after the machine has slept",
+        "It has stopped by its failsafe, which a set-point would end; HOLD keeps it standing.",
+        _slept,
     ),
     Intended(
         "parked by a person while tasks wait: the queue is paused",
@@ -335,24 +262,6 @@ TABLE = (
         After.DIVERGES,
     ),
     Intended(
-        "a restart is seen by the rover's clock",
-        "A measure that is older than the last is a late copy, or a restart: two are asked for.",
-        _restart_seen,
-        After.MOVED,
-        within=6.0,
-    ),
-    Intended(
-        "a rover that is not armed is not told to stay at its place",
-        "A restart disarms; what was shown before proves nothing any more.",
-        _stays_disarmed,
-    ),
-    Intended(
-        "a rover whose measures come late",
-        "How old a measure is, the rover's clock says: what is late does not show that it stands.",
-        _late_measures,
-        After.DIVERGES,
-    ),
-    Intended(
         "what shows is not asked for again",
         "Asked again, mode and arming would undo what a person does meanwhile.",
         _shown_unasked,
@@ -366,12 +275,5 @@ TABLE = (
         "HOLD is asked for until it shows",
         "Up to 30 times, of one that still shows the mode that it was to leave.",
         _insists,
-    ),
-    Intended(
-        "a task ends some ticks earlier or later",
-        "The delay of a net does not count as the rover's: it stands when its clock says so.",
-        _jitter,
-        After.DIVERGES,
-        told_within=1.5,
     ),
 )

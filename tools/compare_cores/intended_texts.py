@@ -99,6 +99,16 @@ OF_MODE = re.compile(rb"Task \d+ (begins now: return home|queued: plan of \d+ it
 ACK = "COMMAND_ACK"
 
 
+def _counts_left_out(difference: Difference) -> bool:
+    """How many texts were too many: those of a flood are others now."""
+    sent = difference.new or difference.old
+    return (
+        difference.name == "STATUSTEXT"
+        and sent is not None
+        and re.fullmatch(rb"\d+ more messages: see the queue", sent.fields["text"]) is not None
+    )
+
+
 def _tells_of_mode(difference: Difference) -> bool:
     """SET_MODE is told of as DO_SET_MODE is."""
     new, now = difference.new, difference.now
@@ -184,5 +194,10 @@ TABLE = (
         "answers among texts",
         "Texts came or went; the answers are the same.",
         _among_texts,
+    ),
+    Intended(
+        "how many texts were left out",
+        "Of a flood of refusals others are told than before.",
+        _counts_left_out,
     ),
 )

@@ -20,7 +20,6 @@ from .words import (
     RATE_LIMITED,
     RELEASE,
     STALE,
-    STOOD_STILL,
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
     VEHICLE_SILENT,
@@ -91,13 +90,13 @@ def _answer_to_unsent(difference: Difference) -> bool:
         for _, sent in story.new(ACK, since=now - ANSWERS)
     )
     sent_old, sent_new = (
-        any(s.fields["command"] == number and s.source == to for _, s in found)
+        sum(s.fields["command"] == number and s.source == to for _, s in found)
         for found in (
             story.old(*COMMANDS, since=now - ANSWERS),
             story.new(*COMMANDS, since=now - ANSWERS),
         )
     )
-    return bool(answered) and refused and sent_old and not sent_new
+    return bool(answered) and refused and sent_old > sent_new
 
 
 def _asks_the_same(one: Sent, other: Sent) -> bool:
@@ -232,13 +231,17 @@ def is_borrowed(sent: Sent) -> bool:
 
 
 def _late_stick(difference: Difference) -> bool:
-    """What moves a rover, and waited while the server stood still, is not passed on."""
-    moment = difference.moment
-    stood = moment.story.silence > STOOD_STILL
-    return stood and any(
-        row_of_message(s.message_id).kind in (PolicyKind.MOTION, PolicyKind.STICKS)
-        for s in moment.old
-        if s.source != OURS and s not in moment.new and not is_of_rover(s)
+    """What moves a rover, and is older than a halt or waited, is not passed on."""
+    moment, story = difference.moment, difference.moment.story
+    gone = [s for s in moment.old if s.source != OURS and not is_of_rover(s)]
+    gone = [s for s in gone if all(s.content[:3] != each.content[:3] for each in moment.new)]
+    kinds = PolicyKind.MOTION, PolicyKind.STICKS
+    moved = [s for s in gone if row_of_message(s.message_id).kind in kinds]
+    words = story.heard(since=difference.now)
+    return any(
+        why_older(word, story)
+        for word in words
+        if any(word.packet.content[:3] == sent.content[:3] for sent in moved)
     )
 
 
@@ -318,8 +321,8 @@ TABLE = (
         After.DIVERGES,
     ),
     Intended(
-        "what moves a rover and waited while the server stood still",
-        "Sticks and set-points of a backlog are old: nobody holds them any more.",
+        "sticks and set-points that are older than a halt, or waited",
+        "Nobody holds a stick any more that came late.",
         _late_stick,
         After.DIVERGES,
     ),

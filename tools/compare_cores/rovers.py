@@ -1,5 +1,6 @@
 """What a record shows of a rover up to a moment, and what both cores have asked of it."""
 
+from itertools import pairwise
 from math import inf
 
 from .motion import asks_hold, stands
@@ -13,6 +14,8 @@ ARM, SET_MODE, REQUEST_MESSAGE = 400, 176, 512
 MEASURES = ("ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
 AUTOPILOT_VERSION = 148
 LATE = 0.3  # s: what is older steers nothing
+PX4 = 12  # autopilot of a heartbeat
+AHEAD = 5.0  # s
 RESTART = 1.0  # s by which its clock goes back
 JITTER = 0.005  # s: whole ms, and several messages of one moment
 
@@ -68,17 +71,44 @@ def arms_or_takes(sent: Sent) -> bool:
     )
 
 
+def boots(system: int, story: Story, *, since: float = -inf) -> list[tuple[float, float]]:
+    """Give of each measure when it came, and when it was made by the rover's clock, last first."""
+    return [
+        (each.at, each.of("time_boot_ms") / 1000)
+        for each in story.heard(*MEASURES, since=since)
+        if each.packet.source == (system, AUTOPILOT)
+    ]
+
+
+def has_restarted(system: int, story: Story, *, since: float) -> bool:
+    """Whether a rover's clock has gone back."""
+    times = [boot for _, boot in boots(system, story, since=since)]
+    return any(later < earlier - RESTART for later, earlier in pairwise(times))
+
+
+def is_ahead(system: int, story: Story) -> bool:
+    """Whether a measure came that seemed to be made later than now: the next seem to be old."""
+    times = boots(system, story)
+    return any(
+        boot - before > at - at_before + AHEAD
+        for (at, boot), (at_before, before) in pairwise(times)
+    )
+
+
+def is_silent(system: int, story: Story, *, now: float, for_: float) -> bool:
+    """Whether nothing that was measured has come for so long, of a rover that measures."""
+    times = boots(system, story)
+    return bool(times) and now - times[0][0] > for_
+
+
 def delays(system: int, story: Story, *, since: float = -inf) -> list[float]:
     """Give by how much measures were late, the last first, besides what all of them are."""
     found: list[float] = []
     later = inf
-    for each in story.heard(*MEASURES, since=since):
-        if each.packet.source != (system, AUTOPILOT):
-            continue
-        boot = each.of("time_boot_ms") / 1000
+    for at, boot in boots(system, story, since=since):
         if boot > later + RESTART:
             break  # it has restarted since
         later = min(later, boot)
-        found.append(each.at - boot)
+        found.append(at - boot)
     least = min(found, default=0.0)
     return [each - least for each in found]
