@@ -39,6 +39,11 @@ class Intended:
     may_move: bool = False
 
 
+def only_one(difference: Difference) -> bool:
+    """Whether it is a packet that only one core sends."""
+    return difference.kind in (Kind.MISSING, Kind.ADDED)
+
+
 def grew(message: str, field: str) -> Condition:
     """Match a message that differs by one field only, which the old revision did not have."""
 

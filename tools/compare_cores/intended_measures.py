@@ -3,7 +3,7 @@
 import re
 
 from .differences import Difference, Kind
-from .entries import After, Intended
+from .entries import After, Intended, only_one
 from .motion import SETPOINTS, moves
 from .rovers import (
     JITTER,
@@ -30,10 +30,6 @@ NEWS = re.compile(
     rb"Rover \d+ moves though .*|Rover \d+ did not stand.*"
 )
 ENDS = re.compile(rb"Task \d+ (started|done)")
-
-
-def only_one(difference: Difference) -> bool:
-    return difference.kind in (Kind.MISSING, Kind.ADDED)
 
 
 def _late_measures(difference: Difference) -> bool:

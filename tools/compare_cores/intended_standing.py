@@ -4,7 +4,7 @@ import re
 from itertools import pairwise
 
 from .differences import Difference, Kind
-from .entries import After, Intended
+from .entries import After, Intended, only_one
 from .ledger import said
 from .motion import HOLD_MODES, asks_hold, moves, stands
 from .rovers import (
@@ -29,10 +29,6 @@ LATE_MODE = 5.0  # s in which a mode or an arming may show that has left before 
 ASKED = 60.0  # s in which a mode may show that only the old core has asked for
 RESTARTS = 35.0  # s in which a rover that restarts is asked for HOLD, 30 times
 TAKEN = re.compile(rb"taken over: mode is (\w+)")
-
-
-def only_one(difference: Difference) -> bool:
-    return difference.kind in (Kind.MISSING, Kind.ADDED)
 
 
 def _in_gap(difference: Difference) -> bool:

@@ -21,7 +21,7 @@ def compare(code: str, folder: Path) -> Any:
     script = f"""
 import json, sys
 from pathlib import Path
-from tools.compare_cores import compared, intended, workers
+from tools.compare_cores import compared, entries, workers
 from tools.compare_cores.differences import Difference, Kind
 from tools.compare_cores.recorded import records_in
 from tools.compare_cores.compared import Comparison
@@ -90,7 +90,7 @@ def test_an_entry_of_the_table_explains_it_and_the_rest_is_compared(folder: Path
     said = compare(
         OTHERWISE
         + """
-entry = intended.Intended("all are 9", "why", lambda d: set(d.fields) == {"priority"})
+entry = entries.Intended("all are 9", "why", lambda d: set(d.fields) == {"priority"})
 print(json.dumps(vars(found([entry]))))
 """,
         folder,
@@ -104,7 +104,7 @@ def test_after_an_entry_that_diverges_nothing_is_compared(folder: Path) -> None:
     said = compare(
         OTHERWISE
         + """
-entry = intended.Intended("all are 9", "why", lambda d: True, intended.After.DIVERGES)
+entry = entries.Intended("all are 9", "why", lambda d: True, entries.After.DIVERGES)
 print(json.dumps(vars(found([entry]))))
 """,
         folder,
