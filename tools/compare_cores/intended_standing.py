@@ -13,13 +13,14 @@ from .rovers import (
     arms_or_takes,
     asks_heartbeat,
     heartbeat,
+    heartbeats,
     is_armed,
     is_hold,
     is_to_rover,
 )
-from .story import Story
+from .story import STOOD_STILL, Story
 from .wire import Sent
-from .words import CLEAR, STOOD_STILL
+from .words import CLEAR, PAUSE_CONTINUE
 
 GAP = 1.5  # s without a heartbeat: one was lost
 GAP_ENDS = 6.0  # s after which HOLD is asked for at the latest
@@ -28,6 +29,7 @@ SHOWN = 3.0  # s in which what was asked for shows
 LATE_MODE = 5.0  # s in which a mode or an arming may show that has left before a halt
 ASKED = 60.0  # s in which a mode may show that only the old core has asked for
 RESTARTS = 35.0  # s in which a rover that restarts is asked for HOLD, 30 times
+DISARMED = re.compile(rb"Task \d+ waits: disarmed; .*")
 TAKEN = re.compile(rb"taken over: mode is (\w+)")
 
 
@@ -44,8 +46,7 @@ def _in_gap(difference: Difference) -> bool:
 
 
 def _had_gap(sent: Sent, story: Story, *, now: float) -> bool:
-    source = sent.fields["target_system"], 1
-    beats = [b.at for b in story.heard("HEARTBEAT", since=now - 30.0) if b.packet.source == source]
+    beats = [each.at for each in heartbeats(sent, story, since=now - 30.0)]
     ends = [now, *beats]
     return (
         any(one - other > GAP for one, other in pairwise(ends) if now - one <= GAP_ENDS)
@@ -106,6 +107,27 @@ def _parked(difference: Difference) -> bool:
     modes = {each.of("custom_mode") for each in beats}
     is_ours = any(is_to_rover(s) and moves(s) for _, s in story.new(since=now - 1.0))
     return len(modes) > 1 and any(map(is_armed, beats)) and not is_ours
+
+
+def _pauses_taken(difference: Difference) -> bool:
+    """A pause also stops a rover that moves without a task, or was taken over: by HOLD."""
+    now, moment = difference.now, difference.moment
+    paused = any(
+        each.of("command") == PAUSE_CONTINUE and each.of("param1") == 0.0
+        for each in moment.story.heard("COMMAND_LONG", "COMMAND_INT", since=now)
+    )
+    asked = [s for s in moment.new if is_to_rover(s) and asks_hold(s)]
+    return paused and any(s.content not in [each.content for each in moment.old] for s in asked)
+
+
+def _stays_as_disarmed(difference: Difference) -> bool:
+    """What somebody has disarmed is not armed for a task before a continue."""
+    now, story = difference.now, difference.moment.story
+    words = list(story.heard("COMMAND_LONG", "COMMAND_INT", since=now - ASKED))
+    disarmed = any(each.of("command") == ARM and each.of("param1") == 0.0 for each in words)
+    waits = any(DISARMED.fullmatch(text) for text in _texts(difference))
+    takes = any(is_to_rover(s) and is_hold(s) for s in difference.moment.old)
+    return disarmed and waits and (takes or difference.kind is Kind.CHANGED)
 
 
 def _late_arming(difference: Difference) -> bool:
@@ -243,6 +265,18 @@ TABLE = (
         "parked by a person while tasks wait: the queue is paused",
         "Who drove the rover and sets HOLD parks it; it does not drive off before a continue.",
         _parked,
+        After.DIVERGES,
+    ),
+    Intended(
+        "a pause stops a rover that was taken over, or moves without a task",
+        "Who pauses means that it stands, whoever drives it.",
+        _pauses_taken,
+        After.DIVERGES,
+    ),
+    Intended(
+        "a rover that was disarmed is armed after a continue only",
+        "Also one that was told so while it was not armed: nobody else arms it for a task.",
+        _stays_as_disarmed,
         After.DIVERGES,
     ),
     Intended(

@@ -1,5 +1,6 @@
 """What a record shows of a rover up to a moment, and what both cores have asked of it."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from math import inf
 
@@ -32,8 +33,15 @@ def is_of_rover(sent: Sent) -> bool:
 
 def heartbeat(sent: Sent, story: Story) -> Heard | None:
     """Give the last heartbeat of the rover to which a packet goes."""
+    return next(heartbeats(sent, story), None)
+
+
+def heartbeats(sent: Sent, story: Story, *, since: float = -inf) -> Iterator[Heard]:
+    """Give those of the rover to which a packet goes, and not of another one of its number."""
     source = sent.fields["target_system"], AUTOPILOT
-    return next((each for each in story.heard("HEARTBEAT") if each.packet.source == source), None)
+    for each in story.heard("HEARTBEAT", since=since):
+        if each.packet.source == source and each.packet.way == sent.way:
+            yield each
 
 
 def is_armed(beat: Heard | None) -> bool:

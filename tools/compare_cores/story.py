@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from .wire import HEADER_V1, HEADER_V2, MAGIC_V2, SIGNED, Layouts, Sent
 
 KEPT = 60.0  # s: the longest that an entry asks about
+STOOD_STILL = 0.5  # s without any input, while rovers stream
 SIGNATURE, CRC = 13, 2  # bytes
 MAGICS = (0xFE, MAGIC_V2)
 OF_PACKETS = ("packets", "at once", "backlog")
@@ -44,6 +45,7 @@ class Story:
         self.is_restart = is_restart
         self.began: float | None = None
         self.silence = 0.0  # s, before this instant, in which nothing at all came in
+        self.stood_until = -inf  # s, when a silence ended in which the server may have stood still
         self.wall_clock: float | None = None  # s since 1970, as of the last word of it
         self._now = 0.0
         self._layouts = layouts
@@ -58,6 +60,8 @@ class Story:
             self.began = self._now = now
         if now > self._now:
             self.silence, self._now = now - self._now, now
+            if self.silence > STOOD_STILL:
+                self.stood_until = now
         if line[0] == "wall clock":
             self.wall_clock = float(line[2])
         if line[0] in OF_PACKETS:

@@ -20,7 +20,7 @@ CANCEL, CLEAR, RELEASE, MISSION_START, REPOSITION = 54010, 54011, 54013, 300, 19
 BUSY = TEMPORARILY_REJECTED, RATE_LIMITED
 COPIED = 3.5  # s after a copy in which the next one comes: the contract
 DOUBLED = 30.0  # s in which the very same packet is a copy: the contract
-STOOD_STILL = 0.5  # s without any input, while rovers stream: the server stood still
+STILL_READ = 0.5  # s after a stand-still in which what is read may have waited
 EPOCH_IN = {PAUSE_CONTINUE: "param2", RELEASE: "param3", MISSION_START: "param3"}
 AHEAD = 32  # packets: what seems further ahead may be seconds behind: the contract
 RESTARTED = 3.5  # s after the server's start in which a word may be a copy: the contract
@@ -96,7 +96,7 @@ def why_older(word: Heard, story: Story) -> str:
     now = word.at
     if story.is_restart and story.began is not None and now - story.began <= RESTARTED:
         return "restart"
-    if word.kind != "packets" or story.silence > STOOD_STILL:
+    if word.kind != "packets" or now - story.stood_until <= STILL_READ:
         return "waited"
     if _names_epoch(word):
         return "another epoch"

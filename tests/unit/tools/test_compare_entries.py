@@ -86,7 +86,7 @@ def test_a_word_is_older_by_a_rule_of_the_contract_only(
 ) -> None:
     quiet = [(at / 100, seq, word) for at, seq, word in [(40.0, 0, (512, 1.0))]]
     story = story_of(*quiet, *[(9.6 + n / 10, 0, (512, 1.0)) for n in range(4)], *words)
-    story.silence = 0.0
+    story.stood_until = -1.0  # it was quiet, and nothing waited
     assert last_of(story) == why
 
 
