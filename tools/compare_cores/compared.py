@@ -14,6 +14,7 @@ from .motion import MotionWatch
 from .new_core import NewCore, sent_of
 from .story import Story
 from .wire import Layouts, Sent
+from .words import let_go
 
 MOST_WAKE_UPS = 1_000  # that only the new core wants, between two inputs
 BOTH = (Kind.MISSING, Kind.ADDED)
@@ -153,6 +154,8 @@ class Comparison:
         """After a split, see that nothing is moved, and that both say what they are to say."""
         now = self._now
         self.result.left_out += len(old)
+        for system in let_go(new, self._story, now=now):
+            self._motion.let_go(system)
         moved = () if self._may_move else self._motion.unmatched(new, now=now)
         for sent in moved:
             self._fail(Difference(Kind.ADDED, now, None, sent, MOVES))

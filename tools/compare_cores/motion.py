@@ -46,10 +46,15 @@ def stands(sent: Sent) -> bool:
 
 
 class MotionWatch:
-    """Sees to it, after a split, that the new core moves only what the old one moves as well."""
+    """Sees to it, after a split, that the new core moves only what the old one moves as well.
+
+    A rover is watched until somebody lets it go and the new core accepts that: from then on its
+    tasks are others than those of the old core, and begin at other times.
+    """
 
     def __init__(self) -> None:
         self._moved_at: dict[object, float] = {}
+        self._let_go: set[int] = set()  # rovers, since the split
 
     def old(self, packets: Iterable[Sent], *, now: float) -> None:
         """Note what the old core sends, also before the split."""
@@ -57,10 +62,16 @@ class MotionWatch:
             if moves(sent):
                 self._moved_at[_rover(sent)] = now
 
+    def let_go(self, system: int) -> None:
+        """Note that the new core has accepted a word that lets a rover go, after the split."""
+        self._let_go.add(system)
+
     def unmatched(self, packets: Iterable[Sent], *, now: float) -> Iterator[Sent]:
         """Give what the new core sends to a rover that the old one does not move."""
         for sent in packets:
-            if moves(sent) and now - self._moved_at.get(_rover(sent), -LATER) > LATER:
+            if not moves(sent) or sent.fields["target_system"] in self._let_go:
+                continue
+            if now - self._moved_at.get(_rover(sent), -LATER) > LATER:
                 yield sent
 
 

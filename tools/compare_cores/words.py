@@ -1,7 +1,7 @@
 """Clients' words at one instant of a record, and how both cores answered each of them."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -86,6 +86,19 @@ def is_halt(heard: Heard) -> bool:
             return True  # without a place it is a pause
         case _:
             return False
+
+
+def let_go(new: Sequence[Sent], story: Story, *, now: float) -> Iterator[int]:
+    """Give the rovers that were let go: by a word that the new core accepts, or a SET_MODE."""
+    for ack in new:
+        if ack.name == ACK and ack.fields["result"] == ACCEPTED:
+            words = story.heard(*COMMANDS, since=now - 1.0)
+            if any(_from(word) == _to(ack) and not is_halt(word) for word in words):
+                yield ack.source[0]
+        elif ack.name == "MISSION_ACK" and ack.fields["type"] == ACCEPTED:
+            yield ack.source[0]
+    for word in story.heard("SET_MODE", "MISSION_ITEM", "MISSION_ITEM_INT", since=now):
+        yield word.of("target_system")
 
 
 def why_older(word: Heard, story: Story) -> str:

@@ -125,6 +125,21 @@ def test_the_new_core_may_move_only_what_the_old_one_has_just_moved() -> None:
     assert list(watch.unmatched([setpoint(0.5)], now=1.1 + motion.LATER)) != []
 
 
+def test_a_rover_that_somebody_lets_go_is_watched_no_more() -> None:
+    watch = motion.MotionWatch()
+    story = story_of((1.0, 1, PAUSE), (2.0, 2, CONTINUE))
+    accepted = packet(m.CommandAck(193, 0, 0, 0, 255, 190), source=(1, 191))
+    assert list(words.let_go([accepted], story, now=2.0)) == [1]
+    watch.let_go(1)
+    assert list(watch.unmatched([setpoint(0.3)], now=2.0)) == []
+
+
+def test_who_pauses_lets_no_rover_go() -> None:
+    story = story_of((1.0, 1, PAUSE))
+    accepted = packet(m.CommandAck(193, 0, 0, 0, 255, 190), source=(1, 191))
+    assert list(words.let_go([accepted], story, now=1.0)) == []
+
+
 def test_what_is_owed_is_found_again_or_overdue() -> None:
     ledger, sent = Ledger(), setpoint(0.0)
     missing = Difference(Kind.MISSING, 1.0, sent, None)
