@@ -20,7 +20,7 @@ from .rovers import (
 )
 from .story import STOOD_STILL, Story
 from .wire import Sent
-from .words import CLEAR, PAUSE_CONTINUE
+from .words import CLEAR, PAUSE_CONTINUE, SET_MODE, why_older
 
 GAP = 1.5  # s without a heartbeat: one was lost
 GAP_ENDS = 6.0  # s after which HOLD is asked for at the latest
@@ -30,6 +30,7 @@ LATE_MODE = 5.0  # s in which a mode or an arming may show that has left before 
 ASKED = 60.0  # s in which a mode may show that only the old core has asked for
 RESTARTS = 35.0  # s in which a rover that restarts is asked for HOLD, 30 times
 DISARMED = re.compile(rb"Task \d+ waits: disarmed; .*")
+SHOWS_LATE = re.compile(rb"Rover \d+ shows \w+, asked for before it was to")
 TAKEN = re.compile(rb"taken over: mode is (\w+)")
 
 
@@ -128,6 +129,24 @@ def _stays_as_disarmed(difference: Difference) -> bool:
     waits = any(DISARMED.fullmatch(text) for text in _texts(difference))
     takes = any(is_to_rover(s) and is_hold(s) for s in difference.moment.old)
     return disarmed and waits and (takes or difference.kind is Kind.CHANGED)
+
+
+def _older_mode(difference: Difference) -> bool:
+    """A SET_MODE that is older than a halt is refused: it has no acknowledgement, but a text."""
+    now, story = difference.now, difference.moment.story
+    words = story.heard("SET_MODE", since=now)
+    told = any(b"came since: if you st" in t or b"it waited while" in t for t in _texts(difference))
+    return told and any(why_older(each, story) for each in words)
+
+
+def _late_mode(difference: Difference) -> bool:
+    """A mode shows that a client had asked for before a halt: HOLD is asked for again."""
+    now, story = difference.now, difference.moment.story
+    asked = any(
+        each.name == "SET_MODE" or each.of("command") == SET_MODE
+        for each in story.heard("SET_MODE", "COMMAND_LONG", since=now - 2 * LATE_MODE)
+    )
+    return asked and any(SHOWS_LATE.match(text) for text in _texts(difference))
 
 
 def _late_arming(difference: Difference) -> bool:
@@ -277,6 +296,18 @@ TABLE = (
         "a rover that was disarmed is armed after a continue only",
         "Also one that was told so while it was not armed: nobody else arms it for a task.",
         _stays_as_disarmed,
+        After.DIVERGES,
+    ),
+    Intended(
+        "a SET_MODE older than a halt is refused",
+        "What holds beats every older word that lets go, also one that is not acknowledged.",
+        _older_mode,
+        After.DIVERGES,
+    ),
+    Intended(
+        "a mode that was asked for before a halt and shows after it is undone",
+        "The net has brought the two to the rover in the wrong order.",
+        _late_mode,
         After.DIVERGES,
     ),
     Intended(

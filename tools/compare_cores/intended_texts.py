@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from .differences import Difference, Kind
-from .entries import Condition, Intended, grew
+from .entries import After, Condition, Intended, grew, only_one
 from .wire import Sent
 
 STATUS = "TASK_QUEUE_STATUS"
@@ -199,5 +199,12 @@ TABLE = (
         "how many texts were left out",
         "Of a flood of refusals others are told than before.",
         _counts_left_out,
+    ),
+    Intended(
+        "MISSION_CURRENT at another time",
+        "It is sent once a second and with each change, counted from the last.",
+        lambda difference: only_one(difference) and difference.name == "MISSION_CURRENT",
+        After.MOVED,
+        within=1.2,
     ),
 )

@@ -128,7 +128,11 @@ def _halts_first(difference: Difference) -> bool:
     heard = [*moment.story.heard(since=difference.now)][::-1]
     first = next((n for n, each in enumerate(heard) if not is_halt(each)), len(heard))
     comes_later = any(is_halt(each) for each in heard[first:])
-    return comes_later and _told(moment.old) == _told(moment.new)
+    old, new = moment.old, moment.new
+    if difference.kind is Kind.REORDERED and difference.old is not None:
+        way = difference.old.way  # whatever else is otherwise at this instant
+        old, new = ([s for s in each if s.way == way] for each in (old, new))
+    return comes_later and _told(old) == _told(new)
 
 
 def _told(packets: Sequence[Sent]) -> Counter[str]:
@@ -145,7 +149,7 @@ def _released_waits(difference: Difference) -> bool:
     moment = difference.moment
     is_released = any(
         each.of("command") == RELEASE
-        for each in moment.story.heard(*COMMANDS, since=difference.now)
+        for each in moment.story.heard(*COMMANDS, since=difference.now - 2.0)
     )
     words = b"released, and goes on when continued"
     return is_released and any(words in s.fields.get("text", b"") for s in moment.new)

@@ -16,7 +16,8 @@ LATER = 5.0
 STANDING = 0.002
 HOLD_MODES = ((4.0, 0.0), (4.0, 3.0))  # param2 and param3 of ArduPilot's HOLD and of PX4's
 SETPOINTS = ("SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT")
-ARM, SET_MODE = 400, 176
+ARM, SET_MODE, REPOSITION = 400, 176, 192
+NO_PLACE = 2_147_483_647  # x and y of a COMMAND_INT
 
 
 def moves(sent: Sent) -> bool:
@@ -42,7 +43,15 @@ def asks_hold(sent: Sent) -> bool:
 
 def stands(sent: Sent) -> bool:
     """Whether a packet to a rover lets it stand: a set-point that means so, or HOLD."""
-    return asks_hold(sent) or (sent.name in SETPOINTS and not moves(sent))
+    is_setpoint = sent.name in SETPOINTS and not moves(sent)
+    return asks_hold(sent) or is_setpoint or stays_here(sent)
+
+
+def stays_here(sent: Sent) -> bool:
+    """Whether a PX4 is told to hold the place where it is: a DO_REPOSITION without a place."""
+    values = sent.fields
+    is_reposition = sent.name == "COMMAND_INT" and values["command"] == REPOSITION
+    return is_reposition and values["x"] == values["y"] == NO_PLACE
 
 
 class MotionWatch:
