@@ -26,10 +26,10 @@ RESTARTS = 35.0  # s in which a rover that restarts is asked for HOLD, 30 times
 JITTERS = 4.0  # s in which a rover comes to stand
 STATUS = ("STATUSTEXT", "TASK_STATUS", "TASK_QUEUE_STATUS", "MISSION_CURRENT")
 NEWS = re.compile(
-    rb"Task \d+ (started|done|paused: position lost|waits: no position|held: .*)|"
+    rb"Task \d+ (started|done|cancelled.*|paused: position lost|waits: no position|held: .*)|"
     rb"Rover \d+ moves though .*|Rover \d+ did not stand.*"
 )
-ENDS = re.compile(rb"Task \d+ (started|done)")
+ENDS = re.compile(rb"Task \d+ (started|done|cancelled.*)")
 
 
 def _late_measures(difference: Difference) -> bool:

@@ -44,6 +44,7 @@ class NewCore:
         self._old_events = 0
         self._old_committed = 0
         self._numbers: list[tuple[int, int]] = []  # old and own number of events, after each turn
+        self._is_store_away = False  # until it has committed something again
         self._taken: list[Outgoing] = []
         self.skipped = 0  # wake-ups that only the old core wanted
         self.added = 0  # and those that only this one did
@@ -58,8 +59,10 @@ class NewCore:
                 return
             self.engine.handle_deadline(now=now)
         elif kind == "committed":
+            self._is_store_away = False
             self._commit(line[2], now=now)
         else:
+            self._is_store_away = self._is_store_away or kind == "store failed"
             if kind == "settings":
                 line = [*line[:2], known(line[2])]
             item = input_of(line)
@@ -88,9 +91,13 @@ class NewCore:
         return [due]
 
     def end_instant(self, layouts: Layouts, *, now: float) -> list[Sent]:
-        """Give all packets since the last instant; events that only this core has are durable."""
+        """Give all packets since the last instant; events that only this core has are durable.
+
+        They are not while the store is away: it would seem to be back.
+        """
         self._take()
-        while self._events > self._committed and self._old_committed == self._old_events:
+        is_stored = self._old_committed == self._old_events and not self._is_store_away
+        while self._events > self._committed and is_stored:
             self._committed = self._events
             self.engine.handle(Committed(self._events), now=now)
             self._take()
