@@ -172,6 +172,9 @@ class TestTakingControl:
         ticks(rig, 0.9)
         assert rig.story() == ["zero"]
         ticks(rig, 0.2)
+        assert rig.story() == ["zero"], "a heartbeat is to show first whose it is now"
+        rig.hear()
+        ticks(rig, 0.1)
         assert "our mode" in rig.story()
 
     def test_one_that_is_armed_in_our_mode_is_in_control_at_once(self) -> None:
@@ -223,7 +226,9 @@ class TestTakingControl:
         rig.answer(MavCmd.DO_SET_MODE, MavResult.ACCEPTED)
         ticks(rig, LEAD_IN - PERIOD)
         assert rig.story() == ["zero", "stay", "zero"]
-        ticks(rig, 4 * PERIOD)
+        ticks(rig, 2 * PERIOD)
+        rig.hear()
+        ticks(rig, 2 * PERIOD)
         assert rig.story() == ["zero", "our mode", "zero"]
 
     @pytest.mark.parametrize("speed", [0.5, -0.5])
