@@ -1,13 +1,13 @@
 """Driving a vehicle from outside: take control, stream velocity setpoints, hand back, stop.
 
-MAVLink guide, "Offboard Control Interface". First a heartbeat that comes from now on: whoever has
-taken the vehicle since the last one keeps it. Steps for ArduPilot: its GUIDED mode, one zero
-setpoint (it keeps a setpoint from before and would drive off when armed: observed), arm, zeros
-until seen armed, and only then motion. For PX4: HOLD, asked for even where it is shown (one that
-shows it because the setpoints were lost would drive again by itself when they return), arm, a
-second of zeros, OFFBOARD, motion. A mode or arm request is believed when a HEARTBEAT shows it, not
-when it is acknowledged. The caller calls one of ``take``, ``drive``, ``release`` or ``stop`` at
-each setpoint period; each does the next thing that is due.
+MAVLink guide, "Offboard Control Interface". First it waits for the next heartbeat: if somebody has
+taken the vehicle since the last one, that shows it, and they keep it. Steps for ArduPilot: its
+GUIDED mode, one zero setpoint (it keeps a setpoint from before and would drive off when armed:
+observed), arm, zeros until seen armed, and only then motion. For PX4: HOLD, asked for even where it
+is shown (one that shows it because the setpoints were lost would drive again by itself when they
+return), arm, a second of zeros, OFFBOARD, motion. A mode or arm request is believed when a
+HEARTBEAT shows it, not when it is acknowledged. The caller calls one of ``take``, ``drive``,
+``release`` or ``stop`` at each setpoint period; each does the next thing that is due.
 """
 
 from enum import Enum, auto
@@ -129,10 +129,6 @@ class OffboardControl:
     @property
     def _may_arm_here(self) -> bool:
         return self._news.in_hold if self._persona.arms_in_hold else self._news.in_our_mode
-
-    @property
-    def _moves_in_hold(self) -> bool:
-        return self._persona.drives_in_hold and self._news.armed
 
     @property
     def _may_move(self) -> bool:

@@ -89,7 +89,7 @@ def why_older(asked: Asked, *, now: float) -> str:
 def has_left_before_halt(asked: Asked, *, anybodys: bool = False, now: float) -> bool:
     """Return whether the last halt is the same sender's, and this word had left before it.
 
-    With ``anybodys`` also whether it may have left before, whoever sent that halt.
+    With ``anybodys`` the halt may be anybody's: it is enough that this word may have left before.
     """
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
     number = line.number_of(asked.packet.seq)
