@@ -58,7 +58,7 @@ class Watch:
     heartbeat_lost: float = 3.5  # silent after three missed beats and some jitter; QGroundControl's
     late_tick: float = 0.5  # a setpoint tick later than this holds the task, LATE
     start_timeout: float = 8.0  # from STARTING to in control; PX4 takes four heartbeats
-    ask_vehicle: float = 1.0  # arm and mode requests are repeated for at most this long
+    ask_vehicle: float = 1.0  # a refused mode or arming is asked for again for this long
     #: a vehicle that is not ready, restarting or refusing to arm, is waited for so long
     ready_timeout: float = 600.0
     lost_timeout: float = 30.0  # paused LINK_LOST or POSITION_LOST for longer than this fails

@@ -122,14 +122,32 @@ class CommandSender:
         now: float,
         give_up_after: float,
         urgent: bool = False,
+        repeats: bool = True,
     ) -> None:
-        """Send a command of our own, repeated until it is answered or given up."""
-        retry = Retry.starting(now=now, interval=REPEAT, give_up_after=give_up_after)
+        """Send a command of our own, repeated until it is answered or given up.
+
+        Without ``repeats`` it is sent once, and again by ``repeat``.
+        """
+        interval = REPEAT if repeats else give_up_after
+        retry = Retry.starting(now=now, interval=interval, give_up_after=give_up_after)
         self._enqueue(
             _Request(None, (message.target_component, message.command), message, None, retry),
             now=now,
             urgent=urgent,
         )
+
+    def repeat(self, message: CommandLong | CommandInt, *, now: float) -> bool:
+        """Send one copy more of a command of our own, which is given up as much later.
+
+        False if none is in flight.
+        """
+        lane = self._lanes.get((message.target_component, message.command))
+        flying = None if lane is None else lane.in_flight
+        if flying is None or flying.origin is not None or flying.message != message:
+            return False
+        flying.retry.renew(now)
+        self._send(flying, now=now)
+        return True
 
     def relay(
         self,
@@ -157,7 +175,7 @@ class CommandSender:
             return
         lane.waiting = [request for request in lane.waiting if request.origin is not None]
         if lane.in_flight is not None and lane.in_flight.origin is None:
-            lane.quiet_until = lane.in_flight.retry.next_at - REPEAT + LATE
+            lane.quiet_until = lane.in_flight.retry.sent_at + LATE
             lane.in_flight = None
 
     def cancel(self, component: int, command: int, *, now: float) -> None:

@@ -22,6 +22,7 @@ from mav_tasks.mavlink.messages import (
     SetPositionTargetLocalNed,
 )
 from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.insistence import Insistence
 from mav_tasks.services.news import AWAITED, News
 from mav_tasks.services.orders import STANDING, Orders, Posture, Speeds, to_stand
 from mav_tasks.services.persona import Persona
@@ -30,17 +31,25 @@ from mav_tasks.settings import Watch
 
 STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirmed yet
 RELEASE_REPEAT = 1.0  # s, the same of a hand-back
-ASK_REPEAT = 0.25  # s, between requests that the vehicle refuses
 STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
 ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 3.7 s
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
 #: times, that one is asked which shows the very mode still that it was to leave: nobody has acted
 INSISTS = 30
+ANSWERED_BY = 5.0  # s, after which an answer to what was asked for in taking counts no more
 LEAD_GAP = 0.2  # s between zeros, after which the stream counts anew
 LEAD_IN = 1.0  # s of zeros before a mode that is entered only while setpoints stream
 UNSTOPPED = 1.0  # s after which a STOP may depend on HOLD no more, where HOLD is not to be trusted
 #: results of an arm request by a vehicle that may arm later: ArduPilot's, PX4's of two versions
 NOT_READY = frozenset({MavResult.FAILED, MavResult.TEMPORARILY_REJECTED, MavResult.DENIED})
+
+
+#: what is asked for in each phase of being taken
+ASKED_IN = {
+    Phase.ASKING_HOLD: MavCmd.DO_SET_MODE,
+    Phase.ASKING_MODE: MavCmd.DO_SET_MODE,
+    Phase.ASKING_ARM: MavCmd.COMPONENT_ARM_DISARM,
+}
 
 
 class Refused(Enum):
@@ -62,14 +71,14 @@ class OffboardControl:
         self._sender = sender
         self._watch = watch
         self._news = News(persona)
-        #: s, since when a heartbeat is awaited that shows whose it is
-        self.looks_since = -inf
+        self._looks_since = -inf  # s, since when a heartbeat is awaited that shows whose it is
+        self._wants_heartbeat = False
         self._looks_back = False  # while LOOKING: it was being handed back, or stopped
         #: what decides which set-point asks it to stand
         self.posture = Posture()
         self._outgoing: list[Message] = []
-        self._ask_until = -inf  # our mode or arming is asked for until then
-        self._ask_again_at: float | None = None  # a refused request is repeated then
+        self._insistence = Insistence()  # while TAKING
+        self._hold_until = -inf  # while RELEASING: HOLD is asked for until then
         self._next_hold_at = 0.0
         self._asks_left = 0  # times
         self._left_mode = -1  # which it showed when HOLD was asked for
@@ -169,6 +178,11 @@ class OffboardControl:
         is_stopping = self.phase is Phase.STOPPING
         return self._news.may_be_our_disarming(is_stopping=is_stopping, now=now)
 
+    def takes_heartbeat(self) -> bool:
+        """Whether the vehicle is to be asked for a heartbeat, once."""
+        wants, self._wants_heartbeat = self._wants_heartbeat, False
+        return wants
+
     def take_messages(self) -> list[Message]:
         """Give the setpoints to send since the last call."""
         outgoing, self._outgoing = self._outgoing, []
@@ -193,14 +207,11 @@ class OffboardControl:
         """Take in the vehicle's answer, or its silence, to a mode or arm request of ours."""
         if answer.ack is not None and answer.ack.result == MavResult.ACCEPTED:
             self._news.accepted(is_mode=answer.command == MavCmd.DO_SET_MODE, now=now)
-            return
-        asked = {
-            Phase.ASKING_HOLD: MavCmd.DO_SET_MODE,
-            Phase.ASKING_MODE: MavCmd.DO_SET_MODE,
-            Phase.ASKING_ARM: MavCmd.COMPONENT_ARM_DISARM,
-        }
-        if asked.get(self.phase) == answer.command:
-            self._ask_again_at = now + ASK_REPEAT
+            if ASKED_IN.get(self.phase) == answer.command:
+                self._insistence.accepted()
+        elif ASKED_IN.get(self.phase) == answer.command:
+            if answer.ack is not None:
+                self._insistence.refused(now=now)
             if self.phase is Phase.ASKING_ARM:
                 self._arm_result = None if answer.ack is None else answer.ack.result
         elif self.phase is Phase.DISARMING and answer.command == MavCmd.COMPONENT_ARM_DISARM:
@@ -294,10 +305,13 @@ class OffboardControl:
         """Await a heartbeat: the last is up to a second old, and a person may have it since."""
         self._looks_back = self.phase is not Phase.IDLE
         self._begin_asking(Phase.LOOKING, now=now)
-        self.looks_since = now
+        self._ask_to_show(now=now)
+
+    def _ask_to_show(self, *, now: float) -> None:
+        self._looks_since, self._wants_heartbeat = now, True
 
     def _shows_whose_it_is(self, now: float) -> bool:
-        since = self.looks_since if self.phase is Phase.LOOKING else now
+        since = self._looks_since if self.phase is Phase.LOOKING else now
         return self._news.is_newer_than(since)
 
     def _next_by_way_of_hold(self, *, may_arm: bool, now: float) -> None:
@@ -346,9 +360,9 @@ class OffboardControl:
         self._led_at = now
         if now < self._lead_until:
             return True
-        if self.looks_since < self._lead_until:
-            self.looks_since = now
-        return not self._news.is_newer_than(self.looks_since)
+        if self._looks_since < self._lead_until:
+            self._ask_to_show(now=now)
+        return not self._news.is_newer_than(self._looks_since)
 
     def drive(self, wanted: Speeds) -> None:
         """Send a velocity setpoint; zeros unless ``in_control``."""
@@ -399,8 +413,8 @@ class OffboardControl:
             case Phase.RELEASING if self._gives_up_hold(now):
                 self._withdraw(MavCmd.DO_SET_MODE)
                 self.phase = Phase.IDLE
-            case Phase.RELEASING if now >= self._ask_until and self._news.is_silent(now):
-                self._ask_until, self._asks_left = now, INSISTS  # until it is heard again
+            case Phase.RELEASING if now >= self._hold_until and self._news.is_silent(now):
+                self._hold_until, self._asks_left = now, INSISTS  # until it is heard again
             case Phase.RELEASING:
                 self._send_setpoint(STANDING)
                 if now >= self._next_hold_at:
@@ -420,7 +434,7 @@ class OffboardControl:
         self._withdraw_requests()
         self.phase = Phase.RELEASING
         self.refused = None
-        self._ask_until, self._left_mode = now + RELEASE_LIMIT, self._news.mode
+        self._hold_until, self._left_mode = now + RELEASE_LIMIT, self._news.mode
         self._asks_left = INSISTS
         self._news.unsettle(now, awaits_hold=True)
         self._send_setpoint(STANDING)
@@ -431,7 +445,7 @@ class OffboardControl:
         if self._news.in_our_mode or self._news.is_silent(now):
             return False
         shows_still = self._news.mode == self._left_mode
-        return now >= self._ask_until and not (shows_still and self._asks_left > 0)
+        return now >= self._hold_until and not (shows_still and self._asks_left > 0)
 
     def begin_stop(self, *, now: float, brake_for: float = 0.0) -> None:
         """Zero and HOLD at once, ahead of whatever was asked for; ``stop`` repeats them.
@@ -518,8 +532,7 @@ class OffboardControl:
         self._withdraw_requests()
         self.refused = None
         self.phase = phase
-        self._ask_until = now + self._watch.ask_vehicle
-        self._ask_again_at = None
+        self._insistence.begin(until=now + self._watch.ask_vehicle)
 
     def _begin_arming(self, *, may_arm: bool, now: float) -> None:
         """In the mode for it: clear what setpoint there was, then see to arming."""
@@ -531,34 +544,49 @@ class OffboardControl:
 
     def _insist(self, what: Refused, *, now: float) -> None:
         """Ask again for what was refused or not answered, or take it for an answer."""
-        if self._ask_again_at is None:
-            return
-        if now >= self._ask_until:
-            self.refused = what
-            self.we_armed = False
-            self._news.awaits_answer = False
-        elif now >= self._ask_again_at:
-            self._ask_again_at = None
-            if what is Refused.ARM:
-                self._ask_arming(now=now)
-            elif self.phase is Phase.ASKING_HOLD:
-                self._ask_hold(now=now)
-            else:
-                self._ask_mode(now=now)
+        if self._insistence.is_refusal(now):
+            self._give_up(what)
+        elif self._insistence.is_due(now):
+            if self._insistence.begins_to_look():
+                self._ask_to_show(now=now)
+            if self._news.is_newer_than(self._looks_since):
+                if self._insistence.is_in_vain(now):
+                    self._give_up(what)
+                else:
+                    self._ask_again(what, now=now)
+
+    def _give_up(self, what: Refused) -> None:
+        self.refused = what
+        self.we_armed = False
+        self._news.awaits_answer = False
+
+    def _ask_again(self, what: Refused, *, now: float) -> None:
+        if what is Refused.ARM:
+            self._ask_arming(now=now)
+        elif self.phase is Phase.ASKING_HOLD:
+            self._ask_hold(now=now)
+        else:
+            self._ask_mode(now=now)
 
     def _ask_mode(self, *, now: float) -> None:
         self._news.mode_asked_at = now
         self._news.unsettle(now, mode=self._persona.control_mode)
-        self._request(self._orders.our_mode(), until=self._ask_until, now=now)
+        self._ask(self._orders.our_mode(), now=now)
 
     def _ask_hold(self, *, now: float) -> None:
         self._news.hold_asked_at = now
         self._news.unsettle(now, awaits_hold=True)
-        self._request(self._orders.hold(), until=self._ask_until, now=now)
+        self._ask(self._orders.hold(), now=now)
 
     def _ask_arming(self, *, now: float) -> None:
         self._news.arming_asked_at = now
-        self._request(self._orders.arming(arm=True), until=self._ask_until, now=now)
+        self._ask(self._orders.arming(arm=True), now=now)
+
+    def _ask(self, command: CommandLong, *, now: float) -> None:
+        """Ask once, of which a copy goes only when it is seen that nobody has acted since."""
+        self._insistence.asked(now=now)
+        if not self._sender.repeat(command, now=now):
+            self._sender.request(command, now=now, give_up_after=ANSWERED_BY, repeats=False)
 
     def _end_release(self, *, disarm: bool, now: float) -> None:
         if disarm and self.we_armed:  # also where that was asked for and is not seen yet

@@ -1,6 +1,7 @@
 """Repeating a request until it is answered or too old: arithmetic only."""
 
 from dataclasses import dataclass
+from math import inf
 
 
 @dataclass(slots=True)
@@ -11,6 +12,7 @@ class Retry:
     give_up_at: float
     next_at: float
     sent: int = 0
+    sent_at: float = -inf
 
     @classmethod
     def starting(cls, *, now: float, interval: float, give_up_after: float) -> "Retry":
@@ -28,7 +30,12 @@ class Retry:
     def note_sent(self, now: float) -> None:
         """Count a sending and plan the next."""
         self.sent += 1
+        self.sent_at = now
         self.next_at = now + self.interval
+
+    def renew(self, now: float) -> None:
+        """Give it as long as at first, from now on."""
+        self.give_up_at += now - self.sent_at
 
     def next_deadline(self) -> float:
         """Give the next moment at which something changes."""

@@ -349,7 +349,11 @@ _WATCH = (
         _seconds(3, 120),
         "a task that has not begun to drive by then fails",
     ),
-    _key("watch.ask_vehicle", _seconds(0.3, 5), "arm and mode requests are repeated for so long"),
+    _key(
+        "watch.ask_vehicle",
+        _seconds(0.3, 5),
+        "a mode, or arming, that the rover refuses is asked for again for so long",
+    ),
     _key(
         "watch.ready_timeout",
         _seconds(0, 3600),

@@ -158,9 +158,8 @@ class Pilot:
         control = parts.control
         match demand.kind:
             case DemandKind.TAKE:
-                looked_since = control.looks_since
                 control.take(may_arm=seen.may_arm, now=now)
-                if control.looks_since != looked_since:
+                if control.takes_heartbeat():
                     parts.requests.ask_to_show(now=now)
             case DemandKind.DRIVE:
                 wanted = demand.velocity

@@ -21,7 +21,8 @@ from tests.scenarios.attacks.test_words_passed_on import go_to
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_car import RADIUS, car_profile
 
-CANCEL, CLEAR, SET_MODE = 54010, 54011, 176
+CANCEL, CLEAR, SET_MODE, ARM = 54010, 54011, 176, 400
+COMMAND_ACK = 77
 POSITIONS = (30, 32, 33)  # ATTITUDE, and where it is
 EVERY_MAKE = pytest.mark.parametrize(
     "persona", [PROMPT, ARDUPILOT, PROMPT_PX4, PX4], ids=["ap", "ap 1 Hz", "px4", "px4 1 Hz"]
@@ -369,3 +370,41 @@ def test_a_halt_while_it_is_being_taken_stops_its_way_to_a_place(
     assert said.result == ACCEPTED
     assert world.truth.north - north < 20  # by STOP, too, 14 to 18 m
     assert abs(world.truth.forward_speed) < 0.05
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=["ap", "px4"])
+@pytest.mark.parametrize("answers", [1, 3])
+@pytest.mark.parametrize("after", [0.05, 0.15, 0.3])
+@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5, 0.75])
+def test_who_takes_it_while_the_answer_to_our_mode_is_lost_keeps_it(
+    make_world: MakeWorld, persona: Persona, answers: int, after: float, phase: float
+) -> None:
+    """It has done as it was asked, and the copy of what was not answered would do it again."""
+    world = make_world(persona=persona, shows_on_request=False)
+    world.client.move(10.0)
+    world.until(lambda: world.truth.forward_speed > 0.45, within=30)
+    world.client.pause()
+    world.run(6 + phase)
+    lost: list[bytes] = []
+
+    def loses(source: str, _target: str, data: bytes) -> bool:
+        is_answer = source == "rover1" and data[7] == COMMAND_ACK
+        if is_answer and answered(data) in (SET_MODE, ARM) and len(lost) < answers:
+            lost.append(data)
+            return True
+        return False
+
+    world.watched.loses = loses
+    world.client.proceed()
+    world.until(lambda: world.rover.autopilot.mode is Mode.GUIDED, within=10)
+    world.run(after)
+    world.operator_mode(Mode.MANUAL)
+    before = world.truth.north
+    world.run(8)
+    assert abs(world.truth.north - before) < 0.3, "it rolls out, and no more"
+    assert lost
+
+
+def answered(data: bytes) -> int:
+    """Give which command an answer of MAVLink 2 is to."""
+    return int.from_bytes(data[10:12], "little")

@@ -111,6 +111,30 @@ def test_our_own_command_is_repeated_until_it_is_given_up() -> None:
     assert rig.sender.next_deadline() is None
 
 
+def test_what_is_not_to_be_repeated_goes_again_when_it_is_told_to() -> None:
+    rig = Rig()
+    rig.sender.request(command(), now=5.0, give_up_after=3.0, repeats=False)
+    rig.take(5.0)
+    rig.run(6.0)
+    assert not rig.sender.repeat(command(param1=0.0), now=6.0), "that was not asked for"
+    assert rig.sender.repeat(command(), now=6.0)
+    rig.take(6.0)
+    rig.run(10.0)
+    assert (rig.times, rig.results) == ([5.0, 6.0], [(9.0, None, None)])
+    assert not rig.sender.repeat(command(), now=10.0), "it was given up"
+
+
+def test_after_a_withdrawal_the_next_waits_for_the_answer_to_the_copy() -> None:
+    rig = Rig()
+    rig.sender.request(command(), now=5.0, give_up_after=3.0, repeats=False)
+    rig.sender.repeat(command(), now=6.0)
+    rig.sender.withdraw(AUTOPILOT, ARM)
+    rig.take(6.0)
+    rig.request(command(param1=0.0), 6.1)
+    rig.run(6.5)
+    assert rig.times == [6.0, 6.0, 6.0 + LATE]
+
+
 def test_each_repeat_is_the_same_message_with_confirmation_0() -> None:
     rig = Rig()
     wanted = command()

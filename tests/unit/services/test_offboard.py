@@ -12,7 +12,7 @@ from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Watch
 from tests.unit.services.control_rig import PERIOD, Rig
 
-HOLD, GUIDED = ARDUPILOT.hold_mode, ARDUPILOT.control_mode
+HOLD, GUIDED, MANUAL = ARDUPILOT.hold_mode, ARDUPILOT.control_mode, 0
 ASK_FOR = Watch().ask_vehicle  # s
 
 
@@ -125,10 +125,42 @@ class TestTakingControl:
             rig.take()
             if result is not None:
                 rig.answer(command, result)
+            rig.hear()
             rig.tick()
         assert rig.control.refused is refused
         assert ASK_FOR <= rig.now - start <= ASK_FOR + 4 * PERIOD
         assert "velocity" not in " ".join(rig.story())
+
+    @pytest.mark.parametrize(("mode", "asks"), [(HOLD, "our mode"), (GUIDED, "arm")])
+    def test_asks_again_only_once_a_heartbeat_shows_that_nobody_has_acted(
+        self, mode: int, asks: str
+    ) -> None:
+        rig = Rig(mode=mode)
+        rig.now += 0.1  # that its first heartbeat comes before what is looked for
+        rig.take()
+        assert not rig.control.takes_heartbeat()
+        for _ in range(round(3 * ASK_FOR / PERIOD)):
+            rig.take()
+            rig.tick()
+            assert rig.refused is None, "silence is no answer yet"
+        assert rig.sent.count(asks) == 1, "a person may have taken it since"
+        assert [rig.control.takes_heartbeat() for _ in range(2)] == [True, False]
+        rig.hear()
+        rig.take()
+        assert rig.sent.count(asks) == 2
+
+    def test_a_person_seen_before_the_mode_is_asked_for_again_keeps_it(self) -> None:
+        rig = Rig(mode=HOLD, armed=True)
+        rig.take()
+        for _ in range(8):
+            rig.take()
+            rig.tick()
+        rig.hear(mode=MANUAL)
+        assert not rig.control.may_have_set(MANUAL, now=rig.now)
+        rig.control.lose()
+        for _ in range(round(2 * ASK_FOR / PERIOD)):
+            rig.tick()
+        assert rig.story() == ["our mode"]
 
     def test_a_refusal_is_forgotten_when_control_is_wanted_again(self) -> None:
         rig = Rig()

@@ -213,6 +213,7 @@ class TestTakingControl:
         rig.story()
         for _ in range(10):
             rig.answer(MavCmd.DO_SET_MODE, MavResult.TEMPORARILY_REJECTED)
+            rig.hear()
             ticks(rig, PERIOD)
         assert rig.story() == ["zero", "our mode", "zero"]
 
