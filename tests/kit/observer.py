@@ -45,6 +45,7 @@ GREETING = (
 BY_CLIENT = 2.5  # s after a client's wish to arm, in which that the rover is armed is its doing
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
+INITIALISING = 16  # custom_mode of an ArduPilot that starts
 SAME_PACKET = 5.0  # s; then numbers may have begun anew, and it is another one
 REMEMBERED = 64  # commands of clients
 ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops by itself: ArduPilot's; PX4's is 1
@@ -117,7 +118,6 @@ class Observer:
     ways: Ways = ARDUPILOT_WAYS
     #: a test that stops the server's clock expects a gap
     expects_gaps: bool = False
-    expects_late_modes: bool = False  # from before a halt: zeros go with the HOLD that undoes them
     #: a world that does several things in one step: which came first is not known
     batches: bool = False
     #: whether the rover is really armed and in our mode
@@ -152,6 +152,7 @@ class Observer:
     _stick_hold_at: float = -1e9  # the last request for HOLD that a stick has brought
     _sticks_at: float = -2e9
     _disarm_at: float = -1e9
+    _disarmed_at: float = -1e9  # when it was seen that somebody else has disarmed it
     _mode_at: float = -1e9  # when it was last heard that the mode is another one
     _hold_wished_at: float = -1e9  # when a client last asked for HOLD
     _pause_at: float = -1e9  # when a client last asked for a pause
@@ -337,6 +338,7 @@ class Observer:
             self._stop_due = (now, {"zero", "HOLD"})  # found now
         if self.armed and not armed and now - self._disarm_at > OWN_REQUEST:
             self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
+            self._disarmed_at = now  # nor where it was taken over before
         if mode != self.mode:
             self._zero_in_mode = False
             self._mode_at = now
@@ -344,6 +346,8 @@ class Observer:
             by_us = asked and not self._moved_last  # driving on, we had not asked for this one
             # news of HOLD in the step in which a client asks for it, and in which we ask the rover
             by_us |= self.batches and mode == self.ways.hold and now == self._hold_wished_at
+            # it has restarted before it was driven: the task that is to drive it begins again
+            by_us |= mode == INITIALISING and not self._moved_last
             if self.mode == self.ways.ours and not by_us:
                 self._take_over(now, zeros=0)
         self.armed, self.mode = armed, mode
@@ -386,13 +390,15 @@ class Observer:
                 self._violation(now, "a client's setpoint while the server drives")
             return
         if self.taken_over and (moves or now != self._greeting_at):
-            # a client's pause stops a rover that somebody else drives: zero and HOLD at once; to
-            # no other pause does a zero belong. After a freeze, HOLD for a stick is asked for again
-            is_held = self._is_held_for_sticks(now)
-            if not moves and (now == self._pause_at or (self._is_held_since_stick and not is_held)):
+            # a zero goes with HOLD, or soon after it: for a client's pause, or to undo what came late
+            is_held = now - max(self._hold_at, self._stick_hold_at) <= OWN_REQUEST
+            is_pause = now == self._pause_at or self._is_held_since_stick
+            if moves:
+                self._violation(now, "moving setpoint after a takeover")
+            elif now == self._disarmed_at or is_held:
+                pass
+            elif is_pause or self._zeros_left == 0:
                 self._hold_due = now
-            elif moves or (self._zeros_left == 0 and not is_held and not self.expects_late_modes):
-                self._violation(now, f"setpoint after a takeover: {self._name(message)}")
             self._zeros_left = max(0, self._zeros_left - 1)
         self._check_rate(now, moves=moves)
         if moves:
