@@ -102,6 +102,7 @@ class Halts:
         self._disturbed_at = -1e9
         self._mode = vehicle.autopilot.mode
         self._mode_sent_at = -1e9  # a request of the server for a mode reached the rover
+        self._passed: dict[int, float] = {}  # commands of clients, when they reached the rover
         self._pauses = True  # of the last halt that was read
         self._is_by_itself = False  # in a mode of its own, and not by the server
         self.halted: Counter[str] = Counter()  # by name
@@ -131,6 +132,10 @@ class Halts:
     def mode_arrived(self, *, now: float) -> None:
         """A request of the server for a mode reaches the rover."""
         self._mode_sent_at = now
+
+    def passed(self, command: int, *, now: float) -> None:
+        """A client's command reaches the rover, and counts even if its answer is lost."""
+        self._passed[command] = now
 
     def began_task(self) -> None:
         """Another task begins: what was called off before has nothing to do with it."""
@@ -168,6 +173,7 @@ class Halts:
             if is_granted:
                 self._begin(word.name, word, read_at=read_at, now=now)
             return
+        is_granted |= self._passed.get(command, -1e9) >= read_at
         if not is_granted:
             self.refused[word.name] += 1
         for go in self._gos:

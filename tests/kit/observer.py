@@ -50,6 +50,7 @@ SAME_PACKET = 5.0  # s; then numbers may have begun anew, and it is another one
 REMEMBERED = 64  # commands of clients
 ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops by itself: ArduPilot's; PX4's is 1
 ANOTHER_COURSE = 0.05  # rad
+ENTERS = 0.3  # s from the request for OFFBOARD until it has a setpoint of that time
 TURN = 8.0  # s, half a turn at the slowest that tasks ask for here
 FAR = 60.0  # s of driving by itself, to a place or in a mode of the rover's own
 
@@ -118,6 +119,7 @@ class Observer:
     ways: Ways = ARDUPILOT_WAYS
     #: a test that stops the server's clock expects a gap
     expects_gaps: bool = False
+    expects_late_modes: bool = False  # from before a halt: zeros go with the HOLD that undoes them
     #: a world that does several things in one step: which came first is not known
     batches: bool = False
     #: whether the rover is really armed and in our mode
@@ -261,6 +263,8 @@ class Observer:
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self._is_wish_for_our_mode(message):
             self._given_to = source  # whoever asks for our mode drives from here on
+            if self.ways.arms_in_hold:  # a PX4 goes on with the last that it followed before
+                self.may_move_until = max(self.may_move_until, now + ENTERS)
         if message.get_type() in SETPOINTS and _moves(message):
             if source == SERVER and not self.is_ready() and self._is_known_unready(now):
                 self._violation(now, "moving setpoint at a rover known not to be ready for it")
@@ -390,8 +394,9 @@ class Observer:
                 self._violation(now, "a client's setpoint while the server drives")
             return
         if self.taken_over and (moves or now != self._greeting_at):
-            # a zero goes with HOLD, or soon after it: for a client's pause, or to undo what came late
-            is_held = now - max(self._hold_at, self._stick_hold_at) <= OWN_REQUEST
+            # a zero goes with HOLD or soon after it: for a pause, or to undo what came late
+            hold_at = self._hold_at if self.expects_late_modes else -1e9
+            is_held = now - max(hold_at, self._stick_hold_at) <= OWN_REQUEST
             is_pause = now == self._pause_at or self._is_held_since_stick
             if moves:
                 self._violation(now, "moving setpoint after a takeover")

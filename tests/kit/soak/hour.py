@@ -112,7 +112,7 @@ class Hour:
         )
         store.now = lambda: world.now
         for observer in world.observers:
-            observer.expects_gaps = observer.batches = True
+            observer.expects_gaps = observer.batches = observer.expects_late_modes = True
         clients = [world.client] + [
             world.add_client(f"client{number}", system_id=100 + number)
             for number in range(1, self._settings.clients)

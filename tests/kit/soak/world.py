@@ -45,6 +45,8 @@ COMMAND_OF_ACK = slice(10, 12)  # of a whole COMMAND_ACK packet
 RESULT_OF_ACK = 12
 COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG
 SET_MODE_MESSAGE = 11
+COMMANDS = (75, 76)  # COMMAND_INT, COMMAND_LONG
+SERVER = 250  # system
 ENDS_WITHIN = 2.0  # s, of a server that is ended in order
 MEANWHILE = (0.1, 0.5, 2.0)  # s, between two deeds of clients while the server stands still
 
@@ -100,7 +102,7 @@ class SoakWorld(World):
         self._read: dict[str, int] = {}  # packets of each client
         self._look_at = self._compare_at = self._forget_at = self._walk_at = 0.0
         for observer in self.observers:
-            observer.expects_gaps = observer.batches = True
+            observer.expects_gaps = observer.batches = observer.expects_late_modes = True
         self.watched.loses = self._passes_by
         self.watched.on_read = self._server_reads
         self.watched.on_arrival = self._rover_hears
@@ -316,6 +318,8 @@ class SoakWorld(World):
         halts = self.halts[int(rover.removeprefix("rover")) - 1]
         if source != VEHICLE_LINK:
             halts.pushed()
+        elif data[5] != SERVER and data[7] in COMMANDS:
+            halts.passed(int.from_bytes(data[COMMAND_ID], "little"), now=self.now)
         elif data[7] == SET_MODE_MESSAGE or (
             data[7] == MODE_COMMAND and data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
         ):

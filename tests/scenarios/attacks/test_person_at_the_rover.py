@@ -215,6 +215,7 @@ def test_a_return_from_before_its_task_was_called_off(
 ) -> None:
     """It comes while the rover still rolls out."""
     person = world.add_client("person", system_id=245)
+    world.observer.expects_late_modes = True
     world.client.move(60, speed=0.5)
     world.until(lambda: world.truth.north > 8, within=40)
     caught = catch(world, RETURN)

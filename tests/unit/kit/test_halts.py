@@ -142,6 +142,24 @@ def test_what_is_refused_lets_nothing_go(watched: Watched) -> None:
     assert watched.halts.refused == {"continue": 1}
 
 
+def test_what_reached_the_rover_lets_it_go_though_its_answer_is_lost(watched: Watched) -> None:
+    watched.say("pause")
+    watched.stand(3)
+    watched.halts.passed(COMMANDS["continue"], now=watched.now)
+    watched.say("continue", result=DENIED)
+    assert watched.drive(1) == []
+    assert watched.halts.refused == {}
+
+
+def test_what_reached_the_rover_before_the_halt_does_not(watched: Watched) -> None:
+    watched.halts.passed(COMMANDS["continue"], now=watched.now)
+    watched.stand(1)
+    watched.say("pause")
+    watched.stand(3)
+    watched.say("continue", result=DENIED)
+    assert watched.drive(1) == ["pause, then no word"]
+
+
 def test_after_stop_only_a_continue_lets_it_go(watched: Watched) -> None:
     watched.say("STOP")
     watched.stand(3)
