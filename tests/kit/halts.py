@@ -157,7 +157,7 @@ class Halts:
         elif word.kind in (Kind.GO, Kind.MOTION):
             self._read_go(word, now=now)
         elif word.kind is Kind.WISH and self._halt is not None:
-            if not self._halt.pauses and word.first_sent > self._halt.read_at:
+            if not self._halt.pauses and self._ends(word, self._halt):
                 self._halt = None
                 return
             self._halt.note(word, f"a {'copy of a ' if word.is_copy else ''}{word.name}")

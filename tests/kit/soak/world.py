@@ -177,8 +177,12 @@ class SoakWorld(World):
         self.net.send(said.client.name, said.client.server, data)
 
     def person_turns(self, number: int, mode: Mode) -> None:
-        """Let a person turn the mode switch at a rover."""
-        self.rovers[number - 1].autopilot.operator_mode(mode, now=self.now)
+        """Let a person turn the mode switch at a rover; what changes nothing nobody can see."""
+        autopilot = self.rovers[number - 1].autopilot
+        was_mode = autopilot.mode
+        autopilot.operator_mode(mode, now=self.now)
+        if autopilot.mode is was_mode:
+            return
         drives = mode is not Mode.HOLD
         self.halts[number - 1].person("HOLD at the rover", drives=drives, now=self.now)
 
