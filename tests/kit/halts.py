@@ -156,11 +156,8 @@ class Halts:
                 self._pauses = word.name != HOLD or has_tasks
         elif word.kind in (Kind.GO, Kind.MOTION):
             self._read_go(word, now=now)
-        elif word.kind is Kind.WISH and self._halt is not None:
-            if not self._halt.pauses and self._ends(word, self._halt):
-                self._halt = None
-                return
-            self._halt.note(word, f"a {'copy of a ' if word.is_copy else ''}{word.name}")
+        elif word.kind is Kind.WISH:
+            self._read_wish(word)
 
     def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
         """The server answers a client."""
@@ -241,6 +238,15 @@ class Halts:
             self._suspended, self._halt = halt, None
         else:
             self._halt = self._suspended = None
+
+    def _read_wish(self, word: Word) -> None:
+        halt = self._halt or self._suspended
+        if halt is None:
+            return
+        if not halt.pauses and self._ends(word, halt):
+            self._halt = self._suspended = None
+        else:
+            halt.note(word, f"a {'copy of a ' if word.is_copy else ''}{word.name}")
 
     def _settle(self, key: tuple[str, int], *, is_granted: bool) -> None:
         halt = self._suspended
