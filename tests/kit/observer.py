@@ -162,6 +162,7 @@ class Observer:
     _hold_due: float | None = None  # when a zero left of which only HOLD says why
     _client_arms_at: float = -1e9  # through the server, while it may be taking control
     _moved_last: bool = False
+    _brakes: bool = False  # zeros have followed motion, and nothing else since
     _stop_due: tuple[float, set[str]] | None = None
     _last_source: tuple[float, tuple[int, int]] | None = None
     _course: float | None = None  # rad, of the last setpoint that arrived without speed
@@ -193,7 +194,8 @@ class Observer:
             self._see_wish_of_client(now, message.custom_mode)
         elif kind in BY_HAND and _off_centre(message):
             self._sticks_at = now
-            self._take_over(now, zeros=1)
+            if not self._brakes:  # else it is brought to a stand already, and handed back
+                self._take_over(now, zeros=1)
 
     def heard(self, now: float, data: bytes, *, sent_at: float) -> None:
         """A datagram from the vehicles' side reaches the server."""
@@ -283,7 +285,7 @@ class Observer:
     def server_restarted(self) -> None:
         """Another server knows nothing of what the first one saw, and drives nothing yet."""
         self.armed, self.mode = False, -1
-        self._moved_last = self._zero_in_mode = False
+        self._moved_last = self._zero_in_mode = self._brakes = False
 
     def check(self, *, now: float = float("inf")) -> None:
         """Raise AssertionError if anything was wrong."""
@@ -344,7 +346,7 @@ class Observer:
             self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
             self._disarmed_at = now  # nor where it was taken over before
         if mode != self.mode:
-            self._zero_in_mode = False
+            self._zero_in_mode = self._brakes = False
             self._mode_at = now
             asked = mode == self.ways.hold and now - self._hold_at < OWN_REQUEST
             by_us = asked and not self._moved_last  # driving on, we had not asked for this one
@@ -416,6 +418,7 @@ class Observer:
                 self._stop_due[1].discard("zero")
         self._in_row = self._in_row + 1 if now - self._setpoint_at <= GAP else 1
         self._setpoint_at = now
+        self._brakes = not moves and (self._moved_last or self._brakes)
         self._moved_last = moves
 
     def _check_motion(self, now: float) -> None:

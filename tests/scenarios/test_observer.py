@@ -114,6 +114,11 @@ def test_a_pause_that_is_hold_is_no_violation_after_a_takeover() -> None:
     story.moves(0.0).sends(mode_request(HOLD)).later(0.05).moves(0.0).observer.check()
 
 
+def test_sticks_while_it_is_brought_to_a_stand_are_no_takeover() -> None:
+    story = Story().driving().later(0.05).moves(0.0).later(0.02).asks(sticks(500))
+    story.later(0.03).moves(0.0).later(0.05).moves(0.0).observer.check()
+
+
 def test_news_of_hold_in_the_step_in_which_a_client_asks_for_it_is_no_takeover() -> None:
     story = Story().driving().later(0.05).in_batches()
     story.asks(mode_request(HOLD)).rover(HOLD, armed=True)
