@@ -183,15 +183,7 @@ TABLE = (
     _row(
         _E.PAUSE,
         *(*TAKE_BACK, _F.PAUSE, _E.HOLD),
-        work=(Work.NONE, Work.WAITS, Work.TAKEN),
-        grip=Grip.FREE,
-        may_be_armed=True,
-    ),
-    _row(
-        _E.PAUSE,
-        *(*TAKE_BACK, _F.PAUSE, _E.HOLD),
-        work=Work.STANDS,
-        is_led=True,  # by whoever has taken it since
+        work=(Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN),
         grip=Grip.FREE,
         may_be_armed=True,
     ),

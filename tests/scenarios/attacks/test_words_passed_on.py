@@ -161,6 +161,22 @@ def px4(make_world: MakeWorld) -> World:
     return world
 
 
+def test_a_pause_stops_a_paused_rover_that_another_station_has_sent_to_a_place(px4: World) -> None:
+    """A PX4 shows HOLD all the way there."""
+    px4.rover.autopilot.parameters["RO_SPEED_LIM"] = 1.0
+    px4.client.pause()
+    px4.run(3)
+    other = px4.net.link("other station")
+    other.send("rover1", go_to(30, 5).pack(common.MAVLink(None, 255, 190)))
+    px4.run(4)
+    assert px4.rover.autopilot.mode is Mode.HOLD
+    assert px4.truth.forward_speed > 0.3
+    paused = px4.client.pause()
+    px4.run(4)
+    assert paused.result == ACCEPTED
+    assert stays(px4, 4)
+
+
 def test_a_go_to_that_its_senders_hold_has_overtaken_does_not_undo_it(px4: World) -> None:
     late = px4.client.send_repeated(go_to(5, 5))
     held = ask_mode(px4.client, PX4_HOLD)
