@@ -68,9 +68,7 @@ async def stop(
             await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
         except Refused as error:
             if error.reason == TaskReason.VEHICLE_SILENT:
-                words = (
-                    f"{error}: STOP stays in force, and reaches the rover when it is heard again"
-                )
+                words = "STOP is in force, but a rover is silent: it stops when it is heard again"
                 raise Refused(words, result=error.result, reason=error.reason) from error
             raise
     which = "every rover" if common.vehicle is None else f"rover {common.vehicle}"

@@ -6,6 +6,7 @@ from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common, TaskId, Wait
 
 if TYPE_CHECKING:
+    from mav_tasks.client.aio import Client
     from mav_tasks.client.handle import Task
     from mav_tasks.client.values import TaskStatus, TaskTiming
 
@@ -27,7 +28,8 @@ async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
         if common.json:
             output.say_json(words.task_json(answer) | {"setpoints": words.timing_json(timing)})
             return
-        for name, value in _fields(answer, timing):
+        silence = words.silence_of(_heartbeat_age(client, answer.vehicle))
+        for name, value in _fields(answer, timing, silence):
             if value:
                 output.say(f"{name:<12}{value}")
 
@@ -41,7 +43,13 @@ async def _timing_of(task: "Task") -> "TaskTiming | None":
         return None
 
 
-def _fields(status: "TaskStatus", timing: "TaskTiming | None") -> list[tuple[str, str]]:
+def _heartbeat_age(client: "Client", vehicle: int) -> float | None:
+    return next((each.heartbeat_age for each in client.vehicles() if each.id == vehicle), None)
+
+
+def _fields(
+    status: "TaskStatus", timing: "TaskTiming | None", silence: str
+) -> list[tuple[str, str]]:
     from mav_tasks.cli import words  # noqa: PLC0415
     from mav_tasks.cli.times import format_duration  # noqa: PLC0415
 
@@ -51,7 +59,7 @@ def _fields(status: "TaskStatus", timing: "TaskTiming | None") -> list[tuple[str
     ahead = "" if not status.is_waiting or status.position is None else str(status.position)
     return [
         ("task", str(status.id)),
-        ("rover", str(status.vehicle)),
+        ("rover", f"{status.vehicle} ({silence})" if silence else str(status.vehicle)),
         ("what", words.what_of(status)),
         ("state", words.state_of(status)),
         ("why", words.why_of(status)),

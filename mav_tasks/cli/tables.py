@@ -1,7 +1,7 @@
 """Queues and rovers as tables that fit a width."""
 
 from collections.abc import Callable, Sequence
-from math import degrees
+from math import degrees, inf
 from typing import NamedTuple
 
 from rich.cells import cell_len
@@ -127,14 +127,21 @@ def vehicle_table(vehicles: Sequence[VehicleStatus]) -> Table:
             str(each.id),
             each.kind,
             each.mode,
-            "armed" if each.armed else "disarmed",
-            "yes" if each.is_heard else "NO",
+            "-" if each.armed is None else "armed" if each.armed else "disarmed",
+            _heard(each),
             _number(each.north, "m", 2),
             _number(each.east, "m", 2),
             _number(None if each.yaw is None else degrees(each.yaw) % 360, "deg", 1),
             _number(each.speed, "m/s", 2),
         )
     return table
+
+
+def _heard(vehicle: VehicleStatus) -> str:
+    age = vehicle.heartbeat_age
+    if vehicle.is_heard or age is None:
+        return "yes" if vehicle.is_heard else "NO"
+    return "never" if age == inf else f"{format_duration(age)} ago"
 
 
 def _width(column: Column, tasks: Sequence[TaskStatus]) -> int:

@@ -17,7 +17,8 @@ async def vehicles(common: Common) -> None:
 
     async with opened(common) as client:
         for _ in range(LOOKS):
-            if all(each.north is not None and each.yaw is not None for each in client.vehicles()):
+            heard = [each for each in client.vehicles() if each.is_heard]
+            if all(each.north is not None and each.yaw is not None for each in heard):
                 break
             await asyncio.sleep(LOOK)
         found = [each for each in client.vehicles() if common.vehicle in (None, each.id)]

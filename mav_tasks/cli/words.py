@@ -1,9 +1,10 @@
 """What a client learns, in words and as JSON. Pure. Angles are degrees here."""
 
-from math import degrees
+from math import degrees, inf
 from typing import Any
 
 from mav_tasks.cli.times import format_duration
+from mav_tasks.client.fleet_view import SILENT_AFTER
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Unit, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
@@ -77,6 +78,15 @@ def left(status: TaskStatus) -> tuple[float | None, str | None]:
     return degrees(status.remaining) if is_angle else status.remaining, UNITS[status.unit]
 
 
+def silence_of(heartbeat_age: float | None) -> str:
+    """Return how long a rover has been silent; "" if it is heard, or nobody knows."""
+    if heartbeat_age is None or heartbeat_age <= SILENT_AFTER:
+        return ""
+    if heartbeat_age == inf:
+        return "not heard since the server started"
+    return f"silent for {format_duration(heartbeat_age)}"
+
+
 def headline_of(queue: QueueStatus) -> str:
     """Give what a rover does, and what is in the way."""
     if queue.current is not None:
@@ -90,7 +100,9 @@ def headline_of(queue: QueueStatus) -> str:
         does += f"; {way_on_of(queue.current)}"
     if queue.paused is not None:
         does += f"; paused: {words_of(queue.paused)}, to go on: mav-tasks resume"
-    return f"rover {queue.vehicle}: {does}; {queue.waiting_count} waiting"
+    silence = silence_of(queue.heartbeat_age)
+    rover = f"rover {queue.vehicle} ({silence})" if silence else f"rover {queue.vehicle}"
+    return f"{rover}: {does}; {queue.waiting_count} waiting"
 
 
 def counts_of(queue: QueueStatus) -> str:
@@ -157,6 +169,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
         "next": queue.next,
         "paused": None if queue.paused is None else queue.paused.name.lower(),
         "halt_epoch": queue.halt_epoch,
+        "heartbeat_age": _age(queue.heartbeat_age),
         "waiting_count": queue.waiting_count,
         "capacity": queue.capacity,
         "counts": {state.name.lower(): count for state, count in queue.counts.items()},
@@ -174,12 +187,18 @@ def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
         "mode": vehicle.mode,
         "armed": vehicle.armed,
         "heard": vehicle.is_heard,
+        "heartbeat_age": _age(vehicle.heartbeat_age),
         "north": _rounded(vehicle.north),
         "east": _rounded(vehicle.east),
         "heading": _rounded(heading),
         "speed": _rounded(vehicle.speed),
         "server_component": vehicle.server_component,
     }
+
+
+def _age(heartbeat_age: float | None) -> float | None:
+    """Return an age as JSON has it: null for one that never came, too."""
+    return None if heartbeat_age in (None, inf) else _rounded(heartbeat_age)
 
 
 def _rounded(value: float | None) -> float | None:

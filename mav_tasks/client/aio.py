@@ -395,9 +395,8 @@ class Client:
         It takes the place of the one that waits there.
         """
         system_id = self._which(vehicle)
-        view = self._open.session.fleet.get(system_id)
         items = items_of(plan)
-        if view is not None and view.has_home_item:
+        if self._has_home_item(system_id):
             items = wire.with_home(items)
         return await self._submit_plan(items, system_id, None, component=AUTOPILOT)
 
@@ -416,9 +415,9 @@ class Client:
 
     async def mission_file(self, *, vehicle: int | None = None) -> PlanFile:
         """Fetch the mission as ``write_plan`` takes it; home, if it came along, is apart."""
+        has_home_item = self._has_home_item(self._which(vehicle))
         items = wire.file_items(await self.mission(vehicle=vehicle))
-        view = self._open.session.fleet.get(self._which(vehicle))
-        return plan_files.mission_of(items, has_home_item=view is not None and view.has_home_item)
+        return plan_files.mission_of(items, has_home_item=has_home_item)
 
     async def fence_file(self, *, vehicle: int | None = None) -> PlanFile:
         """Fetch the fence as ``write_plan`` takes it. PlanFileError if a file cannot hold it."""
@@ -485,6 +484,14 @@ class Client:
 
     def _autopilot(self, vehicle: int | None) -> Address:
         return Address(self._which(vehicle), AUTOPILOT)
+
+    def _has_home_item(self, vehicle: int) -> bool:
+        """Return whether the first item of a mission is home there. NoAnswer if nobody knows."""
+        view = self._open.session.fleet.get(vehicle)
+        if view is None or not view.is_known:
+            words = f"rover {vehicle} is silent: whether its missions begin with home is not known"
+            raise NoAnswer(words)
+        return view.has_home_item
 
     def _handle(self, followed: Followed) -> Task:
         task = self._tasks.get(followed)

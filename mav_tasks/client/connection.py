@@ -32,7 +32,8 @@ class Connection:
         self._loop = asyncio.get_running_loop()
         self._signatures = signatures
         self.link = _open(link) if isinstance(link, str) else link
-        self.session = make_session(self._loop.time())
+        self.session = make_session(self.now)
+        self.session.ask_for_rovers(now=self.now)
         self._peers: dict[Peer, None] = dict.fromkeys(self.link.peers)
         self._splitters: dict[Peer, StreamSplitter] = {}
         self._is_closed = False
@@ -117,6 +118,7 @@ class Connection:
             if change.state is PeerState.UP:
                 self._peers.setdefault(change.peer)
                 self.session.greet()
+                self.session.ask_for_rovers(now=self.now)
             elif change.state is PeerState.DOWN:
                 self._peers.pop(change.peer, None)
                 self._splitters.pop(change.peer, None)

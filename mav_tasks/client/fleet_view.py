@@ -7,12 +7,12 @@ from typing import Any
 from mav_tasks.client.values import VehicleStatus
 from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT
+from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
-from mav_tasks.services.persona import PERSONAS
+from mav_tasks.services.persona import PERSONAS, Persona
 
 SILENT_AFTER = 3.5  # s without a heartbeat; as the server has it
 GAP = 1.7  # s between two heartbeats, after which the server may be another process
@@ -23,11 +23,13 @@ KEPT = frozenset({m.LocalPositionNed.id, m.Attitude.id})
 
 
 class VehicleView:
-    """One system with an autopilot."""
+    """One system with an autopilot, or of which a task server tells that it was there."""
 
-    def __init__(self, system_id: int, first: m.Heartbeat, *, now: float) -> None:
+    def __init__(self, system_id: int, *, now: float) -> None:
         self.system_id = system_id
-        self.monitor = HeartbeatMonitor(first, lost_after=SILENT_AFTER, now=now)
+        self._monitor: HeartbeatMonitor | None = None  # None: no heartbeat came here
+        #: when the rover's last heartbeat reached the server, as that tells; None: it does not
+        self._server_heard_at: float | None = None
         #: of the task server inside it; None until that has answered
         self.server_component: int | None = None
         self.ask_at = now
@@ -37,29 +39,66 @@ class VehicleView:
         return f"VehicleView({self.system_id}, server {self.server_component})"
 
     @property
+    def is_known(self) -> bool:
+        """Whether its kind is known: a heartbeat of it came here."""
+        return self._monitor is not None
+
+    @property
     def has_home_item(self) -> bool:
         """Whether the first item of a mission is home there."""
-        persona = PERSONAS.get(self.monitor.latest.autopilot)
+        persona = self._persona
         return persona is not None and persona.has_home_item
+
+    def heartbeat(self, message: m.Heartbeat, *, now: float) -> bool:
+        """Take a heartbeat in; whether it is the first, or the first after a gap."""
+        if self._monitor is None:
+            self._monitor = HeartbeatMonitor(message, lost_after=SILENT_AFTER, now=now)
+            return True
+        is_back = now - self._monitor.heard_at > GAP
+        self._monitor.receive(message, now=now)
+        return is_back
+
+    def told_by_server(self, age: float | None, *, now: float) -> None:
+        """Take in how old the rover's last heartbeat is at the server, s."""
+        self._server_heard_at = None if age is None else now - age
+
+    def heartbeat_age(self, *, now: float) -> float | None:
+        """Return seconds since the last heartbeat, inf: none in this run; None: not known."""
+        heard = [] if self._monitor is None else [self._monitor.heard_at]
+        heard += [] if self._server_heard_at is None else [self._server_heard_at]
+        return now - max(heard) if heard else None
 
     def status(self, decoder: Decoder, *, now: float) -> VehicleStatus:
         """Give what is known of it."""
         place = self._latest(decoder, m.LocalPositionNed)
         attitude = self._latest(decoder, m.Attitude)
-        persona = PERSONAS.get(self.monitor.latest.autopilot)
-        mode = self.monitor.custom_mode
+        monitor = self._monitor
         return VehicleStatus(
             id=self.system_id,
-            kind="other" if persona is None else persona.name,
-            armed=self.monitor.armed,
-            mode=f"mode {mode}" if persona is None else persona.mode_name(mode),
-            is_heard=self.monitor.is_heard(now=now),
+            kind=self._kind,
+            armed=None if monitor is None else monitor.armed,
+            mode="unknown" if monitor is None else self._mode_of(monitor.custom_mode),
+            is_heard=monitor is not None and monitor.is_heard(now=now),
             server_component=self.server_component or 0,
+            heartbeat_age=self.heartbeat_age(now=now),
             north=None if place is None else place.x,
             east=None if place is None else place.y,
             yaw=None if attitude is None else attitude.yaw,
             speed=None if place is None else hypot(place.vx, place.vy),
         )
+
+    @property
+    def _persona(self) -> Persona | None:
+        return None if self._monitor is None else PERSONAS.get(self._monitor.latest.autopilot)
+
+    @property
+    def _kind(self) -> str:
+        if self._monitor is None:
+            return "unknown"
+        return "other" if self._persona is None else self._persona.name
+
+    def _mode_of(self, mode: int) -> str:
+        return f"mode {mode}" if self._persona is None else self._persona.mode_name(mode)
 
     def _latest(self, decoder: Decoder, kind: type[m.Message]) -> Any:
         packet = self.latest.get(kind.id)
@@ -71,6 +110,8 @@ class FleetView:
 
     def __init__(self) -> None:
         self._views: dict[int, VehicleView] = {}
+        #: whether a server has answered which rovers it has
+        self.is_listed = False
 
     def __repr__(self) -> str:
         return f"FleetView({list(self._views.values())})"
@@ -87,16 +128,19 @@ class FleetView:
         return sorted(v.system_id for v in self if v.server_component is not None)
 
     def is_found(self, wished: int | None) -> bool:
-        """Whether the task server of a vehicle has answered; None: that of each that is heard."""
+        """Whether the task server of a vehicle has answered; None: that of each that there is."""
         if wished is not None:
             return wished in self.served()
-        return bool(self._views) and all(v.server_component is not None for v in self)
+        are_served = all(v.server_component is not None for v in self)
+        return self.is_listed and bool(self._views) and are_served
 
     def why_not_found(self, wished: int | None) -> str:
         """Give why, in words; "{where}" stands for where and how long it was listened for."""
         served = self.served()
+        if not self._views and self.is_listed:
+            return "a task server is there, but no rover was heard {where}: is it on, and linked?"
         if not self._views:
-            return "nothing heard {where}: is the server running, and has it a rover?"
+            return "no task server answered {where}: is it running?"
         if not served:
             return f"rover {min(self._views)} is heard {{where}}, but no task server answered"
         return f"rover {wished} was not found {{where}}: there is {_list(served)}"
@@ -119,21 +163,32 @@ class FleetView:
         """
         if packet.component_id != AUTOPILOT or message.autopilot == MavAutopilot.INVALID:
             return False
-        view = self._views.get(packet.system_id)
-        if view is None:
-            self._views[packet.system_id] = VehicleView(packet.system_id, message, now=now)
-            return True
-        is_back = now - view.monitor.heard_at > GAP
-        view.monitor.receive(message, now=now)
-        if is_back:
+        view = self._view(packet.system_id, now=now)
+        is_new = view.heartbeat(message, now=now)
+        if is_new:
             view.ask_at = now
-        return is_back
+        return is_new
+
+    def served_by(self, source: Address, age: float | None, *, now: float) -> None:
+        """A task server has told of a rover: it is there, whether the rover is heard or not.
+
+        ``age``: of the rover's last heartbeat at the server, s, inf: none; None: it does not tell.
+        """
+        view = self._view(source.system_id, now=now)
+        view.server_component = source.component_id
+        view.told_by_server(age, now=now)
 
     def telemetry(self, packet: Packet) -> None:
         """Keep a vehicle's telemetry, to be looked at when somebody asks."""
         view = self._views.get(packet.system_id)
         if view is not None and packet.component_id == AUTOPILOT:
             view.latest[packet.message_id] = packet
+
+    def _view(self, system_id: int, *, now: float) -> VehicleView:
+        view = self._views.get(system_id)
+        if view is None:
+            view = self._views[system_id] = VehicleView(system_id, now=now)
+        return view
 
     def next_deadline(self) -> float | None:
         """Give when a task server is to be asked whether it is there."""

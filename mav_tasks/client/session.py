@@ -7,6 +7,7 @@ asked is answered or given up. What it means for a script is ``aio``'s affair.
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 from mav_tasks.client.calls import AGAIN, Call, Calls, Command
 from mav_tasks.client.fleet_view import KEPT, FleetView
@@ -17,6 +18,7 @@ from mav_tasks.client.values import (
     TaskTiming,
     Text,
     VehicleStatus,
+    heartbeat_age_of,
     reason_of,
     task_status_of,
     task_timing_of,
@@ -37,6 +39,7 @@ from mav_tasks.tasks.lifecycle import TaskReason, words_of
 WORDS_WITHIN = 0.25
 #: Hz, of telemetry that somebody may ask about; a client's share of a busy link is small
 TELEMETRY_RATE = 1
+EVERYBODY = 0  # target_system
 FOLLOWED_AGAIN = 3.0  # s that an unanswered question about a followed task goes on
 
 DECODED = frozenset(
@@ -96,6 +99,7 @@ class Session:
         self._transfers: dict[Address, Transfers] = {}
         self._refused: list[_Refused] = []
         self._out: list[bytes] = []
+        self._listing: Call | None = None  # the question for rovers, unanswered
         self.on_served: Callable[[], None] = lambda: None
         self.on_news: Callable[[Followed], None] = lambda _followed: None
         self.on_status: Callable[[TaskStatus], None] = lambda _status: None
@@ -125,7 +129,8 @@ class Session:
             case m.TaskStatus():
                 self._task_status(task_status_of(message, packet.system_id), now=now)
             case m.TaskQueueStatus():
-                self._served(packet.source)
+                self.fleet.served_by(packet.source, heartbeat_age_of(message), now=now)
+                self.on_served()
                 self.on_queue(message, packet.system_id)
             case m.TaskTiming():
                 self.on_timing(task_timing_of(message, packet.system_id))
@@ -182,6 +187,19 @@ class Session:
     def greet(self) -> None:
         """Say that somebody is here: a script, no ground station whose loss could mean a stop."""
         self.send(component_heartbeat(MavState.ACTIVE))
+
+    def ask_for_rovers(self, *, now: float) -> None:
+        """Ask which rovers a server has, until it is answered: a silent one sends no heartbeat."""
+
+        def done(_reply: Reply | None) -> None:
+            self._listing = None
+            self.fleet.is_listed = True
+            self.on_served()
+
+        if self._listing is not None:  # the link is up only now
+            self._calls.settle(self._listing, is_answered=True, now=now)
+        request = request_message(EVERYBODY, m.TaskQueueStatus.id)
+        self._listing = self.call(request, done, now=now, within=inf)
 
     def send(self, message: m.Message) -> None:
         """Send a message now."""
@@ -295,12 +313,6 @@ class Session:
     def _ask_server(self, vehicle: int, *, now: float) -> None:
         request = request_message(vehicle, m.TaskQueueStatus.id)
         self.call(request, lambda _reply: None, now=now, within=AGAIN)
-
-    def _served(self, source: Address) -> None:
-        view = self.fleet.get(source.system_id)
-        if view is not None:
-            view.server_component = source.component_id
-            self.on_served()
 
     def _task_status(self, status: TaskStatus, *, now: float) -> None:
         followed = self.watch.receive(status, now=now)

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from math import isfinite
+from math import inf, isfinite
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
 
 UNKNOWN_POSITION = 65535
 UNKNOWN_PROGRESS = 255
+NO_HEARTBEAT = 0xFFFFFFFF
 
 
 class Unit(IntEnum):
@@ -76,7 +77,8 @@ class QueueStatus:
 
     ``counts`` are its tasks by state; ``waiting`` are those asked for, in the order in which they
     run, those that wait for a time or another task after them. ``halt_epoch`` grows with all that
-    makes the rover stand.
+    makes the rover stand. ``heartbeat_age``: seconds since the rover's last heartbeat reached the
+    server; inf: none since it started; None: it does not tell.
     """
 
     vehicle: int
@@ -89,6 +91,7 @@ class QueueStatus:
     current: TaskStatus | None
     version: int
     halt_epoch: int = 0
+    heartbeat_age: float | None = None
 
     @property
     def waiting_count(self) -> int:
@@ -119,13 +122,15 @@ class TaskTiming:
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:
     """A rover as its telemetry shows it. ``north`` and ``east`` in m, ``yaw`` in rad, ``speed`` in
-    m/s; None is "not heard". ``is_heard``: its heartbeats come. ``server_component`` is the task
-    server's component id inside its system.
+    m/s; None is "not heard", and so is "unknown" for ``kind`` and ``mode``. ``is_heard``: its
+    heartbeats come. ``server_component`` is the task server's component id inside its system.
+    ``heartbeat_age``: seconds since its last heartbeat; inf: none since the server started; None:
+    none came here, and the server does not tell.
     """
 
     id: int
     kind: str
-    armed: bool
+    armed: bool | None
     mode: str
     is_heard: bool
     server_component: int
@@ -133,6 +138,7 @@ class VehicleStatus:
     east: float | None = None
     yaw: float | None = None
     speed: float | None = None
+    heartbeat_age: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +214,15 @@ def queue_status_of(
         current=current,
         version=message.version,
         halt_epoch=message.halt_epoch,
+        heartbeat_age=heartbeat_age_of(message),
     )
+
+
+def heartbeat_age_of(message: m.TaskQueueStatus) -> float | None:
+    """Return s since the rover's last heartbeat, inf: none; None: the server does not tell."""
+    if not message.heartbeat_age:
+        return None
+    return inf if message.heartbeat_age == NO_HEARTBEAT else message.heartbeat_age / 1000
 
 
 def reason_of(number: int) -> TaskReason:

@@ -33,7 +33,7 @@ class Fleet:
         self._was_driven: set[int] = set()
         self._halted: dict[int, LastHalt] = {}  # by somebody, before this run
         self._comes_up_paused = False
-        self._began_at = 0.0
+        self.began_at = 0.0  # of this run, by the clock of ``now``
 
     def __iter__(self) -> Iterator[VehicleTasks]:
         return iter(self._of.values())
@@ -45,8 +45,8 @@ class Fleet:
             tasks = VehicleTasks(vehicle, self._book, self.room, self._settings)
             self._of[vehicle] = tasks
             if self._comes_up_paused:
-                tasks.restore((), paused=R.RESTARTED, speed=None, uid="", now=self._began_at)
-                self._book.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self._began_at))
+                tasks.restore((), paused=R.RESTARTED, speed=None, uid="", now=self.began_at)
+                self._book.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self.began_at))
         return tasks
 
     def was_driven(self, vehicle: int) -> bool:
@@ -88,7 +88,7 @@ class Fleet:
         halted = restored.halted.items()
         self._halted = {each: LastHalt(*halt) for each, halt in halted if halt[0] in WORDS}
         pauses = self._settings.on_restart == "pause"
-        self._began_at = now
+        self.began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
         of_note |= restored.halt_epochs.keys() | restored.disarmed
         for vehicle in begun.keys() | waiting | of_note:

@@ -204,7 +204,7 @@ def test_a_stop_that_does_not_reach_the_rover_stays(there: Stand, client: SyncCl
         wait_until(lambda: not client.vehicles()[0].is_heard, within=10, what="a silent rover")
         done = called("stop", "--vehicle", "1", server=url_of(there))
         assert done.status == 1
-        assert "STOP stays in force" in done.error
+        assert "STOP is in force, but a rover is silent" in done.error
         assert len(done.error.splitlines()) == 1
     wait_until(lambda: client.vehicles()[0].is_heard, within=10, what="the rover again")
     assert client.queue().paused is not None

@@ -231,7 +231,9 @@ def test_what_is_still_read_when_the_client_is_closed_ends_quietly(
 @awaited
 async def test_nobody_there_is_said_in_time() -> None:
     (port,) = free_udp_ports(1)
-    with pytest.raises(NoAnswer, match=f"nothing heard on udpout:127.0.0.1:{port} within 0.3 s"):
+    with pytest.raises(
+        NoAnswer, match=f"no task server answered on udpout:127.0.0.1:{port} within 0.3 s"
+    ):
         async with Client(f"udpout:127.0.0.1:{port}", timeout=0.3):
             pass
 

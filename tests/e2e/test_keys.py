@@ -20,7 +20,7 @@ from tests.kit.terminal import Terminal, terminal
 
 PASSPHRASE = "correct horse battery staple"
 REVOKED_WITHIN = 0.5  # s
-COUNTED_BY_NOBODY = "nothing heard"
+COUNTED_BY_NOBODY = "no task server answered"
 
 
 def keys(*arguments: str, ring: Path, given: str = "") -> Done:
@@ -184,7 +184,9 @@ def test_who_does_not_sign_is_told_that_this_may_be_why(signed: Signed) -> None:
     assert COUNTED_BY_NOBODY in done.error
     assert "(does it want a signature? --sign NAME)" in done.error
     with (
-        pytest.raises(NoAnswer, match=r"nothing heard .* does the server know key stranger \("),
+        pytest.raises(
+            NoAnswer, match=r"no task server answered .* does the server know key stranger \("
+        ),
         SyncClient(signed.url, key=Key("stranger", b"s" * 32), timeout=1.0),
     ):
         pass

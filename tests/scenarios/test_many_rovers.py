@@ -780,7 +780,7 @@ def queue_statuses(client: FakeClient) -> list[QueueStatus]:
     """Give those that a client has received."""
     found = []
     for packet in client.of_id(TASK_QUEUE_STATUS):
-        values = struct.unpack("<5I14I2BI", packet.payload.ljust(82, b"\0"))
+        values = struct.unpack("<5I14I2B2I", packet.payload.ljust(86, b"\0"))
         found.append(QueueStatus(packet.source[0], values[2], values[3], values[5:19], values[19]))
     return found
 

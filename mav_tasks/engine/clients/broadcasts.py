@@ -28,13 +28,12 @@ class Broadcasts:
         self._packer = packer
 
     def addressed(self, received: Received) -> list[Received]:
-        """Return a copy of a client's packet for each rover; it alone, if none is to answer it."""
+        """Return a copy of a client's packet for each rover; it alone if none is to answer it."""
         if not _is_to_be_answered(received.message):
             return [received]
-        return [
-            self._copy(received, vehicle.system_id)
-            for vehicle in sorted(self._vehicles.all, key=lambda vehicle: vehicle.system_id)
-        ]
+        unheard = (tasks.vehicle for tasks in self._vehicles.unheard)
+        ids = sorted([*self._vehicles.by_id, *unheard])
+        return [self._copy(received, system_id) for system_id in ids] or [received]
 
     def _copy(self, received: Received, system_id: int) -> Received:
         """Return what a client sent to everybody as if it had named this rover's autopilot."""

@@ -12,9 +12,12 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, address_of
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
 
@@ -83,14 +86,49 @@ class Displays:
                 client.uses_dialect = True
                 self._show_timing(asked, now=now)
             case m.TaskQueueStatus.id:
-                client.uses_dialect = True
-                counts = self._book.counts(vehicle.system_id)
-                status = translate.queue_status(
-                    vehicle.tasks, counts, version=self._book.recorded, now=now
+                heard_at = vehicle.heard_at
+                self._show_queue(
+                    client, vehicle.tasks, vehicle.server_address, heard_at=heard_at, now=now
                 )
-                client.outlet.send(status, vehicle.server_address)
             case m.ProtocolVersion.id:
                 client.outlet.send(PROTOCOL_VERSION, asked.answering)
+            case _:
+                return False
+        return True
+
+    def show_unheard(
+        self,
+        client: GcsClient,
+        packet: Packet,
+        command: Command,
+        tasks: VehicleTasks,
+        address: Address,
+        *,
+        now: float,
+    ) -> bool:
+        """REQUEST_MESSAGE about a rover that was not heard in this run; whether it is shown."""
+        client.uses_dialect = True
+        match translate.message_id_of(command):
+            case m.TaskQueueStatus.id:
+                self._show_queue(client, tasks, address, heard_at=None, now=now)
+            case m.TaskStatus.id:
+                task_id = translate.task_id_of(command)
+                first = max(0, translate.first_index_of(command))
+                for each in (task_id,) if task_id else tasks.page(first, PAGE):
+                    task = self._book.get(each)
+                    if task is None:
+                        raise Rejection(R.NOT_FOUND, f"no task {each}")
+                    self._send(
+                        client,
+                        task,
+                        tasks,
+                        address,
+                        reader=packet.source,
+                        with_position=True,
+                        now=now,
+                    )
+            case m.TaskTiming.id:  # it needs the rate of the rover's setpoints
+                raise Rejection(R.VEHICLE_SILENT, f"rover {tasks.vehicle} was not heard yet")
             case _:
                 return False
         return True
@@ -116,16 +154,53 @@ class Displays:
         vehicle = self._vehicles.look_at(task.vehicle)
         if vehicle is None:
             return
-        status = translate.task_status(
+        address = vehicle.server_address
+        self._send(
+            client,
             task,
             vehicle.tasks,
+            address,
+            reader=reader,
+            with_position=with_position,
+            now=now,
+        )
+
+    def _send(
+        self,
+        client: GcsClient,
+        task: Task,
+        tasks: VehicleTasks,
+        address: Address,
+        *,
+        reader: Address,
+        with_position: bool,
+        now: float,
+    ) -> None:
+        status = translate.task_status(
+            task,
+            tasks,
             self._book,
             reader=reader,
             link_number=self._gcs.link_numbers.get(task.submitter.link, 0),
             with_position=with_position,
             now=now,
         )
-        client.outlet.send(status, vehicle.server_address)
+        client.outlet.send(status, address)
+
+    def _show_queue(
+        self,
+        client: GcsClient,
+        tasks: VehicleTasks,
+        address: Address,
+        *,
+        heard_at: float | None,
+        now: float,
+    ) -> None:
+        client.uses_dialect = True
+        counts = self._book.counts(tasks.vehicle)
+        version = self._book.recorded
+        status = translate.queue_status(tasks, counts, heard_at=heard_at, version=version, now=now)
+        client.outlet.send(status, address)
 
     def _show_tasks(self, asked: Asked, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)

@@ -217,7 +217,8 @@ class GcsClient:
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT of a vehicle's task server, unless there were too many."""
-        if not self.is_heard or source.system_id not in self.introduced:
+        is_known = source.system_id in self.introduced or self.uses_dialect
+        if not self.is_heard or not is_known:
             return
         if severity > MavSeverity.WARNING and not self._texts.take(now=now):
             self.left_out[source] = self.left_out.get(source, 0) + 1

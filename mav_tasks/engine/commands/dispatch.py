@@ -23,7 +23,7 @@ from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, 
 from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
-from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans, begins_with
 from mav_tasks.engine.policy import Kind, is_task_command
@@ -94,7 +94,8 @@ class Commands:
         system_id = command.target.system_id
         vehicle = self._vehicles.get(system_id or min(self._vehicles.by_id, default=0))
         if vehicle is None:
-            return  # clients send everything to everyone: it is for somebody else
+            self._of_unheard(client, packet, command, now=now)
+            return
         receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
@@ -115,6 +116,43 @@ class Commands:
             else:  # a flood of them fills neither disk nor net
                 asked.answer(result_of(refusal.reason), refusal.reason)
         note_halt(asked, before=epoch)
+
+    def _of_unheard(
+        self, client: GcsClient, packet: Packet, command: Command, *, now: float
+    ) -> None:
+        """Answer about a rover of an earlier run: a question; what is more than that is refused.
+
+        Not in the first seconds: the rover may be heard before a script that sends again gives up.
+        A server that has no rover answers in its own name to whoever looks for task servers.
+        Silence otherwise: clients send everything to everyone, and it is for somebody else.
+        """
+        system_id, component = command.target
+        tasks = self._vehicles.tasks_of_unheard(system_id)
+        address = Address(system_id, MavComponent.ONBOARD_COMPUTER)
+        result, reason, words = MavResult.ACCEPTED, int(R.NONE), ""
+        if tasks is None:
+            if system_id != EVERYBODY or not _looks_for_servers(command):
+                return
+            address = self._vehicles.our_address
+        elif command.command == MavCmd.REQUEST_MESSAGE:
+            try:
+                if not self._displays.show_unheard(
+                    client, packet, command, tasks, address, now=now
+                ):
+                    return
+            except Rejection as refusal:
+                result, reason, words = result_of(refusal.reason), refusal.reason, refusal.text
+        elif self._vehicles.has_listened(now=now) and (
+            is_task_command(command.command) or command.command == MavCmd.DO_PAUSE_CONTINUE
+        ):
+            result, reason = result_of(R.VEHICLE_SILENT), int(R.VEHICLE_SILENT)
+            words = f"rover {system_id} was not heard yet: only STOP counts"
+        else:
+            return
+        source = Address(system_id, component) if tasks is not None and component else address
+        client.answer(Answer(command.command, result, reason, source), packet.source)
+        if words and client.may_be_refused(now=now):
+            client.tell_refusal(words, address, now=now)
 
     def _is_tried_again(self, asked: Asked, *, now: float) -> bool:
         """Whether a mode that has just been refused is asked for, and refused, once more.
@@ -315,6 +353,11 @@ class Commands:
             words = f"paused, but vehicle {vehicle.system_id} is silent"
             raise Rejection(R.VEHICLE_SILENT, words)
         return paused
+
+
+def _looks_for_servers(command: Command) -> bool:
+    is_request = command.command == MavCmd.REQUEST_MESSAGE
+    return is_request and message_id_of(command) == m.TaskQueueStatus.id
 
 
 def _undo_hold(undoes: _UndoesHold, *, now: float) -> None:

@@ -35,6 +35,8 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
 
+NEVER = 0xFFFFFFFF  # TASK_QUEUE_STATUS.heartbeat_age: none came
+
 #: the wire answer of each refusal; what is not listed is DENIED
 RESULT_OF: dict[int, MavResult] = {
     R.QUEUE_FULL: MavResult.TEMPORARILY_REJECTED,
@@ -169,10 +171,14 @@ def task_timing(
 
 
 def queue_status(
-    tasks: VehicleTasks, counts: list[int], *, version: int, now: float
+    tasks: VehicleTasks, counts: list[int], *, heard_at: float | None, version: int, now: float
 ) -> m.TaskQueueStatus:
-    """Give the TASK_QUEUE_STATUS of a vehicle; ``counts`` are its tasks by TASK_STATE."""
+    """Return the TASK_QUEUE_STATUS of a vehicle; ``counts`` are its tasks by TASK_STATE.
+
+    ``heard_at``: when its last heartbeat came, None: there was none in this run.
+    """
     begun = tasks.begun
+    age = NEVER if heard_at is None else min(max(1, round((now - heard_at) * 1000)), NEVER - 1)
     return m.TaskQueueStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
         version=version & 0xFFFFFFFF,
@@ -183,6 +189,7 @@ def queue_status(
         paused_reason=tasks.paused,
         flags=0,
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
+        heartbeat_age=age,
     )
 
 

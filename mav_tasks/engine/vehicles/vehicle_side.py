@@ -30,6 +30,7 @@ from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 NANO = 1e9  # TIMESYNC is in ns
 ASKED = 64  # questions for the time, one a second and link, to which an answer may come
@@ -143,14 +144,23 @@ class VehicleSide:
 
         They are stopped when they are heard. ``system_id`` 0: all of them.
         """
-        unheard = [
-            tasks
-            for tasks in self._fleet
-            if tasks.vehicle not in self._vehicles and system_id in (0, tasks.vehicle)
-        ]
+        unheard = [tasks for tasks in self.unheard if system_id in (0, tasks.vehicle)]
         for tasks in unheard:
             tasks.stop(clear=clear, actor=actor, now=now)
         return [tasks.vehicle for tasks in unheard]
+
+    @property
+    def unheard(self) -> list[VehicleTasks]:
+        """The tasks of each vehicle of an earlier run that was not heard in this one."""
+        return [tasks for tasks in self._fleet if tasks.vehicle not in self._vehicles]
+
+    def tasks_of_unheard(self, system_id: int) -> VehicleTasks | None:
+        """Return the tasks of a vehicle that was not heard in this run, None if it has none."""
+        return next((tasks for tasks in self.unheard if tasks.vehicle == system_id), None)
+
+    def has_listened(self, *, now: float) -> bool:
+        """Whether this run is so old that a vehicle that is there would have been heard."""
+        return now - self._fleet.began_at > self._settings.watch.heartbeat_lost
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle with a task of a key that counts no more, whosever task is driven.

@@ -2,7 +2,7 @@
 
 import io
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import pytest
 from rich.cells import cell_len
@@ -227,3 +227,22 @@ def test_what_is_not_known_of_a_rover_is_a_dash() -> None:
         *("3", "px4", "OFFBOARD", "armed", "yes", "1.50 m", "-2.25 m", "270.0 deg", "-"),
     ]
     assert words.vehicle_json(rover)["heading"] == 270.0
+
+
+@pytest.mark.parametrize(
+    ("age", "said"),
+    [
+        (None, ""),
+        (0.9, ""),
+        (12.0, "silent for 12s"),
+        (inf, "not heard since the server started"),
+    ],
+)
+def test_a_queue_says_how_old_its_news_is(age: float | None, said: str) -> None:
+    headline = words.headline_of(replace(QUEUE, heartbeat_age=age))
+    assert headline.startswith(f"rover 1 ({said}): " if said else "rover 1: ")
+
+
+def test_json_has_no_infinity() -> None:
+    assert words.queue_json(replace(QUEUE, heartbeat_age=inf))["heartbeat_age"] is None
+    assert words.queue_json(replace(QUEUE, heartbeat_age=1.25))["heartbeat_age"] == 1.25
