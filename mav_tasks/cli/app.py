@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import typer
 
-from mav_tasks.cli import config, control, exit_codes, keys, plans, submit
+from mav_tasks.cli import config, control, exit_codes, halts, keys, plans, submit
 from mav_tasks.cli.demo import demo
 from mav_tasks.cli.log import log
 from mav_tasks.cli.probe import probe
@@ -37,9 +37,9 @@ app.command()(status)
 app.command()(queue)
 app.command()(control.cancel)
 app.command()(control.clear)
-app.command()(control.stop)
-app.command()(control.pause)
-app.command()(control.resume)
+app.command()(halts.stop)
+app.command()(halts.pause)
+app.command()(halts.resume)
 app.command()(control.modify)
 app.command()(control.release)
 app.command()(vehicles)

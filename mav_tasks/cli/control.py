@@ -1,7 +1,6 @@
-"""Commands that steer what is there: cancel, clear, stop, pause, resume, modify, release."""
+"""Commands about tasks that are there: cancel, clear, modify, release."""
 
 import sys
-from contextlib import suppress
 from typing import Annotated, get_args
 
 import typer
@@ -33,7 +32,9 @@ async def cancel(
             await (task.kill() if kill else task.cancel())
         else:
             task_id = await (client.kill() if kill else client.cancel())
-    _done(common, "kill" if kill else "cancel", f"task {task_id} is called off", task=task_id)
+    output.say_done(
+        common.json, "kill" if kill else "cancel", f"task {task_id} is called off", task=task_id
+    )
 
 
 @command
@@ -50,67 +51,7 @@ async def clear(
     async with opened(common) as client:
         await client.clear(running_too=everything)
     which = "all tasks are" if everything else "all tasks that waited are"
-    _done(common, "clear", f"{which} called off", running_too=everything)
-
-
-@command
-async def stop(
-    common: Common,
-    clear: Annotated[bool, typer.Option("--clear", help="Call off what waits, too.")] = False,
-) -> None:
-    """Stop every rover at once, or the one named, until you resume."""
-    from mav_tasks.cli.session import unfound  # noqa: PLC0415
-    from mav_tasks.errors import Refused  # noqa: PLC0415
-    from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
-
-    async with unfound(common) as client:  # looking for the rovers would take a second
-        try:
-            await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
-        except Refused as error:
-            if error.reason == TaskReason.VEHICLE_SILENT:
-                words = "STOP is in force, but a rover is silent: it stops when it is heard again"
-                raise Refused(words, result=error.result, reason=error.reason) from error
-            raise
-    which = "every rover" if common.vehicle is None else f"rover {common.vehicle}"
-    words = f"STOP holds for {which}: nothing runs until 'mav-tasks resume'"
-    words += " (with --vehicle N where there are several)" if common.vehicle is None else ""
-    _done(common, "stop", words, vehicle=common.vehicle, cleared=clear)
-
-
-@command
-async def pause(common: Common) -> None:
-    """Stop the rover where it is; its task can go on from there."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-
-    async with opened(common) as client:
-        await client.pause()
-    _done(common, "pause", "paused; to go on: mav-tasks resume")
-
-
-@command
-async def resume(
-    common: Common,
-    epoch: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Only if nothing came since: halt_epoch of 'queue --json'."
-        ),
-    ] = None,
-) -> None:
-    """Go on after a pause, a STOP or a takeover."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-    from mav_tasks.cli.words import line_of  # noqa: PLC0415
-    from mav_tasks.errors import ClientError  # noqa: PLC0415
-    from mav_tasks.tasks.lifecycle import TaskState  # noqa: PLC0415
-
-    words = "goes on"
-    async with opened(common) as client:
-        await client.resume(epoch=epoch)
-        with suppress(ClientError):  # it is resumed all the same
-            first = (await client.queue(limit=0)).current
-            if first is not None and first.state is TaskState.HELD:
-                words += f" after {line_of(first)}"
-    _done(common, "resume", words)
+    output.say_done(common.json, "clear", f"{which} called off", running_too=everything)
 
 
 @command
@@ -155,7 +96,7 @@ async def modify(
                 preemptive=preemptive,
                 at=start.at,
             )
-    _done(common, "modify", f"task {task_id} is changed", task=task_id)
+    output.say_done(common.json, "modify", f"task {task_id} is changed", task=task_id)
 
 
 @command
@@ -188,7 +129,7 @@ async def release(
             task_id = task.id
         else:
             task_id = await client.release(None, chosen)
-    _done(common, "release", f"task {task_id}: {how}", task=task_id, how=how)
+    output.say_done(common.json, "release", f"task {task_id}: {how}", task=task_id, how=how)
 
 
 def _confirm(question: str) -> None:
@@ -196,10 +137,3 @@ def _confirm(question: str) -> None:
         raise UsageError("--all calls off the running task, too: say --yes")
     if not typer.confirm(question):
         raise UsageError("nothing was called off")
-
-
-def _done(common: Common, action: str, words: str, **fields: object) -> None:
-    if common.json:
-        output.say_json({"done": action, **fields})
-    else:
-        output.say(words)

@@ -46,6 +46,14 @@ def say_json(value: dict[str, Any]) -> None:
     say(json.dumps(value))
 
 
+def say_done(as_json: bool, action: str, words: str, **fields: object) -> None:
+    """Say that a request was carried out: in words, or as an object with ``fields``."""
+    if as_json:
+        say_json({"done": action, **fields})
+    else:
+        say(words)
+
+
 def show(what: "RenderableType") -> None:
     """Print a table; no blanks at the ends of its lines where a program reads them."""
     target = console()

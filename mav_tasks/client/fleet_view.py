@@ -143,17 +143,17 @@ class FleetView:
             return "no task server answered {where}: is it running?"
         if not served:
             return f"rover {min(self._views)} is heard {{where}}, but no task server answered"
-        return f"rover {wished} was not found {{where}}: there is {_list(served)}"
+        return f"rover {wished} was not found {{where}}: {_there_are(served)}"
 
     def which(self, wished: int | None) -> int:
         """Give the vehicle that is meant, None: the only one. NoSuchVehicle."""
         served = self.served()
         if wished is not None and wished not in served:
-            raise NoSuchVehicle(f"rover {wished} is not there: there is {_list(served)}")
+            raise NoSuchVehicle(f"rover {wished} is not there: {_there_are(served)}")
         if wished is not None:
             return wished
         if len(served) != 1:
-            raise NoSuchVehicle(f"there is {_list(served)}: name the one that is meant")
+            raise NoSuchVehicle(f"{_there_are(served)}: name the one that is meant")
         return served[0]
 
     def heartbeat(self, packet: Packet, message: m.Heartbeat, *, now: float) -> bool:
@@ -203,7 +203,9 @@ class FleetView:
         return [view.system_id for view in due]
 
 
-def _list(ids: Sequence[int]) -> str:
+def _there_are(ids: Sequence[int]) -> str:
     if not ids:
-        return "none"
-    return ("rover " if len(ids) == 1 else "rovers ") + ", ".join(map(str, ids))
+        return "there is none"
+    if len(ids) == 1:
+        return f"there is rover {ids[0]}"
+    return f"there are rovers {', '.join(map(str, ids))}"

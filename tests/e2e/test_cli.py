@@ -235,7 +235,7 @@ def test_after_a_restart_of_the_rover_it_is_said_how_to_go_on_and_that_works(
             (queue,) = called("queue", "--json", server=server).objects
             assert queue["paused"] == "restarted"
             (said,) = called("resume", server=server).lines
-            assert said.startswith(f"goes on after task {task.id}: move 1 m: held")
+            assert said.startswith(f"rover 1: goes on after task {task.id}: move 1 m: held")
             assert said.endswith(f"decide: mav-tasks release {task.id} again|remainder|skip")
             assert called("release", str(task.id), "remainder", server=server).status == 0
             assert task.done(timeout=30.0).state is TaskState.COMPLETED
@@ -294,20 +294,20 @@ def read_way() -> PlanFile:
 
 
 def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) -> None:
-    assert called("pause", server=server).lines == ["paused; to go on: mav-tasks resume"]
+    assert called("pause", server=server).lines == ["rover 1: paused. To go on: mav-tasks resume"]
     (queue,) = called("queue", "--json", server=server).objects
     assert queue["paused"] == "operator"
-    assert called("resume", server=server).lines == ["goes on"]
+    assert called("resume", server=server).lines == ["rover 1: goes on"]
     stopped = called("stop", "--clear", server=server)
     assert stopped.status == 0
     (line,) = stopped.lines
-    assert line.startswith("STOP holds for every rover")
+    assert line.startswith("STOP is in force for every rover")
     assert "mav-tasks resume" in line
     assert client.queue().paused is not None
     assert called("stop", "--vehicle", "1", "--json", server=server).objects == [
         {"done": "stop", "vehicle": 1, "cleared": False}
     ]
-    assert called("resume", "--json", server=server).objects == [{"done": "resume"}]
+    assert called("resume", "--json", server=server).objects == [{"done": "resume", "vehicle": 1}]
     assert client.queue().paused is None
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.kit.commands import called
-from tests.kit.processes import free_udp_ports, process
+from tests.kit.processes import free_udp_ports, frozen, process
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def test_what_can_mean_either_rover_is_asked_back(server: str) -> None:
     done = called("submit", "move", "1", server=server)
     assert done.status == 2
     assert done.error == (
-        "mav-tasks: there is rovers 1, 2: name the one that is meant (--vehicle N)\n"
+        "mav-tasks: there are rovers 1, 2: name the one that is meant (--vehicle N)\n"
     )
 
 
@@ -49,13 +49,77 @@ def test_a_task_is_found_by_its_number_alone(server: str) -> None:
     assert (gone.status, gone.error) == (1, "mav-tasks: no task 9999\n")
 
 
-def test_stop_is_for_all_and_each_is_resumed(server: str) -> None:
+def paused(server: str) -> list[str | None]:
+    """Return why the queue of each rover is paused."""
+    return [rover["paused"] for rover in called("queue", "--json", server=server).objects]
+
+
+def test_stop_pause_and_resume_are_for_one_rover_or_for_all(server: str) -> None:
     assert called("stop", server=server).status == 0
-    rovers = called("queue", "--json", server=server).objects
-    assert [rover["paused"] for rover in rovers] == ["stopped", "stopped"]
-    assert called("resume", server=server).status == 2
-    for number in ("1", "2"):
-        assert called("resume", "--vehicle", number, server=server).status == 0
-    assert [rover["paused"] for rover in called("queue", "--json", server=server).objects] == [
-        *(None, None)
+    assert paused(server) == ["stopped", "stopped"]
+    all_go_on = called("resume", "--all", server=server)
+    assert all_go_on.lines == ["rover 1: goes on", "rover 2: goes on"]
+    assert paused(server) == [None, None]
+    assert called("pause", "--vehicle", "2", server=server).lines == [
+        "rover 2: paused. To go on: mav-tasks resume --vehicle 2"
     ]
+    assert paused(server) == [None, "operator"]
+    done = called("pause", "--all", "--json", server=server).objects
+    assert done == [{"done": "pause", "vehicle": 1}, {"done": "pause", "vehicle": 2}]
+    assert paused(server) == ["operator", "operator"]
+    assert called("resume", "--vehicle", "1", server=server).lines == ["rover 1: goes on"]
+    assert called("resume", "--all", server=server).status == 0
+    one = called("stop", "--vehicle", "2", server=server)
+    assert one.lines == [
+        "STOP is in force for rover 2: nothing runs until 'mav-tasks resume --vehicle 2'"
+    ]
+    assert paused(server) == [None, "stopped"]
+    assert called("resume", "--all", server=server).status == 0
+
+
+@pytest.mark.parametrize("action", ["pause", "resume"])
+def test_a_pause_of_several_says_how_to_choose(server: str, action: str) -> None:
+    done = called(action, server=server)
+    assert (done.status, done.output) == (2, "")
+    assert done.error == ("mav-tasks: there are rovers 1, 2: choose with --vehicle N or --all\n")
+    both = called(action, "--all", "--vehicle", "1", server=server)
+    assert (both.status, both.error) == (
+        *(2, "mav-tasks: --all and --vehicle 1: choose one of them\n"),
+    )
+    assert paused(server) == [None, None]
+
+
+def test_a_silent_rover_keeps_no_other_from_being_paused(tmp_path: Path) -> None:
+    client, *rovers = free_udp_ports(3)
+    serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client}", "--no-push"]
+    serve += [part for port in rovers for part in ("--vehicle", f"udpout:127.0.0.1:{port}")]
+    server = f"udpout:127.0.0.1:{client}"
+
+    def sim(number: int) -> tuple[str, ...]:
+        port = str(rovers[number - 1])
+        return (
+            "-m",
+            "rover_sim",
+            "--port",
+            port,
+            "--body",
+            "kinematic",
+            "--system-id",
+            str(number),
+        )
+
+    with (
+        process(*sim(1), folder=tmp_path, name="first"),
+        process(*sim(2), folder=tmp_path, name="second") as second,
+        process(*serve, "--store", ":memory:", folder=tmp_path, name="server") as running,
+    ):
+        running.wait_for("vehicle 1: found")
+        running.wait_for("vehicle 2: found")
+        with frozen(second):
+            running.wait_for("vehicle 2: silent")
+            done = called("pause", "--all", server=server)
+            assert done.status == 1
+            assert done.lines == ["rover 1: paused. To go on: mav-tasks resume --vehicle 1"]
+            assert done.error.startswith("mav-tasks: rover 2: paused, but")
+            headlines = [line for line in called("queue", server=server).lines if "rover" in line]
+            assert "rover 2 (silent for" in headlines[1]

@@ -1,7 +1,6 @@
 """The command line at a terminal: what it looks like, whatever the terminal is, and Ctrl-C."""
 
 import re
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -9,7 +8,7 @@ import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskState, Wait
 from tests.kit.commands import called
-from tests.kit.processes import Process, Stand, stand, wait_until
+from tests.kit.processes import Stand, frozen, stand, wait_until
 from tests.kit.terminal import CTRL_C, Terminal, terminal
 
 ESCAPE = b"\x1b"
@@ -51,16 +50,6 @@ def at(
     command = ("-m", "mav_tasks.cli", *arguments)
     with terminal(*command, size=size, environment=surroundings) as running:
         yield running
-
-
-@contextmanager
-def frozen(process: Process) -> Iterator[None]:
-    """Have a process do nothing for a while."""
-    process.popen.send_signal(signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        process.popen.send_signal(signal.SIGCONT)
 
 
 def test_a_task_that_is_waited_for_is_one_line_that_moves(there: Stand, client: SyncClient) -> None:

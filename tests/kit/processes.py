@@ -288,3 +288,13 @@ def wait_for(
     message = link.recv_match(type=kind, condition=condition, blocking=True, timeout=within)
     assert message is not None, f"no {kind} ({condition}) in {within} s"
     return message
+
+
+@contextmanager
+def frozen(process: Process) -> Iterator[None]:
+    """Have a process do nothing for a while."""
+    process.popen.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        process.popen.send_signal(signal.SIGCONT)

@@ -1,0 +1,151 @@
+"""Commands that stop rovers, and that let them go on: of one rover or of all."""
+
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli import output
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common
+from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
+
+if TYPE_CHECKING:
+    from mav_tasks.client.aio import Client
+
+Everywhere = Annotated[bool, typer.Option("--all", help="Every rover of the server.")]
+
+
+@command
+async def stop(
+    common: Common,
+    everywhere: Everywhere = False,
+    clear: Annotated[bool, typer.Option("--clear", help="Cancel the waiting tasks, too.")] = False,
+) -> None:
+    """Stop the rovers at once; nothing runs until you resume.
+
+    Without --vehicle it stops every rover, as with --all.
+    """
+    from mav_tasks.cli.session import unfound  # noqa: PLC0415
+    from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
+
+    _require_one_choice(common, everywhere=everywhere)
+    async with unfound(common) as client:  # looking for the rovers would take time
+        try:
+            await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
+        except Refused as error:
+            if error.reason == TaskReason.VEHICLE_SILENT:
+                words = "STOP is in force, but a rover is silent: it stops when it is heard again"
+                raise Refused(words, result=error.result, reason=error.reason) from error
+            raise
+    which, way_on = "every rover", "mav-tasks resume --all"
+    if common.vehicle is not None:
+        which, way_on = f"rover {common.vehicle}", f"mav-tasks resume --vehicle {common.vehicle}"
+    output.say_done(
+        common.json,
+        "stop",
+        f"STOP is in force for {which}: nothing runs until '{way_on}'",
+        vehicle=common.vehicle,
+        cleared=clear,
+    )
+
+
+@command
+async def pause(common: Common, everywhere: Everywhere = False) -> None:
+    """Stop a rover where it is; its task can go on from there."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        rovers = _chosen(client, common, everywhere=everywhere)
+
+        async def pause_one(rover: int) -> str:
+            await client.pause(vehicle=rover)
+            return f"paused. To go on: {_way_on(client, rover)}"
+
+        await _each(rovers, pause_one, common, "pause")
+
+
+@command
+async def resume(
+    common: Common,
+    everywhere: Everywhere = False,
+    epoch: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Only if nothing came since: halt_epoch of 'queue --json'."
+        ),
+    ] = None,
+) -> None:
+    """Go on after a pause, a STOP or a takeover."""
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.cli.words import line_of  # noqa: PLC0415
+    from mav_tasks.tasks.lifecycle import TaskState  # noqa: PLC0415
+
+    if everywhere and epoch is not None:
+        raise UsageError("--all and --epoch: each rover has an epoch of its own, name one rover")
+    async with opened(common) as client:
+        rovers = _chosen(client, common, everywhere=everywhere)
+
+        async def resume_one(rover: int) -> str:
+            await client.resume(epoch=epoch, vehicle=rover)
+            with suppress(ClientError):  # it is resumed all the same
+                first = (await client.queue(limit=0, vehicle=rover)).current
+                if first is not None and first.state is TaskState.HELD:
+                    return f"goes on after {line_of(first)}"
+            return "goes on"
+
+        await _each(rovers, resume_one, common, "resume")
+
+
+def _require_one_choice(common: Common, *, everywhere: bool) -> None:
+    if everywhere and common.vehicle is not None:
+        raise UsageError(f"--all and --vehicle {common.vehicle}: choose one of them")
+
+
+def _chosen(client: "Client", common: Common, *, everywhere: bool) -> list[int]:
+    """Return the rovers that are meant: the one named, all, or the only one. UsageError."""
+    _require_one_choice(common, everywhere=everywhere)
+    if common.vehicle is not None:
+        return [common.vehicle]
+    rovers = [each.id for each in client.vehicles()]
+    if len(rovers) > 1 and not everywhere:
+        ids = ", ".join(map(str, rovers))
+        raise UsageError(f"there are rovers {ids}: choose with --vehicle N or --all")
+    return rovers
+
+
+def _way_on(client: "Client", rover: int) -> str:
+    is_alone = len(client.vehicles()) == 1
+    return "mav-tasks resume" if is_alone else f"mav-tasks resume --vehicle {rover}"
+
+
+async def _each(
+    rovers: Sequence[int],
+    ask: Callable[[int], Awaitable[str]],
+    common: Common,
+    action: str,
+) -> None:
+    """Ask it of all rovers at the same time: none waits for a silent one. Say how it went of each.
+
+    Raise Refused, or NoAnswer, if any did not do it.
+    """
+    import asyncio  # noqa: PLC0415
+
+    answers = await asyncio.gather(*map(ask, rovers), return_exceptions=True)
+    failed: list[tuple[int, ClientError]] = []
+    for rover, answer in zip(rovers, answers, strict=True):
+        if isinstance(answer, str):
+            output.say_done(common.json, action, f"rover {rover}: {answer}", vehicle=rover)
+        elif isinstance(answer, ClientError):
+            failed.append((rover, answer))
+        else:
+            raise answer
+    if len(rovers) == 1 and failed:
+        raise failed[0][1]
+    words = "\n".join(f"rover {rover}: {error}" for rover, error in failed)
+    refused = [error for _, error in failed if isinstance(error, Refused)]
+    if refused:
+        raise Refused(words, result=refused[0].result, reason=refused[0].reason)
+    if failed:
+        raise NoAnswer(words)
