@@ -39,6 +39,12 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
+def warn(text: str) -> None:
+    """Write a line on standard error, now; none if there is nothing to say."""
+    if text:
+        sys.stderr.write(f"mav-tasks: {text}\n")
+
+
 def say_json(value: dict[str, Any]) -> None:
     """Write an object as a line, now."""
     import json  # noqa: PLC0415

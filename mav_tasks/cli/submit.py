@@ -76,13 +76,16 @@ async def drive(
 @command
 async def goto(
     north: Annotated[
-        float, typer.Argument(metavar="NORTH|LAT", help="Metres, or degrees with --global.")
+        str, typer.Argument(metavar="NORTH|LAT", help="Metres, or degrees with --global.")
     ],
-    east: Annotated[float, typer.Argument(metavar="EAST|LON", help="The same.")],
+    east: Annotated[str, typer.Argument(metavar="EAST|LON", help="The same.")],
     terms: Terms,
     common: Common,
     is_global: Annotated[
-        bool, typer.Option("--global", help="Latitude and longitude, not metres.")
+        bool, typer.Option("--global", help="The numbers are latitude and longitude.")
+    ] = False,
+    is_local: Annotated[
+        bool, typer.Option("--local", help="The numbers are metres, also if they are large.")
     ] = False,
     speed: Speed = None,
     radius: Annotated[
@@ -93,14 +96,14 @@ async def goto(
         float | None, typer.Option(metavar="DEGREES", help="Turn to it in the end.")
     ] = None,
 ) -> None:
-    """Drive to a place: metres from the rover's origin, or latitude and longitude."""
-    from mav_tasks.cli.session import values_checked  # noqa: PLC0415
-    from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place  # noqa: PLC0415
+    """Drive to a place: metres from the rover's origin, or latitude and longitude.
 
-    place: Place = LocalPlace(north, east)
-    if is_global:
-        with values_checked():
-            place = GlobalPlace(_degE7("latitude", north, 90), _degE7("longitude", east, 180))
+    Numbers that may be a latitude and a longitude need --local or --global.
+    """
+    from mav_tasks.cli.places import parse_place  # noqa: PLC0415
+    from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
+
+    place = parse_place(north, east, is_global=is_global, is_local=is_local)
     way = GoTo(place, speed=speed, radius=radius, yaw=_maybe_radians(heading))
     await _submit([way], terms, common)
 
@@ -160,6 +163,7 @@ async def tell_submitted(
 
     if not common.json:
         output.say(f"task {task.id}{hint}")
+        output.warn(await _why_it_waits(client, task))
     if is_awaited:
         from mav_tasks.cli.follow import follow  # noqa: PLC0415
 
@@ -174,6 +178,19 @@ async def tell_submitted(
             output.say_json({"id": task.id, "vehicle": task.vehicle})
 
 
+async def _why_it_waits(client: "Client", task: "Task") -> str:
+    """Return why nothing runs, and what to do about it; "" if the task's turn comes by itself."""
+    from mav_tasks.cli import words  # noqa: PLC0415
+    from mav_tasks.errors import ClientError  # noqa: PLC0415
+
+    try:
+        status = await task.refresh()
+        queue = await client.queue(vehicle=task.vehicle, limit=0)
+    except ClientError:  # it is there all the same
+        return ""
+    return words.why_it_waits(status, queue)
+
+
 def _radians(angle: float) -> float:
     from math import radians  # noqa: PLC0415
 
@@ -182,9 +199,3 @@ def _radians(angle: float) -> float:
 
 def _maybe_radians(angle: float | None) -> float | None:
     return None if angle is None else _radians(angle)
-
-
-def _degE7(name: str, value: float, limit: int) -> int:
-    if not abs(value) <= limit:
-        raise ValueError(f"{name} {value:g}: expected degrees, -{limit} to {limit}")
-    return round(value * 1e7)

@@ -18,6 +18,15 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
+#: a task with one of these has its turn without anybody's doing
+COMES_BY_ITSELF = (
+    TaskReason.NONE,
+    TaskReason.START_TIME,
+    TaskReason.DEPENDENCY,
+    TaskReason.BEHIND_OTHERS,
+    TaskReason.WAITING_FOR_START,
+)
+
 
 def state_of(status: TaskStatus) -> str:
     """Give the name of its state."""
@@ -54,6 +63,21 @@ def line_of(status: TaskStatus) -> str:
     took_words = f", in {format_duration(took)}" if took else ""
     way_on = f"; {way_on_of(status)}" if way_on_of(status) and not status.is_over else ""
     return f"task {status.id}: {what_of(status)}: {state_of(status)}{why}{took_words}{way_on}"
+
+
+def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
+    """Return why a new task does not run, and what to do; "" if its turn comes by itself."""
+    if not status.is_waiting or status.reason in COMES_BY_ITSELF:
+        return ""
+    why, way_on = why_of(status), way_on_of(status)
+    current = queue.current
+    if current is not None and current.state is TaskState.HELD:
+        why, way_on = f"task {current.id} is held ({why_of(current)})", way_on_of(current)
+    elif queue.paused is not None:
+        why = f"the queue is paused ({words_of(queue.paused)})"
+        way_on = "to go on: mav-tasks resume"
+    text = f"task {status.id} waits, rover {status.vehicle}: {why}"
+    return f"{text}; {way_on}" if way_on else text
 
 
 def percent_of(status: TaskStatus) -> str:

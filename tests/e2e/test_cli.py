@@ -241,6 +241,29 @@ def test_after_a_restart_of_the_rover_it_is_said_how_to_go_on_and_that_works(
             assert task.done(timeout=30.0).state is TaskState.COMPLETED
 
 
+@pytest.mark.parametrize("halt", ["pause", "stop"])
+def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, halt: str) -> None:
+    assert called(halt, server=server).status == 0
+    done = called("submit", "move", "1", server=server)
+    assert done.status == 0
+    (line,) = done.lines
+    number = line.removeprefix("task ")
+    why = {"pause": "operator", "stop": "stopped"}[halt]
+    assert done.error == (
+        f"mav-tasks: task {number} waits, rover 1: the queue is paused ({why});"
+        " to go on: mav-tasks resume\n"
+    )
+    assert called("submit", "move", "1", "--json", server=server).error == ""
+    assert called("clear", server=server).status == 0
+
+
+def test_latitude_and_longitude_are_not_taken_for_metres(server: str) -> None:
+    done = called("submit", "goto", "47.3", "8.5", server=server)
+    assert_one_line(done, 2, "47.3 8.5", "--global", "--local")
+    assert_one_line(called("submit", "goto", "nan", "1", server=server), 2, "nan")
+    assert called("queue", "--json", server=server).objects[0]["waiting_count"] == 0
+
+
 def test_what_is_out_of_range_is_no_task(server: str, client: SyncClient) -> None:
     too_far = called("submit", "move", "1000000", server=server)
     assert_one_line(too_far, 1, "1e+06" if "e+" in too_far.error else "1000000")

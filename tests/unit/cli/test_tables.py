@@ -246,3 +246,32 @@ def test_a_queue_says_how_old_its_news_is(age: float | None, said: str) -> None:
 def test_json_has_no_infinity() -> None:
     assert words.queue_json(replace(QUEUE, heartbeat_age=inf))["heartbeat_age"] is None
     assert words.queue_json(replace(QUEUE, heartbeat_age=1.25))["heartbeat_age"] == 1.25
+
+
+PAUSED = replace(QUEUE, paused=TaskReason.OPERATOR, current=None, running=None)
+NEW = replace(WAITING, reason=TaskReason.QUEUE_PAUSED, words="move 2 m: queued (queue paused)")
+
+
+@pytest.mark.parametrize(
+    ("status", "queue", "said"),
+    [
+        (WAITING, QUEUE, ""),
+        (RUNNING, QUEUE, ""),
+        (NEW, PAUSED, "the queue is paused (operator); to go on: mav-tasks resume"),
+        (
+            replace(NEW, reason=TaskReason.HELD_AHEAD),
+            replace(QUEUE, current=HELD),
+            "task 12 is held (off track); decide: mav-tasks release 12 again|remainder|skip",
+        ),
+        (
+            replace(NEW, reason=TaskReason.DISARMED, words="move 2 m: queued (disarmed)"),
+            replace(QUEUE, current=None),
+            "disarmed",
+        ),
+    ],
+)
+def test_a_new_task_that_does_not_run_says_why(
+    status: TaskStatus, queue: QueueStatus, said: str
+) -> None:
+    expected = f"task 13 waits, rover 1: {said}" if said else ""
+    assert words.why_it_waits(status, queue) == expected
