@@ -25,6 +25,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help: rich alone would cost a third of the time to show it
     pretty_exceptions_enable=False,
     epilog=exit_codes.TABLE,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}

@@ -9,10 +9,41 @@ import inspect
 import sys
 from collections.abc import Callable, Coroutine
 from io import TextIOWrapper
+from itertools import takewhile
 from typing import Any
 
-#: negative numbers are arguments and no options
+from typer.core import TyperCommand
+
+#: of a NumbersCommand
 NUMBERS = {"ignore_unknown_options": True}
+
+
+class NumbersCommand(TyperCommand):
+    """A command that takes a negative number for an argument, and a mistyped option for none."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse them, after a look for options that there are not."""
+        known = [name for each in self.get_params(ctx) for name in each.opts + each.secondary_opts]
+        for argument in takewhile(lambda each: each != "--", args):
+            name = argument.partition("=")[0]
+            if name.startswith("-") and name not in known and not _is_number(name):
+                ctx.fail(f"No such option: {name}{_similar(name, known)}")
+        return super().parse_args(ctx, args)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _similar(name: str, known: list[str]) -> str:
+    from difflib import get_close_matches  # noqa: PLC0415
+
+    close = get_close_matches(name, known)
+    return f" (Possible options: {', '.join(sorted(close))})" if close else ""
 
 
 def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:

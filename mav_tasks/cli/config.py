@@ -17,7 +17,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
-STANDARD_INPUT = "-"
+STANDARD_INPUT = STANDARD_OUTPUT = "-"
 
 
 @app.command()
@@ -62,7 +62,7 @@ def check(
 @app.command()
 def init(
     path: Annotated[
-        str | None, typer.Argument(help="A file that is not there yet; default: print it.")
+        str | None, typer.Argument(help="A file that is not there yet; default, and -: print it.")
     ] = None,
 ) -> None:
     """Print or write a sample file.
@@ -71,7 +71,7 @@ def init(
     """
     from mav_tasks.config.sample import sample  # noqa: PLC0415
 
-    if path is None:
+    if path in (None, STANDARD_OUTPUT):
         sys.stdout.write(sample())
         return
     try:

@@ -83,10 +83,11 @@ async def modify(
     if all(wish is None for wish in wishes):
         raise UsageError(f"modify {task_id}: say what is to be changed, --priority or another")
     from mav_tasks.cli.session import find_task, opened, values_checked  # noqa: PLC0415
+    from mav_tasks.cli.typed_words import in_typed_words  # noqa: PLC0415
 
     async with opened(common) as client:
         task = await find_task(client, common, task_id)
-        with values_checked():
+        with values_checked(), in_typed_words():
             await task.modify(
                 priority=priority,
                 delay=start.delay,

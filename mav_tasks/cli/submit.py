@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mav_tasks.cli.command import NUMBERS, command
+from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
 from mav_tasks.cli.options import Common, Terms
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ app = typer.Typer(
 )
 
 
-@app.command(context_settings=NUMBERS)
+@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def move(
     distance: Annotated[float, typer.Argument(metavar="METRES", help="Negative: backwards.")],
@@ -41,7 +41,7 @@ async def move(
     await _submit([Move(distance, speed)], terms, common)
 
 
-@app.command(context_settings=NUMBERS)
+@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def rotate(
     angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise.")],
@@ -55,7 +55,7 @@ async def rotate(
     await _submit([Rotate(_radians(angle), _maybe_radians(rate))], terms, common)
 
 
-@app.command(context_settings=NUMBERS)
+@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def drive(
     forward: Annotated[float, typer.Argument(metavar="M/S", help="Negative: backwards.")],
@@ -72,7 +72,7 @@ async def drive(
     await _submit([Drive(forward, _radians(yaw_rate), seconds)], terms, common)
 
 
-@app.command(context_settings=NUMBERS)
+@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def goto(
     north: Annotated[
@@ -108,7 +108,7 @@ async def goto(
     await _submit([way], terms, common)
 
 
-@app.command(context_settings=NUMBERS)
+@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def face(
     heading: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise from north.")],
@@ -122,7 +122,7 @@ async def face(
     await _submit([Face(_radians(heading), rate=_maybe_radians(rate))], terms, common)
 
 
-@app.command(context_settings=NUMBERS)
+@app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def wait(
     duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 30s or 5m.")],
@@ -147,10 +147,11 @@ async def home(terms: Terms, common: Common, speed: Speed = None) -> None:
 
 async def _submit(goals: "Sequence[Goal]", terms: Terms, common: Common) -> None:
     from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
+    from mav_tasks.cli.typed_words import in_typed_words  # noqa: PLC0415
 
     wished = read(terms)
     async with opened(common) as client:
-        with values_checked():
+        with values_checked(), in_typed_words():
             task = await client.submit(goals, **wished._asdict())
         await tell_submitted(client, task, common, is_awaited=terms.wait)
 

@@ -257,6 +257,30 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     assert called("clear", server=server).status == 0
 
 
+def test_a_refused_number_is_told_as_it_was_typed(server: str) -> None:
+    for typed, said in {
+        ("move", "1", "--speed", "99"): "--speed 99: at most 2 m/s (driving.max_speed)",
+        ("rotate", "90", "--rate", "500"): "--rate 500: at most 90 deg/s (driving.max_turn_rate)",
+        ("face", "90", "--rate", "500"): "--rate 500: at most 90 deg/s (driving.max_turn_rate)",
+    }.items():
+        done = called("submit", *typed, server=server)
+        assert (done.status, done.error) == (1, f"mav-tasks: {said}\n")
+
+
+def test_a_mistyped_option_is_named_with_what_it_may_be(server: str) -> None:
+    done = called("submit", "move", "-1", "--prio", "3", server=server)
+    assert (done.status, done.output) == (2, "")
+    assert "No such option: --prio (Possible options:" in done.error
+    assert "--priority" in done.error
+
+
+def test_h_is_help_everywhere() -> None:
+    for command in ((), ("submit",), ("submit", "move"), ("mission", "upload"), ("sim",)):
+        done = mav_tasks(*command, "-h")
+        assert done.status == 0, done
+        assert "usage:" in done.output.lower()
+
+
 def test_latitude_and_longitude_are_not_taken_for_metres(server: str) -> None:
     done = called("submit", "goto", "47.3", "8.5", server=server)
     assert_one_line(done, 2, "47.3 8.5", "--global", "--local")

@@ -1,0 +1,62 @@
+"""A server's refusal of a number, in the words of the command line that it was typed on.
+
+The server names a parameter of MAVLink ("param2 speed 99 not in 0.01..2"); whoever typed
+``--speed 99`` is told about that option, its unit, and the setting that holds the limit.
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from mav_tasks.errors import Refused
+
+OUT_OF_RANGE = re.compile(r"param\d ([a-z ]+) (\S+) not in (-?[\d.e+]+)\.\.(-?[\d.e+]+)$")
+
+
+class Typed(NamedTuple):
+    """Where a number was typed, its unit, and the server's setting that limits it."""
+
+    name: str
+    unit: str = ""
+    setting: str = ""
+
+
+TYPED = {
+    "distance": Typed("METRES", "m", "driving.max_distance"),
+    "speed": Typed("--speed", "m/s", "driving.max_speed"),
+    "angle": Typed("DEGREES", "deg", "driving.max_turn"),
+    "rate": Typed("--rate", "deg/s", "driving.max_turn_rate"),
+    "forward speed": Typed("M/S", "m/s", "driving.max_speed"),
+    "yaw rate": Typed("DEG/S", "deg/s", "driving.max_turn_rate"),
+    "duration": Typed("DURATION", "s", "driving.max_duration"),
+    "hold": Typed("DURATION", "s"),
+    "acceptance radius": Typed("--radius", "m"),
+    "start delay": Typed("--in", "s"),
+    "priority": Typed("--priority"),
+}
+
+
+@contextmanager
+def in_typed_words() -> Iterator[None]:
+    """Say a refusal that names a parameter in the words of the command line."""
+    try:
+        yield
+    except Refused as error:
+        words = typed_words(str(error))
+        if words is None:
+            raise
+        raise Refused(words, result=error.result, reason=error.reason) from error
+
+
+def typed_words(refusal: str) -> str | None:
+    """Return a refusal in words of the command line; None if it is about something else."""
+    found = OUT_OF_RANGE.search(refusal)
+    typed = None if found is None else TYPED.get(found[1])
+    if found is None or typed is None:
+        return None
+    value, low, high = found[2], found[3], found[4]
+    limit = f"at most {high}" if float(value) > float(high) else f"at least {low}"
+    unit = f" {typed.unit}" if typed.unit else ""
+    setting = f" ({typed.setting})" if typed.setting else ""
+    return f"{typed.name} {value}: {limit}{unit}{setting}"
