@@ -3,8 +3,8 @@
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 
-LOOK = 0.05  # s
-LOOKS = 30  # telemetry is asked for once a second
+LOOK = 0.01  # s
+LOOKS = 150  # telemetry is asked for once a second
 
 
 @command
