@@ -2,13 +2,15 @@
 
 import asyncio
 import gc
+import json
 import logging
 import os
 import signal
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 from mav_tasks.clock import boot_time
@@ -24,6 +26,7 @@ from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint
 from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES, WayOut
 from mav_tasks.logs.field_notes import FieldNotes
+from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.logs.vehicle_texts import VehicleTexts
 from mav_tasks.recording import witnesses
@@ -50,6 +53,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
         signal.signal(number, _leave_before_serving)
     if reload is not None:
         signal.signal(signal.SIGHUP, reload.note)
+    say = partial(_say, as_json=settings.log.format == "json")
     with ExitStack() as opened:
         opened.enter_context(log_to_stderr(settings.log))
         keys = _watched_ring(links)
@@ -66,23 +70,23 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
         opened.callback(journal.close)
         restored = journal.load() if isinstance(journal, SqliteStore) else None
         if reload is not None and reload.file is not None:
-            _say(f"configuration {reload.file}")
+            say(f"configuration {reload.file}")
         if keys.keys is not None:
             usable = sum(1 for key in keys.keys if key.secret)
-            _say(f"key ring {keys.path}, {usable} keys")
+            say(f"key ring {keys.path}, {usable} keys")
         for link in asked:
             signatures = in_words(link, has_ring=keys.keys is not None)
             waiting = "" if link.side == "clients" else ", waiting for the first heartbeat"
-            _say(f"{link.side} on {link.url}{signatures}{waiting}")
+            say(f"{link.side} on {link.url}{signatures}{waiting}")
         for opened_link in vehicle_links:
             if isinstance(opened_link, UdpLink) and opened_link.note:
-                _say(f"{opened_link.name}: {opened_link.note}")
+                say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
-            _say("nobody is spoken to unasked: none of the links for clients is UDP")
-        _say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
+            say("nobody is spoken to unasked: none of the links for clients is UDP")
+        say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
-            _say(f"parameters set before: {_in_words(restored.parameters)}")
-        running = _run(settings, journal, restored, client_links, vehicle_links, reload, keys)
+            say(f"parameters set before: {_in_words(restored.parameters)}")
+        running = _run(settings, journal, restored, client_links, vehicle_links, reload, keys, say)
         return asyncio.run(running)
 
 
@@ -143,14 +147,15 @@ async def _run(
     vehicles: Sequence[Link],
     reload: Reload | None,
     keys: RingWatch,
+    say: Callable[[str], None],
 ) -> int:
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)  # what the store gave back
     for why in engine.not_in_force:
-        _say(f"not in force, though set before: {why}")
+        say(f"not in force, though set before: {why}")
     recorders = witnesses(settings.recording, settings.engine, restored, now=now)
     for recorder in recorders:
-        _say(f"{recorder}")
+        say(f"{recorder}")
     tame_collector()
     listeners: list[Witness] = [VehicleTexts(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
@@ -172,12 +177,15 @@ def _in_words(parameters: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:g}" for name, value in sorted(parameters.items()))
 
 
-def _say(words: str) -> None:
+def _say(words: str, *, as_json: bool) -> None:
     """Tell who started the server; that nobody listens is no reason not to serve."""
     if sys.stdout is None:  # closed from the beginning
         return
+    line = f"mav-tasks: {words}"
+    if as_json:  # both outputs together are to be JSON
+        line = json.dumps({"time": utc_text(time.time()), "level": "info", "message": words})
     try:
-        sys.stdout.write(f"mav-tasks: {words}\n")
+        sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
     except OSError:  # nor shall the interpreter fail for it when it ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -4,7 +4,9 @@ import json
 import logging
 import time
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import is_dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 from mav_tasks.clock import boot_time
@@ -15,16 +17,19 @@ from mav_tasks.tasks.events import Event, SubmissionRefused
 #: record, its words, how often more it was said, in so many seconds -> the line
 LineOf = Callable[[logging.LogRecord, str, tuple[int, float] | None], str]
 
+SECONDS = len("2026-11-24T14:05:09")
+
 _traceback = logging.Formatter().formatException
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 
 
 class TextLines:
-    """Local time, level, words. A traceback follows on lines of its own."""
+    """Local time with its zone, level, words. A traceback follows on lines of its own."""
 
     def __init__(self) -> None:
         self._second = -1
-        self._clock = ""  # that second in words: thousands of lines a second have the same
+        # that second in words, and its zone: thousands of lines a second have the same
+        self._clock = self._zone = ""
 
     def __call__(
         self, record: logging.LogRecord, words: str, repeated: tuple[int, float] | None
@@ -33,8 +38,10 @@ class TextLines:
         second = int(record.created)
         if second != self._second:
             self._second = second
-            self._clock = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(second))
-        line = f"{self._clock},{int(record.msecs):03} {record.levelname} {words}"
+            moment = datetime.fromtimestamp(second, UTC).astimezone().isoformat()
+            self._clock, self._zone = moment[:SECONDS], moment[SECONDS:]
+        clock = f"{self._clock}.{int(record.msecs):03}{self._zone}"
+        line = f"{clock} {record.levelname} {words}"
         if repeated:
             line += _count(repeated)
         if record.exc_info:
@@ -64,10 +71,11 @@ def json_line(record: logging.LogRecord, words: str, repeated: tuple[int, float]
 
 
 class Lines:
-    """Makes lines of records. ``now`` in monotonic seconds."""
+    """Makes lines of records. ``now`` in monotonic seconds, ``wall`` gives UTC seconds."""
 
-    def __init__(self, line_of: LineOf) -> None:
+    def __init__(self, line_of: LineOf, *, wall: Callable[[], float] = time.time) -> None:
         self._line_of = line_of
+        self._wall = wall
         self._repeats: Repeats[tuple[logging.LogRecord, str]] = Repeats()
 
     def __repr__(self) -> str:
@@ -95,8 +103,11 @@ class Lines:
         return map(self._counted, self._repeats.rest(now=now))
 
     def _counted(self, of: tuple[Said[tuple[logging.LogRecord, str]], float]) -> str:
+        """Give a line of now: one with the time of the first would stand after later ones."""
         said, seconds = of
-        record, words = said.what
+        record, words = copy(said.what[0]), said.what[1]
+        record.created = self._wall()
+        record.msecs = record.created % 1 * 1000
         return self._line_of(record, words, (said.more, seconds))
 
 

@@ -19,12 +19,14 @@ from mav_tasks.tasks.events import (
     Event,
     QueuePaused,
     SubmissionRefused,
+    TaskChanged,
     TaskProgressed,
     TaskSubmitted,
     VehicleHalted,
     VehicleNoted,
 )
 from mav_tasks.tasks.goal import Goal, Place
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.task import Submitter, Task
 
@@ -63,8 +65,14 @@ def level_of(event: Event) -> int:
     """Give the log level of an event: what its operator should look at is a warning."""
     if isinstance(event, SignaturesSeen | TaskProgressed | VehicleHalted):
         return logging.DEBUG  # beside what else is told of it
-    noteworthy = SubmissionRefused | SignatureRefused | VehicleNoted | QueuePaused
-    return logging.WARNING if isinstance(event, noteworthy) else logging.INFO
+    match event:
+        case TaskChanged(new=TaskState.FAILED | TaskState.HELD | TaskState.EXPIRED):
+            return logging.WARNING
+        case QueuePaused(reason=TaskReason.OPERATOR):
+            return logging.INFO  # somebody wished it
+        case SubmissionRefused() | SignatureRefused() | VehicleNoted() | QueuePaused():
+            return logging.WARNING
+    return logging.INFO
 
 
 def utc_text(utc: float) -> str | None:

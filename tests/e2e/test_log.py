@@ -117,10 +117,10 @@ def test_what_a_rover_says_is_in_the_log_and_gives_no_orders_to_the_terminal(
             running.server.wait_for("DEBUG vehicle 42 says: that is all")
             running.server.end()
             lines = [line for line in running.server.text.splitlines() if "vehicle 42" in line]
-    assert [line.split(" ", 2)[2] for line in lines] == [
+    assert [line.split(" ", 1)[1] for line in lines] == [
         "WARNING vehicle 42 says: PreArm: [31mred ERROR forged",
         "DEBUG vehicle 42 says: that is all",
-    ] + [line.split(" ", 2)[2] for line in lines[2:]]
+    ] + [line.split(" ", 1)[1] for line in lines[2:]]
     assert "\x1b" not in running.server.text
     assert any("more in" in line for line in lines[2:])
 
@@ -164,7 +164,10 @@ def test_the_log_in_json_and_the_journal_beside_the_server_say_the_same(tmp_path
     assert (followed[-1]["old"], followed[-1]["new"]) == ("executing", "completed")
     assert kept[-1]["event"] == "ServerStopped"
 
-    said = [json.loads(line) for line in text.splitlines() if not line.startswith("mav-tasks: ")]
+    said = [json.loads(line) for line in text.splitlines()]  # also what it says as it starts
+    assert any(each["message"].startswith("clients on ") for each in said)
+    times = [each["time"] for each in said]
+    assert times == sorted(times)
     texts = [each for each in said if each.get("event") == "VehicleText"]
     assert {each["vehicle"] for each in texts} == {1}  # the simulated autopilot said something
     logged = [each for each in said if "event" in each and each not in texts]

@@ -3,6 +3,9 @@
 import json
 import logging
 import sys
+import time
+
+import pytest
 
 from mav_tasks.logs.lines import Lines, TextLines, json_line
 from mav_tasks.tasks.events import QueuePaused, SubmissionRefused, VehicleNoted
@@ -67,13 +70,37 @@ def test_a_traceback_is_in_both_and_gives_no_orders() -> None:
     assert "ZeroDivisionError" in json.loads(line)["traceback"]
 
 
-def test_a_text_line_is_as_loggings_own() -> None:
-    own = logging.Formatter("%(asctime)s %(levelname)s %(message)s")
-    lines = TextLines()
-    for created in (1.0, 1_790_000_000.123, 1_790_000_000.9, 1_790_000_001.0):
+@pytest.mark.parametrize(
+    ("zone", "second", "expected"),
+    [
+        ("UTC0", 1_790_000_000.125, "2026-09-21T14:13:20.125+00:00"),
+        ("CET-1CEST,M3.5.0,M10.5.0/3", 1_790_000_000.9, "2026-09-21T16:13:20.900+02:00"),
+        ("NST3:30NDT,M3.2.0,M11.1.0", 1.0, "1969-12-31T20:30:01.000-03:30"),
+    ],
+)
+def test_a_text_line_has_local_time_and_its_zone(
+    monkeypatch: pytest.MonkeyPatch, zone: str, second: float, expected: str
+) -> None:
+    monkeypatch.setenv("TZ", zone)
+    time.tzset()
+    try:
         it = record("words %d", 3)
-        it.created, it.msecs = created, created % 1 * 1000
-        assert lines(it, it.getMessage(), None) == own.format(it)
+        it.created, it.msecs = second, second % 1 * 1000
+        assert TextLines()(it, it.getMessage(), None) == f"{expected} INFO words 3"
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+
+
+def test_a_count_has_the_time_at_which_it_is_written() -> None:
+    """With the time of the first it stood after later lines, and the log was out of order."""
+    lines = Lines(json_line, wall=lambda: 1_790_000_031.5)
+    for now in (0.0, 1.0):
+        it = record("link x lost")
+        it.created = 1_790_000_000.0 + now
+        lines.of(it, now=now)
+    (line,) = lines.due(now=31.5)
+    assert json.loads(line)["time"] == "2026-09-21T14:13:51.500Z"
 
 
 def test_words_of_more_than_one_line_become_one() -> None:

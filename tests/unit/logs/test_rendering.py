@@ -13,7 +13,7 @@ import pytest
 from mav_tasks.errors import UsageError
 from mav_tasks.logs.export import COLUMNS, csv_entry, json_entry, parse_since, text_entry
 from mav_tasks.logs.lines import json_line
-from mav_tasks.logs.rendering import clean, utc_text
+from mav_tasks.logs.rendering import clean, level_of, utc_text
 from mav_tasks.tasks.events import (
     Event,
     PlanStored,
@@ -44,6 +44,7 @@ from mav_tasks.tasks.task import Frame, Marks, Pose, Progress, Task, TaskId, Ter
 from mav_tasks.tasks.timing import Timing
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE
 
+NEEDS_A_HAND = TaskState.FAILED, TaskState.HELD, TaskState.EXPIRED
 UTC = 1_795_255_200.25
 TIME = "2026-11-21T10:00:00.250Z"
 AT = 100.25
@@ -219,3 +220,21 @@ def test_since_when(text: str, utc: float) -> None:
 def test_since_when_is_not_understood(text: str) -> None:
     with pytest.raises(UsageError, match="--since"):
         parse_since(text, now=0.0)
+
+
+@pytest.mark.parametrize(
+    ("event", "level"),
+    [
+        *((replace(CHANGED, new=each), logging.WARNING) for each in NEEDS_A_HAND),
+        (replace(CHANGED, new=TaskState.COMPLETED, reason=TaskReason.NONE), logging.INFO),
+        (replace(CHANGED, new=TaskState.CANCELLED), logging.INFO),
+        (QueuePaused(1, TaskReason.OPERATOR, "anna", AT), logging.INFO),
+        (QueuePaused(1, TaskReason.STOPPED, "anna", AT), logging.WARNING),
+        (QueuePaused(1, TaskReason.RESTARTED, "server", AT), logging.WARNING),
+        (VehicleNoted(1, "silent", AT), logging.WARNING),
+        (VehicleSeen(1, "heard again", AT), logging.INFO),
+        (REFUSED, logging.WARNING),
+    ],
+)
+def test_what_needs_a_hand_is_a_warning(event: Event, level: int) -> None:
+    assert level_of(event) == level
