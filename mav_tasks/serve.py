@@ -33,7 +33,7 @@ from mav_tasks.recording import witnesses
 from mav_tasks.runner import Runner
 from mav_tasks.settings import Links, Retention, ServerSettings
 from mav_tasks.store import MemoryStore
-from mav_tasks.store.place import path_of_store
+from mav_tasks.store.place import note_latest, path_of_store
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.witness import Witness
@@ -68,6 +68,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
         gc.disable()  # many tasks are read: it would look through them again and again
         journal = open_store(settings.store or None, retention)
         opened.callback(journal.close)
+        note_latest(path_of_store(settings.store or None))
         restored = journal.load() if isinstance(journal, SqliteStore) else None
         if reload is not None and reload.file is not None:
             say(f"configuration {reload.file}")

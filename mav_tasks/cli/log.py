@@ -22,7 +22,7 @@ def log(
         str | None,
         typer.Option(
             metavar="PATH",
-            help="The store's file; default: as the configuration says.",
+            help="The store's file; default: that of the server that was started last.",
         ),
     ] = None,
     task: Annotated[int | None, typer.Option(metavar="ID", help="Of this task only.")] = None,
@@ -57,7 +57,10 @@ def log(
     for flag, number in (("--task", task), ("--vehicle", vehicle)):
         if number is not None and not 0 <= number < MOST:
             raise UsageError(f"{flag} {number}: there is no such number")
-    path = path_of_store(_configured() if store is None else store)
+    path = path_of_store(_store_of_server() if store is None else store)
+    if path is None and store is None:
+        words = "the server that was started last keeps its tasks in memory, so it has no journal"
+        raise StoreError(f"{words}; --store names another store")
     if path is None or store == "":
         raise StoreError("--store: expected the path of a store that is kept")
     begin = None if since is None else export.parse_since(since, now=time.time())
@@ -96,8 +99,10 @@ def _is_written_to(journal: "Journal", seen: int) -> bool:
     return True
 
 
-def _configured() -> str:
-    """Give the store that the server's configuration names."""
+def _store_of_server() -> str:
+    """Return the store that the configuration names, else that of the server started last."""
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
+    from mav_tasks.store.place import latest_store  # noqa: PLC0415
 
-    return Sources(None, dict(os.environ)).load().settings.store
+    configured = Sources(None, dict(os.environ)).load().settings.store
+    return configured or latest_store() or ""

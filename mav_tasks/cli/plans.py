@@ -69,7 +69,10 @@ async def upload_mission(
 @mission.command("start")
 @command
 async def start_mission(common: Common, wait: Wait = False) -> None:
-    """Start the mission that waits for it, or the last one again."""
+    """Start the staged mission, or the last one that was staged again.
+
+    Staged is what a ground station has uploaded, or 'mission upload --stage'.
+    """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     async with opened(common) as client:
@@ -80,13 +83,17 @@ async def start_mission(common: Common, wait: Wait = False) -> None:
 @mission.command("download")
 @command
 async def download_mission(file: FileOut, common: Common, force: Force = False) -> None:
-    """Write the mission at the rover's own place into a file."""
+    """Write the staged mission of a rover into a file.
+
+    That is what a ground station has uploaded, or 'mission upload --stage'; one that 'mission
+    upload' has queued is a task.
+    """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     _check_place(file, force=force)
     async with opened(common) as client:
         plan = await client.mission_file()
-    _check_there(plan.items, "mission")
+    _check_there(plan.items, "mission", hint="; one that was queued is a task")
     _write(plan, file, f"{len(plan.items)} items", common)
 
 
@@ -138,12 +145,13 @@ def _check_place(file: str, *, force: bool) -> None:
         raise UsageError(f"{file} is there: --force writes over it")
 
 
-def _check_there(parts: Sized, kind: str) -> None:
+def _check_there(parts: Sized, kind: str, *, hint: str = "") -> None:
     """An empty file would look as if there had been something to save."""
     if not parts:
         from mav_tasks.errors import Refused  # noqa: PLC0415
 
-        raise Refused(f"the rover has no {kind}: nothing is written", result=0, reason=0)
+        words = f"the rover has no {kind}{hint}: nothing is written"
+        raise Refused(words, result=0, reason=0)
 
 
 def _write(plan: "PlanFile", file: str, what: str, common: Common) -> None:

@@ -19,6 +19,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.tasks.events import VehicleSeen
+from tests.kit.commands import Done, mav_tasks
 from tests.kit.processes import (
     Process,
     Stand,
@@ -266,3 +267,25 @@ def test_a_server_serves_though_nobody_can_be_told(tmp_path: Path, closed: str) 
         finally:
             server.kill()
             server.wait(10)
+
+
+def log_of_nobody_in_particular(folder: Path, *options: str) -> Done:
+    """Run ``mav-tasks log`` as somebody whose files are all in a folder, and who names no store."""
+    own = str(folder)
+    return mav_tasks("log", *options, XDG_STATE_HOME=own, XDG_CONFIG_HOME=own, XDG_DATA_HOME=own)
+
+
+def test_the_log_is_that_of_the_server_that_was_started_last(tmp_path: Path) -> None:
+    nobody = log_of_nobody_in_particular(tmp_path)
+    assert (nobody.status, nobody.output) == (2, "")
+    with stand(tmp_path, serve_store=str(tmp_path / "of its own.sqlite3")) as running:
+        submit(running.connect(), MOVE, 0.2)
+        done = log_of_nobody_in_particular(tmp_path, "--task", "1")
+        assert (done.status, done.error) == (0, "")
+        assert "task 1" in done.lines[0]
+    again = log_of_nobody_in_particular(tmp_path, "--task", "1")
+    assert again.lines[0] == done.lines[0]
+    with stand(tmp_path):
+        none = log_of_nobody_in_particular(tmp_path)
+        assert none.status == 2
+        assert "keeps its tasks in memory" in none.error

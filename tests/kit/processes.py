@@ -92,7 +92,9 @@ def process(
             stderr=subprocess.STDOUT,
             cwd=folder,
             env=environment_with(
-                MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"), XDG_CONFIG_HOME=str(folder)
+                MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"),
+                XDG_CONFIG_HOME=str(folder),
+                XDG_STATE_HOME=str(folder),
             ),
         )
     running = Process(popen, output)
