@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from io import TextIOWrapper
 
 import typer
 
@@ -57,6 +58,9 @@ app.command("qgc-actions")(qgc_actions)
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point: what goes wrong is one line on standard error, and an exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that knows ASCII only
     try:
         app(arguments, prog_name="mav-tasks")
     except exit_codes.TOLD as error:

@@ -6,9 +6,7 @@ stands for all of its options.
 
 import dataclasses
 import inspect
-import sys
 from collections.abc import Callable, Coroutine
-from io import TextIOWrapper
 from itertools import takewhile
 from typing import Any
 
@@ -57,8 +55,6 @@ def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Non
     def run(**values: Any) -> None:
         import asyncio  # noqa: PLC0415
 
-        if isinstance(sys.stdout, TextIOWrapper):
-            sys.stdout.reconfigure(errors="replace")  # a terminal that knows ASCII only
         for name, group in groups.items():
             fields = [field.name for field in dataclasses.fields(group)]
             values[name] = group(**{field: values.pop(field) for field in fields})

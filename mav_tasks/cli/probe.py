@@ -14,7 +14,7 @@ Url = Annotated[
     str | None,
     typer.Argument(
         metavar="URL",
-        help="Of the rover itself: udpout:host:port, udpin:…, tcp:…, serial:/dev/ttyUSB0:57600.",
+        help="Of the rover: udpout:host:port, udpin: or tcp: alike, serial:/dev/ttyUSB0:57600.",
     ),
 ]
 SetFailsafe = Annotated[

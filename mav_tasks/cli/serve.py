@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 LINKS = (
-    "udpin:host:port or tcpin:… listens, udpout:… or tcp:… dials, "
+    "udpin:host:port and tcpin:host:port listen, udpout: and tcp: dial, "
     "serial:/dev/ttyUSB0:57600 is a line; ?unsigned=allow, ?unsigned=refuse and ?key=NAME behind "
     "it say what is asked of signatures."
 )

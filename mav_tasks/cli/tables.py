@@ -1,8 +1,8 @@
 """Queues and rovers as tables that fit a width."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import degrees, inf
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from rich.cells import cell_len
 from rich.console import Group
@@ -27,11 +27,14 @@ STYLES = {
 }
 
 
-class Column(NamedTuple):
+T = TypeVar("T")
+
+
+class Column(NamedTuple, Generic[T]):
     """A column: its cells, and its place among those for which there may be no room, 0: always."""
 
     name: str
-    cell: Callable[[TaskStatus], str]
+    cell: Callable[[T], str]
     worth: int = 0
     is_words: bool = False  # may be cut short
     is_right: bool = False
@@ -42,7 +45,7 @@ def _starts(status: TaskStatus) -> str:
     return format_duration(seconds) if seconds and status.is_waiting else ""
 
 
-COLUMNS = (
+TASK_COLUMNS: tuple[Column[TaskStatus], ...] = (
     Column("id", lambda s: str(s.id), is_right=True),
     Column("prio", lambda s: str(s.priority), worth=3, is_right=True),
     Column("state", words.state_of),
@@ -76,10 +79,25 @@ def queue_table(queue: QueueStatus, *, width: int, rows: int | None = None) -> G
 
 
 def task_table(tasks: Sequence[TaskStatus], *, width: int) -> Table:
-    """Give tasks, one a line, with the columns for which there is room."""
+    """Return tasks, one a line, with the columns for which there is room."""
+    return _table(TASK_COLUMNS, tasks, width, styles={"state": lambda s: STYLES.get(s.state, "")})
+
+
+def vehicle_table(vehicles: Sequence[VehicleStatus], *, width: int) -> Table:
+    """Return rovers, one a line, with the columns for which there is room."""
+    return _table(VEHICLE_COLUMNS, vehicles, width, styles={})
+
+
+def _table(
+    columns: Sequence[Column[T]],
+    rows: Sequence[T],
+    width: int,
+    *,
+    styles: Mapping[str, Callable[[T], str]],
+) -> Table:
     table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, header_style="bold")
-    columns = fitting(tasks, width)
-    for column, its_width in columns:
+    shown = fitting(columns, rows, width)
+    for column, its_width in shown:
         table.add_column(
             column.name,
             width=its_width,
@@ -87,54 +105,36 @@ def task_table(tasks: Sequence[TaskStatus], *, width: int) -> Table:
             overflow="ellipsis",
             justify="right" if column.is_right else "left",
         )
-    for status in tasks:
-        cells = [Text(column.cell(status)) for column, _ in columns]
-        for (column, _), cell in zip(columns, cells, strict=True):
-            if column.name == "state":
-                cell.stylize(STYLES.get(status.state, ""))
+    for row in rows:
+        cells = [Text(column.cell(row)) for column, _ in shown]
+        for (column, _), cell in zip(shown, cells, strict=True):
+            if column.name in styles:
+                cell.stylize(styles[column.name](row))
         table.add_row(*cells)
     return table
 
 
-def fitting(tasks: Sequence[TaskStatus], width: int) -> list[tuple[Column, int]]:
-    """Give the columns for which there is room, each with its width; empty ones are left out."""
-    wanted = {column: _width(column, tasks) for column in COLUMNS}
-    shown: list[Column] = []
-    for column in sorted(COLUMNS, key=lambda c: c.worth):
-        is_empty = not any(column.cell(task) for task in tasks)
+def fitting(
+    columns: Sequence[Column[T]], rows: Sequence[T], width: int
+) -> list[tuple[Column[T], int]]:
+    """Return the columns for which there is room, each with its width, without the empty ones."""
+    wanted = {column.name: _width(column, rows) for column in columns}
+    shown: list[Column[T]] = []
+    for column in sorted(columns, key=lambda c: c.worth):
+        is_empty = not any(column.cell(row) for row in rows)
         words_have = LEAST_WORDS if column.is_words else GOOD_WORDS
         least = _least([*shown, column], wanted, words_have)
         if not is_empty and (not column.worth or least <= width):
             shown.append(column)
     spare = max(0, width - _least(shown, wanted, LEAST_WORDS))
-    widths: list[tuple[Column, int]] = []
-    for column in (each for each in COLUMNS if each in shown):
-        least = min(wanted[column], LEAST_WORDS) if column.is_words else wanted[column]
-        more = min(spare, wanted[column] - least)
+    widths: list[tuple[Column[T], int]] = []
+    for column in (each for each in columns if each in shown):
+        most = wanted[column.name]
+        least = min(most, LEAST_WORDS) if column.is_words else most
+        more = min(spare, most - least)
         spare -= more
         widths.append((column, least + more))
     return widths
-
-
-def vehicle_table(vehicles: Sequence[VehicleStatus]) -> Table:
-    """Give rovers, one a line."""
-    table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, header_style="bold")
-    for name in ("rover", "kind", "mode", "armed", "heard", "north", "east", "heading", "speed"):
-        is_number = name in ("rover", "north", "east", "heading", "speed")
-        table.add_column(name, justify="right" if is_number else "left")
-    for each in vehicles:
-        table.add_row(
-            str(each.id),
-            each.kind,
-            each.mode,
-            "-" if each.armed is None else "armed" if each.armed else "disarmed",
-            _heard(each),
-            _number(each.north, "m", 2),
-            _number(each.east, "m", 2),
-            _number(None if each.yaw is None else degrees(each.yaw) % 360, "deg", 1),
-            _number(each.speed, "m/s", 2),
-        )
-    return table
 
 
 def _heard(vehicle: VehicleStatus) -> str:
@@ -144,12 +144,31 @@ def _heard(vehicle: VehicleStatus) -> str:
     return "never" if age == inf else f"{format_duration(age)} ago"
 
 
-def _width(column: Column, tasks: Sequence[TaskStatus]) -> int:
-    return max(cell_len(text) for text in (column.name, *map(column.cell, tasks)))
+def _heading(vehicle: VehicleStatus) -> str:
+    if vehicle.yaw is None:
+        return "-"
+    return f"{round(degrees(vehicle.yaw), 1) % 360:.1f} deg"  # never 360.0
 
 
-def _least(columns: Sequence[Column], wanted: dict[Column, int], words_have: int) -> int:
-    widths = (min(wanted[c], words_have) if c.is_words else wanted[c] for c in columns)
+VEHICLE_COLUMNS: tuple[Column[VehicleStatus], ...] = (
+    Column("rover", lambda v: str(v.id), is_right=True),
+    Column("kind", lambda v: v.kind, worth=5),
+    Column("mode", lambda v: v.mode, worth=2),
+    Column("armed", lambda v: "-" if v.armed is None else "armed" if v.armed else "disarmed"),
+    Column("heard", _heard, worth=1),
+    Column("north", lambda v: _number(v.north, "m", 2), worth=4, is_right=True),
+    Column("east", lambda v: _number(v.east, "m", 2), worth=4, is_right=True),
+    Column("heading", _heading, worth=6, is_right=True),
+    Column("speed", lambda v: _number(v.speed, "m/s", 2), worth=3, is_right=True),
+)
+
+
+def _width(column: Column[T], rows: Sequence[T]) -> int:
+    return max(cell_len(text) for text in (column.name, *map(column.cell, rows)))
+
+
+def _least(columns: Sequence[Column[T]], wanted: Mapping[str, int], words_have: int) -> int:
+    widths = (min(wanted[c.name], words_have) if c.is_words else wanted[c.name] for c in columns)
     return sum(widths) + GAP * max(len(columns) - 1, 0)
 
 

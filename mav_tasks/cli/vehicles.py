@@ -28,4 +28,4 @@ async def vehicles(common: Common) -> None:
         return
     from mav_tasks.cli.tables import vehicle_table  # noqa: PLC0415
 
-    output.show(vehicle_table(found))
+    output.show(vehicle_table(found, width=output.console().width))

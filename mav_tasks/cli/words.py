@@ -204,7 +204,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
 
 def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
     """Give a rover as JSON has it."""
-    heading = None if vehicle.yaw is None else degrees(vehicle.yaw) % 360.0
+    heading = None if vehicle.yaw is None else round(degrees(vehicle.yaw), 4) % 360.0
     return {
         "vehicle": vehicle.id,
         "kind": vehicle.kind,

@@ -22,7 +22,7 @@ from mav_tasks.settings import ARMING, ROLES, TASK_KINDS, ServerSettings
 DEGREE = pi / 180  # rad
 DAY = 86_400.0  # s
 FOREVER = "forever"
-URL = "link URLs: udpin:host:port, udpout:…, tcpin:…, tcp:… or serial:device:baud"
+URL = "link URLs: udpin:host:port, udpout:, tcpin: and tcp: alike, serial:device:baud"
 
 #: where ServerSettings keeps the keys of each table
 PLACES: Mapping[str, str] = {
@@ -196,12 +196,12 @@ _DRIVING = (
     ),
     _key(
         "driving.acceleration",
-        Number(0.05, 5, "m/s²"),
+        Number(0.05, 5, "m/s2"),
         "acceleration of setpoints, and the deceleration that is planned for",
     ),
     _key(
         "driving.turn_acceleration_deg",
-        Number(1, 3600, "deg/s²", DEGREE),
+        Number(1, 3600, "deg/s2", DEGREE),
         "the same for turning",
         field="turn_acceleration",
     ),

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskState, Wait
-from tests.kit.commands import called
+from tests.kit.commands import called, mav_tasks
 from tests.kit.processes import Stand, frozen, stand, wait_until
 from tests.kit.terminal import CTRL_C, Terminal, terminal
 
@@ -197,3 +197,12 @@ def test_a_stop_that_does_not_reach_the_rover_stays(there: Stand, client: SyncCl
         assert len(done.error.splitlines()) == 1
     wait_until(lambda: client.vehicles()[0].is_heard, within=10, what="the rover again")
     assert client.queue().paused is not None
+
+
+@pytest.mark.parametrize(
+    "command", [("config", "show"), ("config", "init"), ("serve", "--help"), ("probe", "--help")]
+)
+def test_what_needs_no_server_is_ascii_too(command: tuple[str, ...]) -> None:
+    done = mav_tasks(*command, PYTHONIOENCODING="ascii")
+    assert (done.status, done.error) == (0, "")
+    assert done.output.isascii()

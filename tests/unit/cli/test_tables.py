@@ -200,7 +200,7 @@ def test_no_number_is_minus_nothing() -> None:
     rover = VehicleStatus(1, "ardupilot", False, "HOLD", True, 191, north=-0.001)
     console = Console(file=io.StringIO(), width=120)
     with console.capture() as captured:
-        console.print(vehicle_table([rover]))
+        console.print(vehicle_table([rover], width=120))
     assert " 0.00 m" in captured.get()
     assert "-0.00" not in captured.get()
 
@@ -221,7 +221,7 @@ def test_what_is_not_known_of_a_rover_is_a_dash() -> None:
     rover = VehicleStatus(3, "px4", True, "OFFBOARD", True, 191, north=1.5, east=-2.25, yaw=-pi / 2)
     console = Console(file=io.StringIO(), width=120, color_system=None)
     with console.capture() as captured:
-        console.print(vehicle_table([rover]))
+        console.print(vehicle_table([rover], width=120))
     cells = captured.get().splitlines()[1].split("  ")
     assert [cell.strip() for cell in cells if cell] == [
         *("3", "px4", "OFFBOARD", "armed", "yes", "1.50 m", "-2.25 m", "270.0 deg", "-"),
@@ -275,3 +275,31 @@ def test_a_new_task_that_does_not_run_says_why(
 ) -> None:
     expected = f"task 13 waits, rover 1: {said}" if said else ""
     assert words.why_it_waits(status, queue) == expected
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_rovers_fit_a_narrow_terminal_with_no_cell_cut(width: int) -> None:
+    rover = VehicleStatus(
+        *(112, "ardupilot", True, "GUIDED", False, 191, -1234.56, 1234.56, 3.0, 1.25),
+        heartbeat_age=754.0,
+    )
+    console = Console(file=io.StringIO(), width=width, color_system=None)
+    with console.capture() as captured:
+        console.print(vehicle_table([rover, rover], width=width))
+    lines = captured.get().splitlines()
+    assert len(lines) == 3
+    assert max(map(cell_len, lines)) <= width
+    assert "…" not in captured.get()
+    for shown in ("112", "armed", "GUIDED", "12m34s ago"):
+        assert shown in lines[1]
+    assert ("ardupilot" in lines[1]) is (width >= 80)
+
+
+@pytest.mark.parametrize(("yaw", "shown"), [(-0.0004, "0.0 deg"), (2 * pi - 0.0004, "0.0 deg")])
+def test_no_heading_is_360(yaw: float, shown: str) -> None:
+    rover = VehicleStatus(1, "px4", True, "HOLD", True, 191, yaw=yaw)
+    console = Console(file=io.StringIO(), width=120, color_system=None)
+    with console.capture() as captured:
+        console.print(vehicle_table([rover], width=120))
+    assert f" {shown}" in captured.get()
+    assert words.vehicle_json(replace(rover, yaw=-1e-9))["heading"] == 0.0
