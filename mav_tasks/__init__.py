@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    __version__: str
     from mav_tasks.client.aio import Client as Client
     from mav_tasks.client.handle import Task as Task
     from mav_tasks.client.sync import SyncClient as SyncClient
@@ -79,6 +80,10 @@ __all__ = sorted(_HOME_OF)  # noqa: PLE0605  # strings, all of them
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version  # noqa: PLC0415
+
+        return version("mav-tasks")
     home = _HOME_OF.get(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,6 +8,7 @@ import typer
 
 from mav_tasks.cli import config, control, exit_codes, halts, keys, plans, submit
 from mav_tasks.cli.demo import demo
+from mav_tasks.cli.dialect import dialect
 from mav_tasks.cli.log import log
 from mav_tasks.cli.probe import probe
 from mav_tasks.cli.qgc_actions import qgc_actions
@@ -54,6 +55,7 @@ app.command()(replay)
 app.add_typer(config.app, name="config")
 app.add_typer(keys.app, name="keys")
 app.command("qgc-actions")(qgc_actions)
+app.command()(dialect)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -164,7 +164,8 @@ async def tell_submitted(
 
     if not common.json:
         output.say(f"task {task.id}{hint}")
-        output.warn(await _why_it_waits(client, task))
+        if not is_awaited:  # else each reason is shown as it comes
+            output.warn(await _why_it_waits(client, task))
     if is_awaited:
         from mav_tasks.cli.follow import follow  # noqa: PLC0415
 

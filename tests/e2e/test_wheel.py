@@ -86,6 +86,11 @@ def without_extras(python: str, folder: Path) -> None:
     for extra in ("pybullet", "numpy", "matplotlib", "pytest", "mavsdk"):
         assert run(python, "-c", f"import {extra}", folder=folder).returncode == 1, extra
 
+    path = run(python, "-m", "mav_tasks.cli", "dialect", "--path", folder=folder).stdout.strip()
+    assert ROOT not in Path(path).parents
+    for name in ("mav_tasks.xml", "base_additions.xml"):
+        assert (Path(path) / name).read_bytes() == (ROOT / "dialects" / name).read_bytes()
+
     refused = run(python, "-m", "mav_tasks.cli", "sim", "--body", "bullet", folder=folder)
     assert refused.returncode == 2, refused.stdout
     assert "pip install pybullet numpy" in refused.stderr

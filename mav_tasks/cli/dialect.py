@@ -1,0 +1,29 @@
+"""``mav-tasks dialect``: the MAVLink definitions of the task messages, for other programs."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from mav_tasks.errors import UsageError
+
+
+def dialect(
+    path: Annotated[
+        bool, typer.Option("--path", help="Say in which folder the XML files are.")
+    ] = False,
+) -> None:
+    """Print the MAVLink definitions of the task messages.
+
+    The file includes common.xml, which every MAVLink generator has.
+    """
+    from mav_tasks.mavlink.definitions import DIALECT, folder_of_definitions  # noqa: PLC0415
+
+    try:
+        folder = folder_of_definitions()
+    except FileNotFoundError as error:
+        raise UsageError(str(error)) from error
+    if path:
+        sys.stdout.write(f"{folder}\n")
+    else:
+        sys.stdout.write((folder / DIALECT).read_text(encoding="utf-8"))
