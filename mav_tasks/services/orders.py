@@ -1,6 +1,6 @@
 """What is said to one vehicle so that it does what we want, in the way of its persona. Pure."""
 
-from math import copysign, cos, isfinite, sin
+from math import copysign, cos, isfinite, nan, sin
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
@@ -124,7 +124,8 @@ class Orders:
     def staying(self, *, changes_mode: bool) -> CommandInt:
         """Return the "go to" without a place: a vehicle that drives to one in HOLD stays here.
 
-        With ``changes_mode`` it asks for HOLD, too.
+        With ``changes_mode`` it asks for HOLD, too. Heading and altitude are NaN, "not given": with
+        a number in either, a PX4 drives on to the place that it has (1.17, navigator_main.cpp).
         """
         return CommandInt(
             *self._target,
@@ -135,10 +136,10 @@ class Orders:
             param1=DEFAULT_SPEED,
             param2=CHANGE_MODE if changes_mode else 0.0,
             param3=0.0,
-            param4=0.0,
+            param4=nan,
             x=NOT_GIVEN,
             y=NOT_GIVEN,
-            z=0.0,
+            z=nan,
         )
 
     def _command(

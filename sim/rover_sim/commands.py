@@ -30,6 +30,7 @@ class Command(NamedTuple):
     place: tuple[int, int] | None  # x, y of COMMAND_INT; None from COMMAND_LONG
     degrees: tuple[float, float] | None  # param5, param6 of COMMAND_LONG; None from COMMAND_INT
     frame: int
+    altitude: float = 0.0  # param7, z of COMMAND_INT
 
 
 Action = Callable[[Command, float], MavResult]
@@ -75,12 +76,14 @@ class CommandReceiver:
 
     def _handle_long(self, message: messages.CommandLong, sender: Address, now: float) -> None:
         degrees = (message.param5, message.param6)
-        command = Command(_first_four(message), place=None, degrees=degrees, frame=0)
+        params = _first_four(message)
+        command = Command(params, None, degrees, frame=0, altitude=message.param7)
         self._answer(message.command, command, sender, now)
 
     def _handle_int(self, message: messages.CommandInt, sender: Address, now: float) -> None:
         place = (message.x, message.y)
-        command = Command(_first_four(message), place=place, degrees=None, frame=message.frame)
+        params = _first_four(message)
+        command = Command(params, place, None, frame=message.frame, altitude=message.z)
         self._answer(message.command, command, sender, now)
 
     def _handle_set_mode(self, message: messages.SetMode, sender: Address, now: float) -> None:

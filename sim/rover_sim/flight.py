@@ -143,13 +143,19 @@ class FlightControl:
             self._route.skip_to(seq)
         return True
 
-    def reposition(self, destination: Destination | None, *, now: float) -> bool:
-        """Drive to a place (None: stay here) in the mode that is for it, if that may be entered."""
+    def reposition(
+        self, destination: Destination | None, *, keeps_place: bool = False, now: float
+    ) -> bool:
+        """Drive to a place (None: stay here) in the mode that is for it, if that may be entered.
+
+        ``keeps_place``: go on to the place of before, if there is one.
+        """
         mode = self._rules.reposition_mode
         if self.mode is not mode and not self.request_mode(mode, now=now):
             return False
         self._rules.choose(mode)
-        self._rules.go_to(destination, now=now)
+        if not keeps_place:
+            self._rules.go_to(destination, now=now)
         return True
 
     @property

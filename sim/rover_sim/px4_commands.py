@@ -144,17 +144,27 @@ class Px4Commands:
         return _done(started and self._flight.arm(forced=False, now=now))
 
     def reposition(self, command: Command, now: float) -> MavResult:
-        """Drive to a place in HOLD, from either form of the command; no place: stay here."""
-        if command.params[1] != CHANGE_MODE:
+        """Drive to a place in HOLD, from either form of the command; no place: stay here.
+
+        "Stay here" is only what has neither place nor heading nor altitude, each NaN: with a number
+        in one of these the navigator of 1.17 keeps the place that it is on its way to
+        (navigator_main.cpp, DO_REPOSITION). Without CHANGE_MODE the commander says that it knows no
+        such command, and the navigator obeys it all the same.
+        """
+        changes_mode = command.params[1] == CHANGE_MODE
+        if not changes_mode and not (self._flight.can_reposition and self._flight.armed):
             return MavResult.UNSUPPORTED
         place = _place(command)
         if place is None:
-            return _done(self._flight.reposition(None, now=now))
+            keeps = any(map(math.isfinite, (command.params[3], command.altitude)))
+            done = self._flight.reposition(None, keeps_place=keeps, now=now)
+            return _done(done) if changes_mode else MavResult.UNSUPPORTED
         latitude, longitude = place
         if abs(latitude) > LATITUDE_LIMIT_DEGE7 or abs(longitude) > LONGITUDE_LIMIT_DEGE7:
             return MavResult.DENIED
         destination = Destination(*self._parts.origin.to_local(round(latitude), round(longitude)))
-        return _done(self._flight.reposition(destination, now=now))
+        done = self._flight.reposition(destination, now=now)
+        return _done(done) if changes_mode else MavResult.UNSUPPORTED
 
     def change_speed(self, command: Command, _now: float) -> MavResult:
         """Change how fast it drives by itself."""

@@ -45,6 +45,12 @@ class RealPx4Rules(Px4Rules):
         super().enter(mode)
         self._held_at = None
 
+    def go_to(self, destination: Destination | None, *, now: float) -> None:
+        """Drive to a place in HOLD; None: stay where it is at the next step."""
+        super().go_to(destination, now=now)
+        if destination is None:
+            self._held_at = None
+
     def intervene(
         self, mode: Mode, *, armed: bool, arrived: bool, now: float
     ) -> Intervention | None:

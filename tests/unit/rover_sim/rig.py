@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
+from math import nan
 from typing import TypeVar
 
 from mav_tasks.mavlink import messages as m
@@ -109,9 +110,19 @@ class Rig:
         padded = (*params, *(0.0,) * (7 - len(params)))
         return self._answer_to(m.CommandLong(1, 1, command, 0, *padded))
 
-    def command_int(self, command: int, *, frame: int, x: int, y: int, param2: float) -> MavResult:
+    def command_int(
+        self,
+        command: int,
+        *,
+        frame: int,
+        x: int,
+        y: int,
+        param2: float,
+        param4: float = nan,
+        z: float = 0.0,
+    ) -> MavResult:
         return self._answer_to(
-            m.CommandInt(1, 1, frame, command, 0, 0, -1.0, param2, 0.0, float("nan"), x, y, 0.0)
+            m.CommandInt(1, 1, frame, command, 0, 0, -1.0, param2, 0.0, param4, x, y, z)
         )
 
     def set_mode(self, custom_mode: int) -> MavResult:

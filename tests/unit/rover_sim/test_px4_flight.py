@@ -20,6 +20,7 @@ from tests.unit.rover_sim.rig import (
 )
 
 REJECTED = MavResult.TEMPORARILY_REJECTED
+NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT
 
 
 def go_to(rig: Px4Rig, north: float, east: float) -> MavResult:
@@ -224,6 +225,45 @@ def test_hold_asked_for_again_does_not_stop_it_but_a_pause_does() -> None:
     rig.run(1.0)
     assert rig.truth.forward_speed > 1.0
     assert pause(rig) == MavResult.ACCEPTED
+    rig.run(6.0)
+    assert rig.truth.forward_speed == 0.0
+
+
+@pytest.mark.parametrize("given", [(0.0, math.nan), (math.nan, 0.0), (0.0, 0.0)])
+@pytest.mark.parametrize("is_int", [True, False])
+def test_a_pause_with_a_heading_or_an_altitude_is_none(
+    given: tuple[float, float], *, is_int: bool
+) -> None:
+    """It drives on to its place: so does PX4 1.17, which stays for nothing but NaN."""
+    rig = Px4Rig()
+    rig.arm()
+    go_to(rig, 30.0, 0.0)
+    rig.run(3.0)
+    heading, altitude = given
+    if is_int:
+        rig.command_int(
+            MavCmd.DO_REPOSITION,
+            frame=0,
+            x=NOT_GIVEN,
+            y=NOT_GIVEN,
+            param2=1,
+            param4=heading,
+            z=altitude,
+        )
+    else:
+        rig.command(MavCmd.DO_REPOSITION, -1, 1, 0, heading, math.nan, math.nan, altitude)
+    rig.run(3.0)
+    assert rig.truth.forward_speed > 1.0
+
+
+def test_a_pause_without_the_mode_change_is_unsupported_and_obeyed_in_hold() -> None:
+    """The commander knows no such command, the navigator does."""
+    rig = Px4Rig()
+    rig.arm()
+    go_to(rig, 30.0, 0.0)
+    rig.run(3.0)
+    result = rig.command(MavCmd.DO_REPOSITION, -1, 0, 0, *[math.nan] * 4)
+    assert result == MavResult.UNSUPPORTED
     rig.run(6.0)
     assert rig.truth.forward_speed == 0.0
 
