@@ -118,17 +118,36 @@ def list_(
 
 
 @app.command()
-def revoke(name: Name, keys: File = "") -> None:
-    """Have nobody sign with a key any more; a running server refuses it at once."""
+def revoke(
+    name: Name,
+    forget: Annotated[
+        bool,
+        typer.Option(
+            "--forget", help="Delete its secret: records that it signed cannot be replayed then."
+        ),
+    ] = False,
+    keys: File = "",
+) -> None:
+    """Have nobody sign with a key any more; a running server refuses it at once.
+
+    The ring keeps its secret for one use only: to replay records in which it counted.
+    """
     from datetime import UTC, datetime  # noqa: PLC0415
 
     from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
+    from mav_tasks.key_ring.ring import KeyRing  # noqa: PLC0415
     from mav_tasks.key_ring.ring_file import change, load  # noqa: PLC0415
 
     path = ring_path(keys)
     load(path)  # one that is not there is not to be made now
-    change(path, lambda ring: ring.with_revoked(name, at=datetime.now(UTC)))
-    output.say(f"key {name} is revoked in {path}")
+
+    def without_it(ring: KeyRing) -> KeyRing:
+        is_revoked = any(each.name == name and not each.is_usable for each in ring.entries)
+        revoked = ring if forget and is_revoked else ring.with_revoked(name, at=datetime.now(UTC))
+        return revoked.with_forgotten(name) if forget else revoked
+
+    change(path, without_it)
+    output.say(f"key {name} is revoked in {path}{', and its secret is deleted' if forget else ''}")
 
 
 def _asked(what: str, *, is_new: bool = False) -> str:

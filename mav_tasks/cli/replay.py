@@ -14,7 +14,10 @@ def replay(
     json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="The verdict only.")] = False,
     keys: Annotated[
-        str, typer.Option(metavar="FILE", help="The key ring of a run with signatures.")
+        str,
+        typer.Option(
+            metavar="FILE", help="The key ring of a run with signatures; default: the user's own."
+        ),
     ] = "",
 ) -> None:
     """Run a record through the server's code again.
@@ -29,11 +32,12 @@ def replay(
     from mav_tasks.recording.replay import Replay  # noqa: PLC0415
     from mav_tasks.recording.report import Report  # noqa: PLC0415
 
-    usable = load(path_of_ring(keys)).ring.usable if keys else ()
+    path = path_of_ring(keys)
+    secrets = load(path).ring.secrets if keys or path.exists() else {}
     record = read(file)
     report = Report(sys.stdout, as_json=json, quiet=quiet)
     report.begin(record)
-    running = Replay(record, secrets={key.fingerprint: key.secret for key in usable})
+    running = Replay(record, secrets=secrets)
     for happened in running.events():
         report.tell(happened)
     report.conclude(record, running)

@@ -1,9 +1,12 @@
-"""What a key ring holds. An entry that was revoked stays, without its secret: it is known as such.
+"""What a key ring holds. An entry that was revoked stays: it is known as such.
 
-So a ring whose only key was revoked is still a ring, and that key cannot come back by mistake.
+So a ring whose only key was revoked is still a ring, and that key cannot come back by mistake. Its
+secret is retired: nothing is signed or believed by it, but the records of runs in which it counted
+can be replayed.
 """
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
@@ -29,6 +32,7 @@ class Entry:
     derivation: str = ""
     created: datetime | None = None
     revoked: datetime | None = None
+    retired: bytes = field(default=b"", repr=False)  # the secret of a revoked key
 
     @property
     def is_usable(self) -> bool:
@@ -52,6 +56,14 @@ class KeyRing:
         """Those that packets may be signed with."""
         return tuple(entry.key for entry in self.entries if entry.is_usable)
 
+    @property
+    def secrets(self) -> dict[str, bytes]:
+        """All secrets by fingerprint, the retired ones too: for replays, and nothing else."""
+        secrets = {
+            entry.key.fingerprint: entry.key.secret or entry.retired for entry in self.entries
+        }
+        return {fingerprint: secret for fingerprint, secret in secrets.items() if secret}
+
     def usable_key(self, name: str) -> Key:
         """Give a key to sign with; KeyRingError says why there is none."""
         entry = self._entry(name)
@@ -73,16 +85,20 @@ class KeyRing:
         return KeyRing((*self.entries, entry))
 
     def with_revoked(self, name: str, *, at: datetime) -> "KeyRing":
-        """Give the ring in which nobody signs with a key any more; KeyRingError."""
-        self.usable_key(name)
-        return KeyRing(
-            tuple(
-                replace(each, key=without_secret(each.key), revoked=at)
-                if each.name == name
-                else each
-                for each in self.entries
-            )
+        """Return the ring in which nobody signs with a key any more. KeyRingError."""
+        secret = self.usable_key(name).secret
+        return self._with(
+            name, lambda it: replace(it, key=without_secret(it.key), revoked=at, retired=secret)
         )
+
+    def with_forgotten(self, name: str) -> "KeyRing":
+        """Return the ring without the secret of a revoked key. KeyRingError if it is in use."""
+        if self._entry(name).is_usable:
+            raise KeyRingError(f"key {name} is in use: revoke it first")
+        return self._with(name, lambda it: replace(it, retired=b""))
+
+    def _with(self, name: str, changed: Callable[[Entry], Entry]) -> "KeyRing":
+        return KeyRing(tuple(changed(each) if each.name == name else each for each in self.entries))
 
     def _entry(self, name: str) -> Entry:
         for entry in self.entries:

@@ -12,7 +12,10 @@ from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
 from mav_tasks.mavlink.signing import Key
 
 TABLE = "keys"
-FIELDS = ("role", "secret", "fingerprint", "derivation", "created", "revoked")
+FIELDS = (
+    *("role", "secret", "fingerprint", "derivation", "created", "revoked"),
+    "retired_secret",
+)
 HEADER = """\
 # The key ring of mav-tasks: secrets. Nobody else may read this file.
 # "mav-tasks keys" writes it anew at each change: comments are lost then.
@@ -67,8 +70,19 @@ def _entry(name: str, table: Mapping[str, Any]) -> Entry:
             raise KeyRingError(f"key {name}: secret: {error}") from None
     else:
         key = Key(name, b"", role=key.role, fingerprint=table["fingerprint"])
+    retired = _retired(name, table, key.fingerprint) if "retired_secret" in table else b""
     derivation, created = table.get("derivation", ""), _date(name, table, "created")
-    return Entry(name, str(kind), key, derivation, created, revoked)
+    return Entry(name, str(kind), key, derivation, created, revoked, retired)
+
+
+def _retired(name: str, table: Mapping[str, Any], fingerprint: str) -> bytes:
+    try:
+        secret = from_hex(table["retired_secret"])
+    except KeyRingError as error:
+        raise KeyRingError(f"key {name}: retired_secret: {error}") from None
+    if Key(name, secret).fingerprint != fingerprint:
+        raise KeyRingError(f"key {name}: retired_secret is not of fingerprint {fingerprint}")
+    return secret
 
 
 def _faults(name: str, table: Mapping[str, Any], *, is_revoked: bool) -> Iterator[str]:
@@ -81,6 +95,10 @@ def _faults(name: str, table: Mapping[str, Any], *, is_revoked: bool) -> Iterato
         yield f"key {name}: there is something else than {', '.join(FIELDS)}"
     elif is_revoked and "secret" in table:
         yield f"key {name}: it was revoked, and still has a secret: take that away"
+    elif not is_revoked and "retired_secret" in table:
+        yield f"key {name}: retired_secret: the key is not revoked"
+    elif not isinstance(table.get("retired_secret", ""), str):
+        yield f"key {name}: retired_secret: expected 64 hexadecimal digits in quotes"
     elif is_revoked and not _is_text(table.get("fingerprint"), _FINGERPRINT):
         yield f"key {name}: fingerprint: expected 16 hexadecimal digits"
     elif not is_revoked and not isinstance(table.get("secret"), str):
@@ -108,6 +126,8 @@ def _table(entry: Entry) -> str:
         lines.append(f'secret = "{entry.key.secret.hex()}"')
     else:
         lines.append(f'fingerprint = "{entry.key.fingerprint}"')
+    if entry.retired:
+        lines.append(f'retired_secret = "{entry.retired.hex()}"  # for replays of old records only')
     if entry.derivation:
         lines.append(f'derivation = "{entry.derivation}"')
     for field, date in (("created", entry.created), ("revoked", entry.revoked)):

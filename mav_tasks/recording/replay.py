@@ -105,7 +105,8 @@ class Replay:
             return key
         secret = self._secrets.get(key.fingerprint)
         if secret is None:
-            words = f"signed with key {key.name} ({key.fingerprint}): its key ring is needed"
+            words = f"signed with key {key.name} ({key.fingerprint}): no ring has its secret"
+            words += "; --keys FILE names the ring of that server"
             raise RecordError(f"{self._record.path}: {words}")
         return replace(key, secret=secret)
 

@@ -14,7 +14,7 @@ import pytest
 
 from mav_tasks import Key, Move, NoAnswer, SyncClient
 from mav_tasks.key_ring.ring_file import load
-from tests.kit.commands import LIMIT, Done, called, surroundings
+from tests.kit.commands import LIMIT, Done, called, mav_tasks, surroundings
 from tests.kit.processes import STOP_LIMIT, Stand, free_udp_ports, process, stand, wait_until
 from tests.kit.terminal import Terminal, terminal
 
@@ -72,7 +72,10 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
     assert secret not in shown.output
 
     assert called("keys", "revoke", "anna", "--keys", str(ring)).status == 0
+    assert f'\nretired_secret = "{secret}"' in ring.read_text(encoding="utf-8")
+    assert called("keys", "revoke", "anna", "--forget", "--keys", str(ring)).status == 0
     assert secret not in ring.read_text(encoding="utf-8")
+    assert called("keys", "revoke", "anna", "--keys", str(ring)).status == 2
     again = called("keys", "list", "--json", "--keys", str(ring)).objects[0]
     assert (again["usable"], again["fingerprint"]) == (False, key.fingerprint)
 
@@ -249,13 +252,31 @@ def test_no_secret_is_in_log_record_or_repr(signed: Signed) -> None:
             assert not [s for s in secrets if s in data or s.hex().encode() in data], path
 
 
-def test_a_record_of_a_signed_run_is_replayed_with_the_ring(signed: Signed) -> None:
+def test_a_record_is_replayed_also_after_its_keys_were_revoked(
+    signed: Signed, tmp_path: Path
+) -> None:
     (record,) = (signed.ring.parent / "records").iterdir()
-    copy = record.with_name("copy.mtlog")
+    copy = tmp_path / "copy.mtlog"
     copy.write_bytes(record.read_bytes())
-    without = called("replay", "--quiet", str(copy))
+
+    def replayed() -> Done:
+        return mav_tasks("replay", "--quiet", str(copy), XDG_CONFIG_HOME=str(tmp_path))
+
+    without = replayed()
     assert without.status == 2
-    assert "its key ring is needed" in without.error
+    assert "no ring has its secret; --keys FILE names the ring of that server" in without.error
+    own = tmp_path / "mav-tasks" / "keys.toml"  # the user's own, which need not be named
+    own.parent.mkdir(mode=0o700)
+    own.touch(mode=0o600)
+    own.write_bytes(signed.ring.read_bytes())
+    assert replayed().status == 0
+    for key in load(own).ring.usable:
+        assert called("keys", "revoke", key.name, "--keys", str(own)).status == 0
+    assert load(own).ring.usable == ()
+    after = replayed()
+    assert after.status == 0, after
+    assert called("keys", "revoke", "r1", "--forget", "--keys", str(own)).status == 0
+    assert replayed().status == 2
 
 
 @contextmanager

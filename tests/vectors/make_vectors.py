@@ -60,6 +60,7 @@ TASK_QUEUE_STATUS: list[Field] = [
     ("uint8_t", "paused_reason", 0),
     ("uint8_t", "flags", 0),
 ]
+QUEUE_EXTENSION: list[Field] = [*HALT_EPOCH, ("uint32_t", "heartbeat_age", 0)]
 TASK_TIMING: list[Field] = [
     *[("uint32_t", name, 0) for name in ("time_boot_ms", "task_id", "count", "late")],
     *[("float", name, 0) for name in ("rate", "p50", "p99", "longest")],
@@ -253,7 +254,9 @@ def _by_hand() -> list[dict[str, Any]]:
         "paused_reason": 35,
         "flags": 0,
         "halt_epoch": 12,
+        "heartbeat_age": 0,
     }
+    silent = queue | {"heartbeat_age": 12_345}
     timing = {
         "time_boot_ms": 1000,
         "task_id": 16777215,
@@ -285,8 +288,12 @@ def _by_hand() -> list[dict[str, Any]]:
     return [
         _hand_made("a task under way", "TASK_STATUS", 54000, TASK_STATUS, HALT_EPOCH, status),
         _hand_made(text, "TASK_STATUS", 54000, TASK_STATUS, HALT_EPOCH, full),
-        _hand_made(
-            "a stopped queue", "TASK_QUEUE_STATUS", 54001, TASK_QUEUE_STATUS, HALT_EPOCH, queue
+        *(
+            _hand_made(name, "TASK_QUEUE_STATUS", 54001, TASK_QUEUE_STATUS, QUEUE_EXTENSION, fields)
+            for name, fields in (
+                ("a stopped queue of an older server", queue),
+                ("a stopped queue of a silent rover", silent),
+            )
         ),
         _hand_made("even setpoints", "TASK_TIMING", 54002, TASK_TIMING, [], timing),
         _hand_made("versions", "PROTOCOL_VERSION", 300, PROTOCOL_VERSION, [], version),

@@ -68,6 +68,12 @@ def test_generated_secrets_differ() -> None:
     assert len(derivation.generated()) == 32
 
 
+REVOKED = """[keys.anna]
+role = "operator"
+fingerprint = "0123456789abcdef"
+revoked = 2026-11-21T14:30:00Z
+"""
+
 # the ring
 
 
@@ -83,9 +89,22 @@ def test_a_ring_is_read_as_it_was_written() -> None:
     ]
 
 
-def test_a_revoked_key_leaves_no_secret_and_cannot_come_back() -> None:
+def test_the_secret_of_a_revoked_key_is_good_for_replays_alone() -> None:
+    ring = ring_of(text_of(KeyRing().with_added(entry()).with_revoked("anna", at=AT)), name="k")
+    assert f'\nretired_secret = "{DIGITS}"' in text_of(ring)
+    assert f'\nsecret = "{DIGITS}"' not in text_of(ring)
+    assert (ring.usable, [bool(key.secret) for key in ring.keys]) == ((), [False])
+    assert ring.secrets == {ring.keys[0].fingerprint: entry().key.secret}
+    assert DIGITS not in repr(ring)
+    forgotten = ring.with_forgotten("anna")
+    assert (forgotten.secrets, forgotten.keys) == ({}, ring.keys)
+    assert DIGITS not in text_of(forgotten)
+    with pytest.raises(KeyRingError, match="anna is in use: revoke it first"):
+        KeyRing().with_added(entry()).with_forgotten("anna")
+
+
+def test_a_revoked_key_cannot_come_back() -> None:
     ring = KeyRing().with_added(entry()).with_revoked("anna", at=AT)
-    assert DIGITS not in text_of(ring)
     assert "revoked = 2026-11-21T14:30:00Z" in text_of(ring)
     assert ring.usable == ()
     assert len(ring.keys) == 1
@@ -160,8 +179,24 @@ def test_no_repr_has_a_secret() -> None:
             f"{ENTRY}colour = 1",
             (
                 "k.toml:1: key anna: there is something else than "
-                "role, secret, fingerprint, derivation, created, revoked"
+                "role, secret, fingerprint, derivation, created, revoked, retired_secret"
             ),
+        ),
+        (
+            f'{ENTRY}retired_secret = "{DIGITS}"',
+            "k.toml:1: key anna: retired_secret: the key is not revoked",
+        ),
+        (
+            f'{REVOKED}retired_secret = "{"0" * 64}"',
+            "k.toml:1: key anna: retired_secret: all digits are zero",
+        ),
+        (
+            f'{REVOKED}retired_secret = "{"1" * 64}"',
+            "k.toml:1: key anna: retired_secret is not of fingerprint 0123456789abcdef",
+        ),
+        (
+            f"{REVOKED}retired_secret = 3",
+            "k.toml:1: key anna: retired_secret: expected 64 hexadecimal digits in quotes",
         ),
         (
             f"{ENTRY}revoked = 2026-11-21T14:30:00Z",
