@@ -57,13 +57,13 @@ def log(
     for flag, number in (("--task", task), ("--vehicle", vehicle)):
         if number is not None and not 0 <= number < MOST:
             raise UsageError(f"{flag} {number}: there is no such number")
+    begin = None if since is None else export.parse_since(since, now=time.time())
     path = path_of_store(_store_of_server() if store is None else store)
     if path is None and store is None:
         words = "the server that was started last keeps its tasks in memory, so it has no journal"
         raise StoreError(f"{words}; --store names another store")
     if path is None or store == "":
         raise StoreError("--store: expected the path of a store that is kept")
-    begin = None if since is None else export.parse_since(since, now=time.time())
     which = Which(task=task, vehicle=vehicle, since=begin)
     entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
     with closing(Journal(path, which)) as journal:
