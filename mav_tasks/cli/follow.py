@@ -102,7 +102,7 @@ class Objects:
 
     def show(self, status: TaskStatus) -> None:
         """There is news."""
-        told = (status.state, status.reason, status.progress, status.step)
+        told = (status.state, status.reason, status.progress, status.item)
         if told != self._told:
             self._told = told
             output.say_json(words.task_json(status))

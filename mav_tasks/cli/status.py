@@ -68,7 +68,7 @@ def _fields(
         ("ahead of it", ahead),
         ("done", words.percent_of(status)),
         ("left", words.left_of(status)),
-        ("item", f"{status.step + 1} of {status.steps}" if status.steps > 1 else ""),
+        ("item", f"{status.item} of {status.items}" if status.items > 1 else ""),
         ("starts in", lasting(status.time_to_start)),
         ("ends in", lasting(status.time_to_finish)),
         ("has run for", lasting(status.execution_time)),

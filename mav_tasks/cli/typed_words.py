@@ -1,7 +1,8 @@
 """A server's refusal of a number, in the words of the command line that it was typed on.
 
-The server names a parameter of MAVLink ("param2 speed 99 not in 0.01..2"); whoever typed
-``--speed 99`` is told about that option, its unit, and the setting that holds the limit.
+The server names a parameter of MAVLink ("param2 speed 99 not in 0.01..2"); an operator who typed
+``--speed 99`` reads the name of that option, its unit, and the setting that holds the limit. A task
+of one goal is a plan of one or a few items on the wire: their numbers are left out.
 """
 
 import re
@@ -11,6 +12,8 @@ from typing import NamedTuple
 
 from mav_tasks.errors import Refused
 
+PLACE = re.compile(r"^(.*?)item \d+ is ")
+ITEM = re.compile(r"^(.*?)item \d+: ")
 OUT_OF_RANGE = re.compile(r"param\d ([a-z ]+) (\S+) not in (-?[\d.e+]+)\.\.(-?[\d.e+]+)$")
 
 
@@ -54,7 +57,8 @@ def typed_words(refusal: str) -> str | None:
     found = OUT_OF_RANGE.search(refusal)
     typed = None if found is None else TYPED.get(found[1])
     if found is None or typed is None:
-        return None
+        words = ITEM.sub(r"\1", PLACE.sub(r"\1the place is ", refusal))
+        return words if words != refusal else None
     value, low, high = found[2], found[3], found[4]
     limit = f"at most {high}" if float(value) > float(high) else f"at least {low}"
     unit = f" {typed.unit}" if typed.unit else ""

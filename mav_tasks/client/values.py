@@ -28,9 +28,10 @@ class TaskStatus:
     """One task as the server told it last.
 
     ``progress`` is 0 to 1, ``remaining`` in ``unit``, times in seconds; None is "not known".
-    ``position`` counts the tasks that run before it; only answers to a question have it. ``step``
-    of ``steps`` is the item of a plan that is being driven. ``version`` grows with each change,
-    ``halt_epoch`` with all that makes its rover stand.
+    ``position`` counts the tasks that run before it; only answers to a question have it. ``item``
+    of ``items`` is the item of a plan that is being driven, from 1 as in its file; of another task
+    it is the leg. ``version`` grows with each change, ``halt_epoch`` with all that makes its rover
+    stand.
     """
 
     id: int
@@ -49,8 +50,8 @@ class TaskStatus:
     time_to_start: float | None
     time_to_finish: float | None
     execution_time: float | None
-    step: int
-    steps: int
+    item: int
+    items: int
     submitter: str
     version: int
     halt_epoch: int = 0
@@ -171,8 +172,8 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         time_to_start=known(message.time_to_start),
         time_to_finish=known(message.time_to_finish),
         execution_time=known(message.execution_time),
-        step=message.step,
-        steps=message.step_count,
+        item=message.step + 1,
+        items=message.step_count,
         submitter=f"{message.submitter_system}/{message.submitter_component}",
         version=message.version,
         halt_epoch=message.halt_epoch,

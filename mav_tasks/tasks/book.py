@@ -19,6 +19,7 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     TaskWithdrawn,
 )
+from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
 from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, following
 from mav_tasks.tasks.timing import Timing
@@ -167,11 +168,14 @@ class TaskBook:
         old = self._tasks[task_id]
         task = replace(old, progress=progress, version=old.version + 1)
         self._tasks[task_id] = task
-        self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now))
+        item = _item_number(task, progress.step)
+        self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now, item))
 
     def reached(self, task_id: TaskId, step: int, *, performs: bool, now: float) -> None:
         """Tell of a step of a plan that is done; ``performs``: it is sent to the vehicle."""
-        self.record(StepReached(task_id, self._tasks[task_id].vehicle, step, performs, now))
+        task = self._tasks[task_id]
+        item = _item_number(task, step)
+        self.record(StepReached(task_id, task.vehicle, step, performs, now, item))
 
     def note_progress(self, task_id: TaskId, progress: Progress) -> None:
         """Keep live progress, for status only: no event, no new version."""
@@ -232,3 +236,10 @@ class TaskBook:
         del live[task.id]
         if not live:
             del self._live[key]
+
+
+def _item_number(task: Task, step: int) -> int:
+    """Return the number of an item in its file; 0: no item, as past the end or of no plan."""
+    if not isinstance(task.goal, Plan) or not 0 <= step < len(task.goal.steps):
+        return 0
+    return task.goal.item_number(step)

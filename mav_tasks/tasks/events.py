@@ -64,10 +64,11 @@ class TaskAdvanced:
     version: int
     progress: Progress
     at: float
+    item: int = 0  # its number in the plan's file, from 1
 
     def __str__(self) -> str:
-        step = f"item {self.progress.step}, " if self.progress.step >= 0 else ""
-        return f"task {self.task_id}: {step}leg {self.progress.leg + 1} begun"
+        item = f"item {self.item}, " if self.item > 0 else ""
+        return f"task {self.task_id}: {item}leg {self.progress.leg + 1} begun"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +97,11 @@ class StepReached:
     step: int
     performs: bool
     at: float
+    item: int = 0  # its number in the plan's file, from 1; 0: home
 
     def __str__(self) -> str:
-        return f"task {self.task_id}: item {self.step} {'sent' if self.performs else 'reached'}"
+        item = f"item {self.item}" if self.item > 0 else "home"
+        return f"task {self.task_id}: {item} {'sent' if self.performs else 'reached'}"
 
 
 @dataclass(frozen=True, slots=True)

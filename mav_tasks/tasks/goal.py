@@ -182,12 +182,32 @@ class Plan:
     """A mission: steps, one for each of its items, in their order.
 
     ``source`` is the items as they came, for who sends and shows them; nothing is read out of it
-    here. ``first`` is the step with which it begins.
+    here. ``first`` is the step with which it begins. ``has_home``: the first step is the home that
+    ArduPilot puts before the file's items; ``has_options``: the last one is about the plan itself.
     """
 
     steps: tuple[Step, ...]
     source: str = ""
     first: int = 0
+    has_home: bool = False
+    has_options: bool = False
+
+    @property
+    def item_count(self) -> int:
+        """The number of items that its file has, without a home and options."""
+        return len(self.steps) - self.has_home - self.has_options
+
+    def item_number(self, step: int) -> int:
+        """Return the number of a step's item in its file, from 1; 0 is home."""
+        return number_of(step, has_home=self.has_home)
+
+
+def number_of(step: int, *, has_home: bool) -> int:
+    """Return the number by which a file and its reader know the item of a step, from 1.
+
+    Home is 0 in the file, and an item of the upload only where the autopilot has it there.
+    """
+    return step if has_home else step + 1
 
 
 Goal = SingleGoal | Plan
@@ -256,12 +276,11 @@ def ends_at_home(goal: Goal) -> bool:
 
 
 def _describe_plan(plan: Plan) -> str:
-    has_home = plan.steps[:1] == (Nothing(),)  # somebody's mission, however short
-    if len(plan.steps) <= FEW_STEPS and not has_home:
+    if len(plan.steps) <= FEW_STEPS and not plan.has_home:  # a home: a mission, however short
         driven = [step for step in plan.steps if not isinstance(step, Nothing | SetSpeed)]
         if len(driven) == 1 and isinstance(driven[0], SingleGoal):
             return describe(driven[0])  # beside its speed, and options
-    count = len(plan.steps) - has_home
+    count = plan.item_count
     return f"plan of {count} item{'s' if count != 1 else ''}"
 
 

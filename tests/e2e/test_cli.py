@@ -327,12 +327,12 @@ def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
     assert waiting.stdout is not None
     assert (
         waiting.stdout.readline()
-        == f"task {first.id}: plan of 3 items: queued (queue paused); to go on: mav-tasks resume\n"
+        == f"task {first.id}: plan of 2 items: queued (queue paused); to go on: mav-tasks resume\n"
     )
     client.cancel(first.id)
     output, error = waiting.communicate(timeout=20)
     assert waiting.returncode == 1
-    assert output.startswith(f"task {first.id}: plan of 3 items: cancelled")
+    assert output.startswith(f"task {first.id}: plan of 2 items: cancelled")
     assert error.startswith(f"mav-tasks: task {first.id} cancelled")
 
 
@@ -408,7 +408,7 @@ def test_a_mission_is_a_task_with_terms(server: str, client: SyncClient, tmp_pat
     in_an_hour = datetime.now(UTC) + timedelta(hours=1)
     for start in (("--in", "1h"), ("--at", in_an_hour.isoformat())):
         (task,) = called(*upload, *start, server=server).objects
-        assert (task["state"], task["priority"], task["steps"]) == ("scheduled", 7, 3)
+        assert (task["state"], task["priority"], task["items"]) == ("scheduled", 7, 2)
         assert 3590 < task["time_to_start"] <= 3601
         assert client.status(task["id"]).state is TaskState.SCHEDULED
     moment = in_an_hour.astimezone().replace(tzinfo=None).isoformat(timespec="minutes")

@@ -82,7 +82,7 @@ async def test_a_script_submits_watches_and_awaits(running: Stand) -> None:
         assert seen[-1].state is S.COMPLETED
         assert (await turn.done()).state is S.COMPLETED
         done = await way.done()
-        assert (done.step, done.steps) == (3, 3)
+        assert (done.item, done.items) == (2, 2)
         assert (done.execution_time or 0.0) > 0.3
 
 

@@ -103,8 +103,8 @@ def test_a_circle_of_radius_0_is_none_as_mavsdk_has_it(world: World, command: in
 @pytest.mark.parametrize(
     ("items", "why"),
     [
-        ([Item(CIRCLE_IN, **at(0, 0), param1=-1.0, frame=0)], "item 0: param1 radius -1 m"),
-        ([*YARD[:3], *POND], "item 0: a polygon of 4 corners has others between them"),
+        ([Item(CIRCLE_IN, **at(0, 0), param1=-1.0, frame=0)], "item 1: param1 radius -1 m"),
+        ([*YARD[:3], *POND], "item 1: a polygon of 4 corners has others between them"),
     ],
 )
 def test_a_refused_upload_is_in_the_log_with_its_reason(

@@ -25,7 +25,7 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.commands.words import halts_again
-from mav_tasks.engine.missions.plans import Plans, begins_with
+from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -211,7 +211,8 @@ class Commands:
                     task = self._plans.go_on_with(asked.vehicle, seq, now=now)
                     asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
                     if task is None and seq is not None:
-                        asked.tell(begins_with(seq), MavSeverity.INFO, now=now)
+                        words = self._plans.begins_with(asked.vehicle, seq)
+                        asked.tell(words, MavSeverity.INFO, now=now)
                     return
                 case MavCmd.DO_PAUSE_CONTINUE:
                     asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)

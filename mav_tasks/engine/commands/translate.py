@@ -301,7 +301,9 @@ def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
     """Give the item of a plan that is being driven, of other tasks the leg; and of how many."""
     if isinstance(goal, Plan):
-        return max(progress.step, 0), len(goal.steps)
+        count = goal.item_count
+        step = goal.item_number(max(progress.step, goal.first)) - 1
+        return min(max(step, 0), max(count - 1, 0)), count
     return progress.leg, leg_count(goal)
 
 

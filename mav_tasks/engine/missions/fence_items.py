@@ -37,11 +37,11 @@ def check_fence_item(item: Item, seq: int, *, count: int) -> None:
     elif item.command in CORNERS:
         _place(item)
         if not (3 <= item.param1 <= count and item.param1 == int(item.param1)):
-            raise bad(f"item {seq}: param1 {item.param1:g} corners", param=1)
+            raise bad(f"item {seq + 1}: param1 {item.param1:g} corners", param=1)
     elif item.command in CIRCLES:
         _place(item)
         if not 0.0 <= item.param1 <= MAX_RADIUS:
-            raise bad(f"item {seq}: param1 radius {item.param1:g} m", param=1)
+            raise bad(f"item {seq + 1}: param1 radius {item.param1:g} m", param=1)
     else:
         raise _unsupported(item, seq, "a fence")
     _group(item, seq)
@@ -66,7 +66,7 @@ def fence_of(items: Sequence[Item]) -> Fence:
             if len(corners) < number or any(
                 (corner.command, corner.param1) != (item.command, item.param1) for corner in corners
             ):
-                words = f"item {seq}: a polygon of {number} corners has others between them"
+                words = f"item {seq + 1}: a polygon of {number} corners has others between them"
                 raise Rejection(R.BAD_PARAMETER, words)
             places = tuple(_place(corner) for corner in corners)
             zones.append(Polygon(places, CORNERS[MavCmd(item.command)], _group(item, seq)))
@@ -112,10 +112,10 @@ def _group(item: Item, seq: int) -> int:
     if group != group:  # NaN: not given
         return 0
     if not (0 <= group <= MAX_GROUP and group == int(group)):
-        raise bad(f"item {seq}: param2 group {group:g} not in 0..{MAX_GROUP}", param=2)
+        raise bad(f"item {seq + 1}: param2 group {group:g} not in 0..{MAX_GROUP}", param=2)
     return int(group)
 
 
 def _unsupported(item: Item, seq: int, what: str) -> Rejection:
-    words = f"item {seq}: command {item.command} is not supported in {what}"
+    words = f"item {seq + 1}: command {item.command} is not supported in {what}"
     return Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)

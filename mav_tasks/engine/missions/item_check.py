@@ -14,7 +14,7 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.services.mission_item import Item
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.goal import GoTo, Step
+from mav_tasks.tasks.goal import GoTo, Step, number_of
 from mav_tasks.tasks.lifecycle import TaskReason
 
 R = TaskReason
@@ -65,16 +65,20 @@ class ItemCheck:
         """Give the plan of a whole upload; Rejection says why it is none."""
         count = len(items)
         steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
-        wanted = plan_of(items, steps, now=now)
+        wanted = plan_of(items, steps, has_home=self._manner.has_home, now=now)
         forbidden = self._vehicle.where.leg_over_fence(steps)
         if forbidden is not None:
-            words = f"item {forbidden}: a jump there leads over the fence"
+            words = f"item {wanted.plan.item_number(forbidden)}: a jump there leads over the fence"
             raise Rejection(R.OUTSIDE_FENCE, words)
         return wanted
 
-    def _step(self, item: Item, seq: int, *, count: int) -> Step:
+    @property
+    def _manner(self) -> Manner:
         persona, driving = self._vehicle.persona, self._settings.driving
-        manner = Manner.of(persona, is_staged=self._is_at_autopilot, driving=driving)
+        return Manner.of(persona, is_staged=self._is_at_autopilot, driving=driving)
+
+    def _step(self, item: Item, seq: int, *, count: int) -> Step:
+        manner = self._manner
         if (count, manner) != self._read_by:  # in the middle of an upload all is read anew
             self._read_by = count, manner
             self._read.clear()
@@ -88,16 +92,17 @@ class ItemCheck:
 
     def _check_place(self, step: GoTo, seq: int) -> None:
         """Whether a place is within reach, and it and the way from the one before in the fence."""
+        name = f"item {number_of(seq, has_home=self._manner.has_home)}"
         far, longest = self._vehicle.where.distance_to(step), self._settings.driving.max_distance
         if far is not None and far > longest:
-            words = f"item {seq} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+            words = f"{name} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
             raise bad(words, param=5)
         if not self._vehicle.where.is_within_fence(step):
-            raise Rejection(R.OUTSIDE_FENCE, f"item {seq} is outside the fence")
+            raise Rejection(R.OUTSIDE_FENCE, f"{name} is outside the fence")
         steps: list[Step] = [step]
         for number in range(min(seq, len(self._read)) - 1, -1, -1):  # as far as the last place
             steps.insert(0, self._read[number][1])
             if isinstance(steps[0], GoTo):
                 break
         if self._vehicle.where.leg_over_fence(steps) is not None:
-            raise Rejection(R.OUTSIDE_FENCE, f"item {seq}: the way there leads over the fence")
+            raise Rejection(R.OUTSIDE_FENCE, f"{name}: the way there leads over the fence")

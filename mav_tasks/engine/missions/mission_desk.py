@@ -15,7 +15,7 @@ from mav_tasks.engine.missions.item_check import ItemCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.mission_clearing import MissionClearing
 from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadDesk
-from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored, begins_with
+from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored
 from mav_tasks.engine.missions.write_through import WriteThrough
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.timers import Timers, Turn
@@ -244,7 +244,7 @@ class MissionDesks:
         try:
             self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
             if self._plans.go_on_with(vehicle, seq, now=now) is None:
-                words = begins_with(seq)
+                words = self._plans.begins_with(vehicle, seq)
                 client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         except Rejection as refusal:
             message_id = m.MissionSetCurrent.id

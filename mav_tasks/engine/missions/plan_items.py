@@ -45,6 +45,7 @@ from mav_tasks.tasks.goal import (
     SingleGoal,
     Step,
     Wait,
+    number_of,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, Terms
@@ -108,19 +109,23 @@ def result_of(refusal: Rejection) -> MavMissionResult:
 
 
 def step_of(item: Item, seq: int, *, count: int, manner: Manner) -> Step:
-    """Give what an item asks for."""
+    """Return what an item asks for. Rejection names the item by its number in the file."""
     if manner.has_home and seq == 0:
         return Nothing()
-    step = _step_of(item, seq, count=count, driving=manner.driving)
+    name = number_of(seq, has_home=manner.has_home)
+    try:
+        step = _step_of(item, count=count, driving=manner.driving)
+    except Rejection as why:
+        raise Rejection(why.reason, f"item {name}: {why.text}", param=why.param) from None
     if isinstance(step, SingleGoal):
         return as_driven(step, manner.ability)
     return step
 
 
-def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
+def _step_of(item: Item, *, count: int, driving: Driving) -> Step:
     command = _command_of(item)
     if item.frame not in KNOWN_FRAMES:
-        raise Rejection(R.BAD_FRAME, f"item {seq}: frame {item.frame} is unknown")
+        raise Rejection(R.BAD_FRAME, f"frame {item.frame} is unknown")
     refuse_infinite(command)
     kind = _STEPS.get(item.command)
     if kind is not None:
@@ -131,7 +136,7 @@ def _step_of(item: Item, seq: int, *, count: int, driving: Driving) -> Step:
         return _own(command, driving)
     if item.command in GOALS and item.command != MavCmd.DO_REPOSITION:
         return goal_of(command, driving)
-    words = f"item {seq}: command {item.command} is not supported in a plan"
+    words = f"command {item.command} is not supported in a plan"
     raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
 
 
@@ -142,12 +147,16 @@ def steps_of(items: Sequence[Item], *, manner: Manner) -> tuple[Step, ...]:
     )
 
 
-def plan_of(items: Sequence[Item], steps: tuple[Step, ...], *, now: float) -> Wanted:
-    """Give the plan of items and of what they ask for; Rejection when they make none."""
-    plan = Plan(steps, packed(items))
+def plan_of(
+    items: Sequence[Item], steps: tuple[Step, ...], *, has_home: bool, now: float
+) -> Wanted:
+    """Return the plan of items and of what they ask for; Rejection when they make no plan."""
+    has_options = bool(items) and items[-1].command == MavCmd.TASK_OPTIONS
+    plan = Plan(steps, packed(items), has_home=has_home, has_options=has_options)
     loop = loops_in_vain(plan)
     if loop is not None:
-        raise Rejection(R.BAD_PARAMETER, f"item {loop}: a loop in which nothing is driven")
+        words = f"item {plan.item_number(loop)}: a loop in which nothing is driven"
+        raise Rejection(R.BAD_PARAMETER, words)
     return Wanted(plan, _terms_of(items, now=now), _nonce_of(items))
 
 

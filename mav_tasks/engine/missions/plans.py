@@ -20,7 +20,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
-from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.goal import Plan, number_of
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
@@ -236,7 +236,8 @@ class Plans:
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
     ) -> Draft:
         manner = Manner.of(vehicle.persona, is_staged=True, driving=self._settings.driving)
-        wanted = plan_of(stored.items, steps_of(stored.items, manner=manner), now=now)
+        steps = steps_of(stored.items, manner=manner)
+        wanted = plan_of(stored.items, steps, has_home=manner.has_home, now=now)
         plan = replace(wanted.plan, first=first)
         command, terms = MavCmd.MISSION_START, replace(wanted.terms, is_cruising=True)
         return Draft(vehicle.system_id, command, plan, submitter, terms=terms)
@@ -251,12 +252,25 @@ class Plans:
         if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
             count = len(task.goal.steps)
         if seq >= count:
-            raise Rejection(R.BAD_PARAMETER, f"item {seq}: there are {count}", param=1)
+            has_home = self._has_home(vehicle)
+            number, last = (number_of(n, has_home=has_home) for n in (seq, count - 1))
+            raise Rejection(R.BAD_PARAMETER, f"item {number}: the last one is {last}", param=1)
         if task is None or task.state in TERMINAL:
             self.begin_at(vehicle, seq)
             return None
         vehicle.tasks.skip_to(task, seq, now=now)
         return task
+
+    def begins_with(self, vehicle: Vehicle, seq: int) -> str:
+        """Return the text to a client that has chosen an item of a mission that does not run."""
+        number = number_of(seq, has_home=self._has_home(vehicle))
+        return f"Mission begins with item {number} when started"
+
+    def _has_home(self, vehicle: Vehicle) -> bool:
+        task = self.shown(vehicle)
+        if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
+            return task.goal.has_home
+        return vehicle.persona.has_home_item
 
     # showing
 
@@ -297,11 +311,6 @@ def plan_of_task(task: Task) -> Plan:
 def waits_for_start(task: Task) -> bool:
     """Whether a task is a mission that nobody has started."""
     return task.state in WAITING and task.terms.is_staged
-
-
-def begins_with(seq: int) -> str:
-    """Return what a client is told that has chosen an item of a mission that does not run."""
-    return f"Mission begins with item {seq} when started"
 
 
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:

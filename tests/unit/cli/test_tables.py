@@ -30,8 +30,8 @@ RUNNING = TaskStatus(
     time_to_start=0.0,
     time_to_finish=2.0,
     execution_time=1.5,
-    step=0,
-    steps=1,
+    item=1,
+    items=1,
     submitter="244/190",
     version=3,
 )

@@ -17,6 +17,11 @@ RATE = "driving.max_turn_rate"
         ("param1 distance -20 not in -10..10", f"METRES -20: at least -10 m ({DISTANCE})"),
         ("param1 distance 1e+30 not in -10..10", f"METRES 1e+30: at most 10 m ({DISTANCE})"),
         ("item 1: param2 rate 100 not in 0.5..90", f"--rate 100: at most 90 deg/s ({RATE})"),
+        (
+            "item 1 is 445.0 km away, more than 100 km",
+            "the place is 445.0 km away, more than 100 km",
+        ),
+        ("item 2: the way there leads over the fence", "the way there leads over the fence"),
         ("param7 priority 11 not in 0..10", "--priority 11: at most 10"),
         ("param3 phase 4 not in 0..1", None),
         ("the queue is full", None),

@@ -25,8 +25,8 @@ QUEUED = TaskStatus(
     time_to_start=None,
     time_to_finish=None,
     execution_time=None,
-    step=0,
-    steps=1,
+    item=1,
+    items=1,
     submitter="244/190",
     version=1,
 )

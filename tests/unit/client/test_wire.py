@@ -137,7 +137,9 @@ def test_the_options_of_a_plan_are_its_terms_and_make_it_unlike_any_other() -> N
     terms = WishedTerms(priority=8, after=3, delay=5.0, deadline=60.0)
     items = wire.items_of_goals([Wait(1.0)])
     plans = [(*items, wire.options_of(terms, nonce=nonce)) for nonce in (1, 2)]
-    wanted = [plan_of(plan, steps_of(plan, manner=MANNER), now=10.0) for plan in plans]
+    wanted = [
+        plan_of(plan, steps_of(plan, manner=MANNER), has_home=False, now=10.0) for plan in plans
+    ]
     for each in wanted:
         assert each.plan.steps == (Wait(1.0), Nothing())
         kept = each.terms

@@ -72,7 +72,7 @@ SAMPLES: list[tuple[Event, dict[str, object]]] = [
     (DRIVEN, {"timing": {**FIGURES, "period": 0.05}}),
     (TaskAdvanced(ID, 1, 4, PROGRESS, AT), {"task": 17, "version": 4}),
     (TaskProgressed(ID, 1, 4, PROGRESS, AT), {"task": 17, "version": 4}),
-    (StepReached(ID, 1, 2, True, AT), {"task": 17, "step": 2, "performs": True}),
+    (StepReached(ID, 1, 2, True, AT, 3), {"task": 17, "step": 2, "performs": True, "item": 3}),
     (PlanStored(1, 0, 5, "source", "a", AT), {"kind": 0, "plan_id": 5, "actor": "a"}),
     (TaskModified(ID, 1, 2, Terms(priority=9), "a", AT), {"task": 17, "actor": "a", "version": 2}),
     (TaskWaits(ID, 1, TaskReason.DISARMED, AT), {"task": 17, "reason": "disarmed"}),
@@ -174,7 +174,10 @@ def test_a_submission_says_what_it_is_about() -> None:
     way = GoTo(GlobalPlace(470_000_000, 80_000_000), speed=inf)
     goals: list[tuple[Goal, object]] = [
         (Drive(0.5, nan, 2.0), {"forward": 0.5, "yaw_rate": None, "duration": 2.0}),
-        (Plan((Wait(1.0), way), "source"), {"steps": 2, "first": 0}),
+        (
+            Plan((Wait(1.0), way), "source"),
+            {"steps": 2, "first": 0, "has_home": False, "has_options": False},
+        ),
     ]
     for goal, said in goals:
         value = strictly(json_entry(1, TaskSubmitted(task(goal), UTC)))["goal"]

@@ -28,9 +28,10 @@ PLACE = GoTo(LocalPlace(1.0, -2.0))
         (Plan((PLACE, Nothing())), "go to 1.00 m N, -2.00 m E"),
         (Plan((SetSpeed(0.4), PLACE, SetSpeed(None), Nothing())), "go to 1.00 m N, -2.00 m E"),
         (Plan((PLACE, Wait(1.0), Nothing())), "plan of 3 items"),
-        (Plan((Nothing(),) * 4 + (PLACE,)), "plan of 4 items"),
-        (Plan((Nothing(),)), "plan of 0 items"),
-        (Plan((Nothing(), PLACE)), "plan of 1 item"),
+        (Plan((PLACE, Wait(1.0), Nothing()), has_options=True), "plan of 2 items"),
+        (Plan((Nothing(),) * 4 + (PLACE,), has_home=True), "plan of 4 items"),
+        (Plan((Nothing(),), has_home=True), "plan of 0 items"),
+        (Plan((Nothing(), PLACE), has_home=True), "plan of 1 item"),
         (Plan((Wait(1.0), Jump(0, 3))), "plan of 2 items"),
     ],
 )
