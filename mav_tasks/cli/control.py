@@ -72,6 +72,9 @@ async def modify(
     preemptive: Annotated[
         bool | None, typer.Option("--preemptive/--no-preemptive", help="It may interrupt others.")
     ] = None,
+    label: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="A name for it: 24 letters; '': none.")
+    ] = None,
 ) -> None:
     """Change a task that is not over.
 
@@ -79,7 +82,7 @@ async def modify(
     """
     start = start_of(start_in, start_at)
     until = seconds_of("--deadline", deadline)
-    wishes = (priority, start.delay, start.at, until, after, preemptible, preemptive)
+    wishes = (priority, start.delay, start.at, until, after, preemptible, preemptive, label)
     if all(wish is None for wish in wishes):
         raise UsageError(f"modify {task_id}: say what is to be changed, --priority or another")
     from mav_tasks.cli.session import find_task, opened, values_checked  # noqa: PLC0415
@@ -96,6 +99,7 @@ async def modify(
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=start.at,
+                label=label,
             )
     output.say_done(common.json, "modify", f"task {task_id} is changed", task=task_id)
 

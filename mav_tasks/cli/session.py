@@ -21,13 +21,15 @@ class Read(NamedTuple):
     at: datetime | None
     deadline: float
     nonce: int
+    label: str
 
 
 def read(terms: Terms) -> Read:
     """Read the terms of a task; UsageError."""
     start = start_of(terms.start_in, terms.start_at)
     deadline = seconds_of("--deadline", terms.deadline) or 0.0
-    return Read(terms.priority, terms.after, start.delay or 0.0, start.at, deadline, terms.nonce)
+    delay = start.delay or 0.0
+    return Read(terms.priority, terms.after, delay, start.at, deadline, terms.nonce, terms.label)
 
 
 @asynccontextmanager

@@ -60,6 +60,7 @@ def _fields(
     return [
         ("task", str(status.id)),
         ("rover", f"{status.vehicle} ({silence})" if silence else str(status.vehicle)),
+        ("label", status.label),
         ("what", words.what_of(status)),
         ("state", words.state_of(status)),
         ("why", words.why_of(status)),

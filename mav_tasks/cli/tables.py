@@ -49,6 +49,7 @@ TASK_COLUMNS: tuple[Column[TaskStatus], ...] = (
     Column("id", lambda s: str(s.id), is_right=True),
     Column("prio", lambda s: str(s.priority), worth=3, is_right=True),
     Column("state", words.state_of),
+    Column("label", lambda s: s.label, worth=1, is_words=True),
     Column("what", words.what_of, is_words=True),
     Column("why", words.why_of, worth=1, is_words=True),
     Column("done", words.percent_of, worth=2, is_right=True),

@@ -35,7 +35,7 @@ def state_of(status: TaskStatus) -> str:
 
 def what_of(status: TaskStatus) -> str:
     """Give what it is about: "move 2 m"."""
-    what, colon, _ = status.words.partition(": ")
+    what, colon, _ = status.words.partition(" '" if status.label else ": ")
     return what if colon else f"command {status.command}"
 
 
@@ -62,7 +62,9 @@ def line_of(status: TaskStatus) -> str:
     took = status.execution_time if status.is_over else None
     took_words = f", in {format_duration(took)}" if took else ""
     way_on = f"; {way_on_of(status)}" if way_on_of(status) and not status.is_over else ""
-    return f"task {status.id}: {what_of(status)}: {state_of(status)}{why}{took_words}{way_on}"
+    label = f" '{status.label}'" if status.label else ""
+    what = f"{what_of(status)}{label}"
+    return f"task {status.id}: {what}: {state_of(status)}{why}{took_words}{way_on}"
 
 
 def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
@@ -141,6 +143,7 @@ def task_json(status: TaskStatus) -> dict[str, Any]:
         "id": status.id,
         "vehicle": status.vehicle,
         "what": what_of(status),
+        "label": status.label or None,
         "command": status.command,
         "state": state_of(status),
         "reason": status.reason.name.lower() if status.reason else None,

@@ -40,6 +40,7 @@ from mav_tasks.mavlink.enums import (
     TaskProperty,
 )
 from mav_tasks.mavlink.float_param import to_param
+from mav_tasks.mavlink.label import check_label, pieces_of
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import (
     PlanFile,
@@ -183,6 +184,7 @@ class Client:
         at: datetime | None = None,
         vehicle: int | None = None,
         nonce: int = 0,
+        label: str = "",
     ) -> Task:
         """Have a goal driven, or several in their order as one task; returns once it is durable.
 
@@ -190,8 +192,10 @@ class Client:
         ``delay`` in seconds is waited before it runs, ``deadline`` in seconds is when it must have
         begun (0: neither); ``at`` is a start at a time of day, with its time zone. It is sent until
         it is answered, and is one task however often it arrives: ``nonce`` (1 to 1,065,353,215, 0:
-        one by chance) is its mark, for a second try after NoAnswer.
+        one by chance) is its mark, for a second try after NoAnswer. ``label`` is a name of up to 24
+        bytes, shown wherever the task is.
         """
+        check_label(label)
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = self._submissions.delay(delay, at, mark)
@@ -201,11 +205,11 @@ class Client:
             raise ValueError("no goals: nothing to do")
         if len(goals) == 1 and isinstance(goals[0], Move | Rotate | Drive):
             task = await self._submit_command(goals[0], terms, system_id, mark)
-            await self._complete(task, deadline=deadline, at=at, nonce=mark)
+            await self._complete(task, deadline=deadline, at=at, label=label, nonce=mark)
         else:
             items = (*wire.items_of_goals(goals), wire.options_of(terms, nonce=mark))
             task = await self._submit_plan(items, system_id, mark)
-            await self._complete(task, deadline=0.0, at=at, nonce=mark)
+            await self._complete(task, deadline=0.0, at=at, label=label, nonce=mark)
         return task
 
     async def task(self, task_id: int, *, vehicle: int | None = None) -> Task:
@@ -250,6 +254,7 @@ class Client:
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
+        label: str | None = None,
         vehicle: int | None = None,
     ) -> None:
         """Change a task that is not over; what is None stays as it is.
@@ -271,6 +276,10 @@ class Client:
             await self._control(vehicle, MavCmd.TASK_MODIFY, to_param(task_id), float(name), value)
         if at is not None:
             await self._start_at(task_id, at, self._which(vehicle))
+        for piece in pieces_of(label) if label is not None else ():
+            await self._modify_exactly(
+                task_id, TaskProperty.LABEL, piece.x, piece.y, float(piece.offset), vehicle=vehicle
+            )
 
     async def release(
         self,
@@ -375,18 +384,20 @@ class Client:
         at: datetime | None = None,
         vehicle: int | None = None,
         nonce: int = 0,
+        label: str = "",
     ) -> Task:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
         PlanFileError says what is wrong with a file. Terms as those of ``submit``.
         """
+        check_label(label)
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = self._submissions.delay(delay, at, mark)
         terms = WishedTerms(priority, _id_of(after), wait, deadline)
         items = (*items_of(plan), wire.options_of(terms, nonce=mark))
         task = await self._submit_plan(items, system_id, mark)
-        await self._complete(task, deadline=0.0, at=at, nonce=mark)
+        await self._complete(task, deadline=0.0, at=at, label=label, nonce=mark)
         return task
 
     async def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> Task:
@@ -543,20 +554,23 @@ class Client:
 
     async def _start_at(self, task_id: int, at: datetime, vehicle: int) -> None:
         moment = round(utc_of(at))
+        await self._modify_exactly(task_id, TaskProperty.START_UTC, moment, 0, nan, vehicle=vehicle)
+
+    async def _modify_exactly(
+        self,
+        task_id: int,
+        name: TaskProperty,
+        x: int,
+        y: int,
+        value: float,
+        *,
+        vehicle: int | None,
+    ) -> None:
+        """Change a property whose value a float cannot hold."""
+        system_id, mark = self._which(vehicle), to_param(self._submissions.nonce())
+        first = to_param(task_id), float(name), value, nan
         command = m.CommandInt(
-            vehicle,
-            AUTOPILOT,
-            0,
-            MavCmd.TASK_MODIFY,
-            0,
-            0,
-            to_param(task_id),
-            float(TaskProperty.START_UTC),
-            nan,
-            nan,
-            moment,
-            0,
-            nan,
+            system_id, AUTOPILOT, 0, MavCmd.TASK_MODIFY, 0, 0, *first, x, y, mark
         )
         await self._ask.ask(command, "TASK_MODIFY")
 
@@ -603,8 +617,15 @@ class Client:
             if refused.reason != TaskReason.WRONG_STATE:
                 raise  # else it is over already, and so has begun in time
 
+    async def _set_label(self, task: Task, label: str) -> None:
+        try:
+            await task.modify(label=label)
+        except Refused as refused:
+            if refused.reason != TaskReason.WRONG_STATE:
+                raise  # else it is over already
+
     async def _complete(
-        self, task: Task, *, deadline: float, at: datetime | None, nonce: int
+        self, task: Task, *, deadline: float, at: datetime | None, label: str, nonce: int
     ) -> None:
         """Give a task that is there what its submission could not carry."""
         try:
@@ -612,6 +633,8 @@ class Client:
                 await self._set_deadline(task, deadline)
             if at is not None:
                 await task.modify(at=at)
+            if label:
+                await self._set_label(task, label)
         except NoAnswer as error:  # the task is there: submitted again it must not be another one
             raise NoAnswer(str(error), nonce=nonce) from None
 

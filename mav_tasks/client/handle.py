@@ -110,6 +110,7 @@ class Task:
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
+        label: str | None = None,
     ) -> None:
         """Change what is given: see ``Client.modify``."""
         await self._client.modify(
@@ -122,6 +123,7 @@ class Task:
             preemptible=preemptible,
             preemptive=preemptive,
             at=at,
+            label=label,
         )
 
     async def release(self, how: Release) -> None:

@@ -161,6 +161,7 @@ class SyncTask:
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
+        label: str | None = None,
     ) -> None:
         """Change what is given: see ``Client.modify``."""
         self._portal.call(
@@ -172,6 +173,7 @@ class SyncTask:
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,
+                label=label,
             )
         )
 
@@ -268,6 +270,7 @@ class SyncClient:
         at: datetime | None = None,
         vehicle: int | None = None,
         nonce: int = 0,
+        label: str = "",
     ) -> SyncTask:
         """Have a goal driven, or several as one task: see ``Client.submit``."""
         return self._task(
@@ -280,6 +283,7 @@ class SyncClient:
                 at=at,
                 vehicle=vehicle,
                 nonce=nonce,
+                label=label,
             )
         )
 
@@ -318,6 +322,7 @@ class SyncClient:
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
+        label: str | None = None,
         vehicle: int | None = None,
     ) -> None:
         """Change a task that is not over: see ``Client.modify``."""
@@ -331,6 +336,7 @@ class SyncClient:
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,
+                label=label,
                 vehicle=vehicle,
             )
         )
@@ -388,6 +394,7 @@ class SyncClient:
         at: datetime | None = None,
         vehicle: int | None = None,
         nonce: int = 0,
+        label: str = "",
     ) -> SyncTask:
         """Queue a mission as one task: see ``Client.submit_mission``."""
         return self._task(
@@ -400,6 +407,7 @@ class SyncClient:
                 at=at,
                 vehicle=vehicle,
                 nonce=nonce,
+                label=label,
             )
         )
 

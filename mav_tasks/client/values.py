@@ -31,7 +31,7 @@ class TaskStatus:
     ``position`` counts the tasks that run before it; only answers to a question have it. ``item``
     of ``items`` is the item of a plan that is being driven, from 1 as in its file; of another task
     it is the leg. ``version`` grows with each change, ``halt_epoch`` with all that makes its rover
-    stand.
+    stand. ``label`` is the name that its submitter gave it, "" for none.
     """
 
     id: int
@@ -55,6 +55,7 @@ class TaskStatus:
     submitter: str
     version: int
     halt_epoch: int = 0
+    label: str = ""
 
     @property
     def is_over(self) -> bool:
@@ -160,7 +161,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         vehicle=vehicle,
         state=state_of(message.state),
         reason=reason,
-        words=_text(message.text) or words_of(reason),
+        words=_text(message._text_raw) or words_of(reason),
         priority=message.priority,
         after=message.after_task_id,
         nonce=message.nonce,
@@ -177,6 +178,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         submitter=f"{message.submitter_system}/{message.submitter_component}",
         version=message.version,
         halt_epoch=message.halt_epoch,
+        label=_text(message._label_raw),
     )
 
 
@@ -246,6 +248,5 @@ def known(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _text(text: str | bytes) -> str:
-    raw = text if isinstance(text, bytes) else text.encode("utf-8", "replace")
+def _text(raw: bytes) -> str:
     return raw.split(b"\0")[0].decode("utf-8", "replace")

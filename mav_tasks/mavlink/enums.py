@@ -229,3 +229,4 @@ class TaskProperty(IntEnum):
     PREEMPTIBLE = 5
     PREEMPTIVE = 6
     START_UTC = 7
+    LABEL = 8

@@ -141,7 +141,8 @@ class Terms:
     ``start_utc`` is in seconds since 1970. ``after`` is the id of the task that must complete
     first, 0 for none. ``is_staged``: waits until somebody starts it. ``top_speed`` in m/s: it is
     driven no faster, whatever speed is set; None: as fast as the settings allow. ``is_cruising``:
-    where it names no speed it is driven as fast as the vehicle itself would.
+    where it names no speed it is driven as fast as the vehicle itself would. ``label`` is a name
+    that its submitter gave it, "" for none; it changes nothing.
     """
 
     priority: int = DEFAULT_PRIORITY
@@ -154,6 +155,7 @@ class Terms:
     is_staged: bool = False
     top_speed: float | None = None
     is_cruising: bool = False
+    label: str = ""
 
 
 @dataclass(frozen=True, slots=True)

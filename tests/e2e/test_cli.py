@@ -160,6 +160,9 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert (waiting["left"], waiting["left_unit"], waiting["vehicle"]) == (2.0, "m", 1)
     assert 3500 < waiting["time_to_start"] <= 3600
 
+    named = called("modify", str(waiting["id"]), "--label", "dock 3", server=server)
+    assert named.lines == [f"task {waiting['id']} is changed"]
+
     changed = called("modify", str(waiting["id"]), "--priority", "9", server=server)
     assert changed.lines == [f"task {waiting['id']} is changed"]
 
@@ -172,11 +175,13 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert table.lines[0].startswith(f"rover 1: task {first} ")
     assert "\x1b" not in table.output
     assert all(line == line.rstrip() for line in table.lines)
-    assert table.lines[2].split()[:4] == ["id", "prio", "state", "what"]
+    assert table.lines[2].split()[:5] == ["id", "prio", "state", "label", "what"]
+    assert "dock 3" in table.lines[4]
     assert [line.split()[0] for line in table.lines[3:]] == [str(first), str(waiting["id"])]
 
     shown = called("status", str(waiting["id"]), server=server)
     assert "what        move -2 m" in shown.lines
+    assert "label       dock 3" in shown.lines
     assert "why         start time" in shown.lines
 
     assert called("cancel", "--json", server=server).objects == [{"done": "cancel", "task": first}]

@@ -64,6 +64,7 @@ class TaskStatus(NamedTuple):
     submitter_link: int
     text: str
     halt_epoch: int
+    label: str
 
     @property
     def why(self) -> tuple[int, int]:
@@ -72,8 +73,9 @@ class TaskStatus(NamedTuple):
 
     @classmethod
     def of(cls, payload: bytes) -> "TaskStatus":
-        values = list(struct.unpack("<5I4f4H10B50sI", payload.ljust(108, b"\0")))
-        values[-2] = values[-2].rstrip(b"\0").decode()
+        values = list(struct.unpack("<5I4f4H10B50sI24s", payload.ljust(132, b"\0")))
+        for place in (-3, -1):
+            values[place] = values[place].rstrip(b"\0").decode()
         return cls._make(values)
 
 

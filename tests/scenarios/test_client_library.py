@@ -606,3 +606,34 @@ def test_who_submits_faster_than_he_may_only_waits(make_world: MakeWorld) -> Non
             assert [task.id for task in tasks] == list(range(1, 17))
 
     world.run(script())
+
+
+def test_a_label_is_shown_and_survives_a_crash(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            task = await client.submit(Wait(60.0), label="Hof Süd, gate 3")
+            status = await task.refresh()
+            assert status.label == "Hof Süd, gate 3"
+            assert status.words.startswith("wait 60 s 'Hof Süd, gate 3': ")
+            world.server.kill()
+            world.server.start()
+            await client.found()
+            assert (await task.refresh()).label == "Hof Süd, gate 3"
+            await task.modify(label="gate 4")
+            assert (await task.refresh()).label == "gate 4"
+            await task.modify(label="")
+            assert (await task.refresh()).label == ""
+
+    world.run(script())
+
+
+def test_a_label_that_is_too_long_submits_no_task(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            with pytest.raises(ValueError, match="at most 24 bytes"):
+                await client.submit(Wait(1.0), label="x" * 25)
+            with pytest.raises(ValueError, match="at most 24 bytes"):
+                await client.submit_mission([Wait(1.0)], label="x" * 25)
+            assert (await client.queue()).waiting_count == 0
+
+    world.run(script())

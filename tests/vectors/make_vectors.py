@@ -60,6 +60,7 @@ TASK_QUEUE_STATUS: list[Field] = [
     ("uint8_t", "paused_reason", 0),
     ("uint8_t", "flags", 0),
 ]
+STATUS_EXTENSION: list[Field] = [*HALT_EPOCH, ("char", "label", 24)]
 QUEUE_EXTENSION: list[Field] = [*HALT_EPOCH, ("uint32_t", "heartbeat_age", 0)]
 TASK_TIMING: list[Field] = [
     *[("uint32_t", name, 0) for name in ("time_boot_ms", "task_id", "count", "late")],
@@ -242,8 +243,10 @@ def _by_hand() -> list[dict[str, Any]]:
         "submitter_link": 0,
         "text": "move 2 m: executing",
         "halt_epoch": 0,
+        "label": "",
     }
     full = status | {"text": "x" * 50, "state": 9, "progress": 100, "halt_epoch": 1 << 24}
+    full |= {"label": "y" * 24}
     queue = {
         "time_boot_ms": 1000,
         "version": 7,
@@ -286,8 +289,8 @@ def _by_hand() -> list[dict[str, Any]]:
     extended = MISSION_ACK_EXTENSIONS
     text = "a text without room for a zero"
     return [
-        _hand_made("a task under way", "TASK_STATUS", 54000, TASK_STATUS, HALT_EPOCH, status),
-        _hand_made(text, "TASK_STATUS", 54000, TASK_STATUS, HALT_EPOCH, full),
+        _hand_made("a task under way", "TASK_STATUS", 54000, TASK_STATUS, STATUS_EXTENSION, status),
+        _hand_made(text, "TASK_STATUS", 54000, TASK_STATUS, STATUS_EXTENSION, full),
         *(
             _hand_made(name, "TASK_QUEUE_STATUS", 54001, TASK_QUEUE_STATUS, QUEUE_EXTENSION, fields)
             for name, fields in (

@@ -12,6 +12,7 @@ from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
+from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Settings
@@ -184,11 +185,26 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
             return replace(terms, is_preemptible=flag(command, 3, "pre-emptible", default=None))
         case P.PREEMPTIVE:
             return replace(terms, is_preemptive=flag(command, 3, "pre-emptive", default=None))
+        case P.LABEL:
+            return replace(terms, label=_label(terms.label, command))
         case _:
             return replace(terms, start_at=None, start_utc=_utc(command))
 
 
 _OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
+
+
+def _label(label: str, command: Command) -> str:
+    """Return a label with the piece put in that a command carries."""
+    if command.frame is None:
+        words = "LABEL: a float is too coarse, send it as COMMAND_INT"
+        raise Rejection(R.BAD_PARAMETER, words)
+    offset = whole(command, 3, "byte", high=MAX_LABEL, default=None)
+    x, y = int(command.params[4]), int(command.params[5])
+    try:
+        return with_piece(label, Piece(offset, x, y))
+    except ValueError as error:
+        raise Rejection(R.BAD_PARAMETER, str(error), param=5) from None
 
 
 def _utc(command: Command) -> int:

@@ -95,6 +95,7 @@ FLOAT32_MAX = 3.4e38
 UNKNOWN_POSITION = 65535
 LAST_POSITION = 65534  # or behind it: a queue may be longer than the field can say
 UNKNOWN_PROGRESS = 255
+TEXT = 50  # bytes of TASK_STATUS.text
 
 
 def result_of(reason: int) -> MavResult:
@@ -147,8 +148,9 @@ def task_status(
         submitter_system=submitter.system_id,
         submitter_component=submitter.component_id,
         submitter_link=link_number,
-        text=_words(task, reason, tasks.turns.words_of_blocker(task.id)).encode()[:50],
+        text=_cut(_words(task, reason, tasks.turns.words_of_blocker(task.id)), TEXT),
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
+        label=task.terms.label.encode(),
     )
 
 
@@ -309,7 +311,13 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
 
 def _words(task: Task, reason: TaskReason, says: str) -> str:
     """Give a task, its state and the reason in words; ``says``: the vehicle's own about that."""
-    words = f"{describe(task.goal)}: {STATES[task.state]}"
+    label = f" '{task.terms.label}'" if task.terms.label else ""
+    words = f"{describe(task.goal)}{label}: {STATES[task.state]}"
     if not reason:
         return words
     return f"{words} ({words_of(reason)}: {says})" if says else f"{words} ({words_of(reason)})"
+
+
+def _cut(text: str, size: int) -> bytes:
+    """Return a text in UTF-8, as many whole characters as fit."""
+    return text.encode()[:size].decode(errors="ignore").encode()
