@@ -1,4 +1,4 @@
-"""Draws who lets a rover's queue stand and go on in README.md, from the table of joint control.
+"""Draw what pauses a rover's queue, from the table of joint control, into mav_tasks/README.md.
 
 `--check` tells if it is old.
 """
@@ -79,4 +79,5 @@ def diagram() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(keep_current("README.md", "control diagram", "control_diagram.py", diagram()))
+    document = "mav_tasks/README.md"
+    sys.exit(keep_current(document, "control diagram", "control_diagram.py", diagram()))

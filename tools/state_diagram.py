@@ -1,4 +1,4 @@
-"""Draws the state diagram in README.md from the lifecycle table; `--check` tells if it is old."""
+"""Draw the lifecycle table into mav_tasks/README.md; `--check` tells if the drawing is old."""
 
 import sys
 
@@ -29,4 +29,4 @@ def _name(state: TaskState) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(keep_current("README.md", "state diagram", "state_diagram.py", diagram()))
+    sys.exit(keep_current("mav_tasks/README.md", "state diagram", "state_diagram.py", diagram()))

@@ -1,4 +1,4 @@
-"""What the exit status of a command says, and what is said along with it; the README has the table.
+"""What the exit status of a command says, and what is said along with it; GUIDE.md has the table.
 
 The one place where an error becomes words for the operator: one line on standard error.
 """

@@ -1,8 +1,8 @@
 """The states of a task and every move between them, as one table.
 
 A move that is not in TRANSITIONS is our own mistake and raises. States in TERMINAL are over for
-good. ``tools/state_diagram.py`` draws the README's picture from this table. Numbers are those of
-the dialect's TASK_STATE and TASK_REASON.
+good. ``tools/state_diagram.py`` draws this table into ``mav_tasks/README.md``. The numbers are
+those of the dialect's TASK_STATE and TASK_REASON.
 """
 
 from enum import IntEnum

@@ -1,4 +1,4 @@
-"""A stranger's test file, as the README shows it."""
+"""A stranger's test file, as sim/README.md shows it."""
 
 EXAMPLE = """\
 import pytest

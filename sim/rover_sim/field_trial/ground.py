@@ -10,7 +10,7 @@ from rover_sim.field_trial.track import Track
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What must hold; the table of the README."""
+    """What must hold; GUIDE.md shows what was measured."""
 
     end: float = 0.05  # m, p95
     turn: float = 1.0  # deg, p95

@@ -1,4 +1,4 @@
-"""README.md does not promise what is not there: its examples run, its commands are run by tests."""
+"""The documents promise only what is there: each example runs, each command is run by a test."""
 
 import os
 import re
@@ -16,23 +16,36 @@ from tests.kit.plugin_example import EXAMPLE
 from tests.kit.processes import free_tcp_ports, free_udp_ports, process, stand
 
 ROOT = Path(__file__).resolve().parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-CONTRACT = (ROOT / "dialects" / "README.md").read_text(encoding="utf-8")
+DOCUMENTS = {
+    name: (ROOT / name).read_text(encoding="utf-8")
+    for name in (
+        "README.md",
+        "mav_tasks/README.md",
+        "mav_tasks/GUIDE.md",
+        "mav_tasks/CHANGELOG.md",
+        "sim/README.md",
+        "tests/README.md",
+        "dialects/README.md",
+    )
+}
+README, GUIDE, SIM = (DOCUMENTS[n] for n in ("README.md", "mav_tasks/GUIDE.md", "sim/README.md"))
+CONTRACT = DOCUMENTS["dialects/README.md"]
+ALL = "\n".join(DOCUMENTS.values())
+MOST_WORDS = 1300  # of the README
 
-#: each command of the README, and what runs it
+#: each command that is not run here, and what runs it
 COMMANDS = {
     "./tools/demo": "tests/e2e/test_demo.py",
-    "./tools/test": ".ci/run",
-    "mav-tasks sim": "tests/e2e/test_by_hand.py",
-    "mav-tasks serve": "tests/e2e/test_by_hand.py",
     "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }
 
-#: the part of the README that is run from its first command to its last, by one stranger
-TOUR = README[README.index("## Ten minutes") : README.index("## From a script")]
+BROKEN_AT = "### When something breaks"
+#: the parts of the README that are run from the first command to the last, as a stranger would
+TOUR = README[README.index("## Ten minutes") : README.index(BROKEN_AT)]
+BROKEN = README[README.index(BROKEN_AT) : README.index("## From a script")]
 #: the parts that are run after a server has written records into the folder that they name
-FILES = README[README.index("### Configuration") : README.index("### Is this rover one for it?")]
-KEYS = README[README.index("### Keys and roles") : README.index("### Log, journal, recordings")]
+FILES = GUIDE[GUIDE.index("## Configuration\n") : GUIDE.index("## What the server does while")]
+KEYS = GUIDE[GUIDE.index("## Keys and roles\n") : GUIDE.index("## Log, journal, recordings\n")]
 
 
 #: what MAVProxy says after each of the lines shown
@@ -50,7 +63,7 @@ WAY = """QGC WPL 110
 """
 
 
-def blocks(language: str, text: str = README) -> list[str]:
+def blocks(language: str, text: str = ALL) -> list[str]:
     """Give the fenced blocks of one language."""
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
@@ -69,7 +82,7 @@ def is_test(block: str) -> bool:
 EXAMPLES = [
     *(
         pytest.param(block, "task 1", id=block.split("\n")[0])
-        for block in blocks("python")
+        for block in blocks("python", README + GUIDE)
         if not is_test(block)
     ),
     pytest.param("".join(blocks("python", CONTRACT)), "completed", id="dialects/README.md"),
@@ -77,8 +90,8 @@ EXAMPLES = [
 
 
 def test_every_command_is_run_somewhere() -> None:
-    run_here = {*commands(TOUR), *commands(FILES)}
-    assert set(commands(README)) - run_here == set(COMMANDS) - run_here
+    run_here = {*commands(TOUR), *commands(BROKEN), *commands(FILES)}
+    assert set(commands(ALL)) - run_here == set(COMMANDS)
     for command, where in COMMANDS.items():
         assert command.removeprefix("mav-tasks ").strip("./") in (ROOT / where).read_text()
 
@@ -86,18 +99,19 @@ def test_every_command_is_run_somewhere() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(150)
 def test_the_tour_goes_as_it_is_told(tmp_path: Path) -> None:
-    (way,) = blocks("waypoints")
+    (way,) = blocks("waypoints", TOUR)
+    first, second, *tour = commands(TOUR)
+    assert first.startswith("mav-tasks sim --home ")
+    assert second == "mav-tasks serve"
     (tmp_path / "way.waypoints").write_text(way, encoding="ascii")
     store = tmp_path / "tour.sqlite3"
-    with stand(tmp_path, serve_store=str(store)) as it:
+    with stand(tmp_path, serve_store=str(store), rover_options=rover_options(first)) as it:
         run = partial(
             mav_tasks,
             server=f"udpout:127.0.0.1:{it.client_port}",
             folder=tmp_path,
             MAV_TASKS_STORE=str(store),
         )
-        first, second, *tour = commands(TOUR)
-        assert (first, second) == ("mav-tasks sim", "mav-tasks serve")
         for command in tour:
             done = run(*shlex.split(command)[1:])
             assert (done.status, done.error) == (0, ""), command
@@ -107,6 +121,35 @@ def test_the_tour_goes_as_it_is_told(tmp_path: Path) -> None:
         for number in (1, 2, 3, 4):
             (task,) = run("status", str(number), "--json").objects
             assert (number, task["state"]) == (number, "completed")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(150)
+def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
+    broken, *told = commands(BROKEN)
+    with stand(tmp_path) as it:
+        it.rover.end()
+        port = str(it.rover_port)
+        rover = ("-m", "rover_sim", "--port", port, "--body", "kinematic", *rover_options(broken))
+        with process(*rover, folder=tmp_path, name="broken rover"):
+            ended = [
+                mav_tasks(*shlex.split(command)[1:], server=f"udpout:127.0.0.1:{it.client_port}")
+                for command in told
+            ]
+    assert [done.status for done in ended] == [1, 0, 0]
+    moved, queue, resumed = ended
+    assert "failed (stuck)" in moved.output
+    assert "paused: stuck, to go on: mav-tasks resume" in queue.output
+    assert resumed.output == "rover 1: goes on\n"
+
+
+def rover_options(command: str) -> tuple[str, ...]:
+    """Return the options with which a document starts the simulated rover."""
+    return tuple(shlex.split(command)[2:])
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.split()) <= MOST_WORDS
 
 
 @pytest.mark.slow
@@ -135,12 +178,12 @@ def test_configuration_and_records_are_as_it_is_told(tmp_path: Path) -> None:
 
 
 def test_the_test_of_a_stranger_is_the_one_that_is_run() -> None:
-    (shown,) = [block for block in blocks("python") if is_test(block)]
+    (shown,) = [block for block in blocks("python", SIM) if is_test(block)]
     assert shown == EXAMPLE
 
 
 #: as they are, but for the ports of others
-SERVING = sorted(set(re.findall(r"`(mav-tasks serve --[^`]*)`", README)))
+SERVING = sorted(set(re.findall(r"`(mav-tasks serve --[^`]*)`", ALL)))
 
 
 @pytest.mark.parametrize("command", SERVING)
@@ -178,9 +221,9 @@ def test_example_runs(example: str, printed: str, tmp_path: Path) -> None:
 
 def test_mavproxy_lines_do_what_they_say(tmp_path: Path) -> None:
     (tmp_path / "way.txt").write_text(WAY, encoding="ascii")
-    command = re.search(r"`mavproxy\.py --master udpout:127\.0\.0\.1:14560 (.*?)`", README)
+    command = re.search(r"`mavproxy\.py --master udpout:127\.0\.0\.1:14560 (.*?)`", GUIDE)
     assert command is not None
-    (lines,) = blocks("mavproxy")
+    (lines,) = blocks("mavproxy", GUIDE)
     with (
         stand(tmp_path) as it,
         mavproxy(it.client_port, tmp_path, *command[1].split()) as session,
@@ -193,9 +236,20 @@ def test_mavproxy_lines_do_what_they_say(tmp_path: Path) -> None:
         assert session.complaints() == []
 
 
-def test_every_path_named_exists() -> None:
-    named = re.findall(r"`(?:\./)?((?:tools|tests|dialects|sim)/[\w./]*)`", README)
-    named += re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
-    assert named
-    for path in named:
+def anchors(text: str) -> set[str]:
+    """Return the anchors of the headings of a document, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", text, flags=re.MULTILINE)
+    plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings)
+    return {heading.replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_every_path_and_link_leads_somewhere(name: str) -> None:
+    text, folder = DOCUMENTS[name], (ROOT / name).parent
+    for path in re.findall(r"`(?:\./)?((?:tools|tests|dialects|sim)/[\w./]*)`", text):
         assert (ROOT / path).exists(), path
+    for path, anchor in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", text):
+        target = folder / path if path else ROOT / name
+        assert target.exists(), path
+        if anchor:
+            assert anchor in anchors(target.read_text(encoding="utf-8")), f"{path}#{anchor}"
