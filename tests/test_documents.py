@@ -253,3 +253,20 @@ def test_every_path_and_link_leads_somewhere(name: str) -> None:
         assert target.exists(), path
         if anchor:
             assert anchor in anchors(target.read_text(encoding="utf-8")), f"{path}#{anchor}"
+
+
+INSIDE = DOCUMENTS["mav_tasks/README.md"]
+SOURCES = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "mav_tasks").rglob("*.py"))
+
+
+def test_the_code_that_developers_are_led_to_is_there() -> None:
+    modules = re.findall(r"`((?:\w+/)*\w+\.py)`", INSIDE)
+    assert len(modules) > 20
+    for module in modules:
+        places = (ROOT / "mav_tasks" / module, ROOT / module)
+        assert any(place.exists() for place in places), module
+    methods = re.findall(r"`([A-Z]\w+)\.(\w+)`", INSIDE)
+    assert len(methods) > 8
+    for kind, method in methods:
+        bodies = re.findall(rf"^class {kind}\b.*?(?=^\S)", SOURCES, flags=re.MULTILINE | re.DOTALL)
+        assert any(f"def {method}(" in body for body in bodies), f"{kind}.{method}"
