@@ -21,7 +21,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 VENV_PYTHON = VENV / "bin" / "python"
-LOCK = ROOT / "tools" / "lock" / "requirements.txt"
+LOCKS = ROOT / "tools" / "lock"
+#: What can be installed, and its lock. DEVELOPMENT has all that DEMO has, at the same versions.
+DEMO, DEVELOPMENT = "demo", "development"
+LOCK_OF = {DEMO: LOCKS / "demo.txt", DEVELOPMENT: LOCKS / "requirements.txt"}
 LOCK_WITHOUT_DEPENDENCIES = ROOT / "tools" / "lock" / "without_dependencies.txt"
 DIALECT = ROOT / "mav_tasks" / "mavlink" / "_dialect.py"
 #: What the environment was made from. Written last; "unfinished" while a new one is being made.
@@ -30,6 +33,7 @@ UNFINISHED = "unfinished\n"
 #: A change of any of these means there is something to do.
 INPUTS = (
     "pyproject.toml",
+    "tools/lock/demo.txt",
     "tools/lock/requirements.txt",
     "tools/lock/without_dependencies.txt",
     "tools/setup_venv.py",
@@ -44,28 +48,31 @@ class SetupError(Exception):
     """The environment could not be made; the message says why."""
 
 
-def is_current() -> bool:
+def is_current(wanted: str) -> bool:
     """Asked with the environment's own interpreter: is there nothing to do?"""
-    return DIALECT.is_file() and _read_stamp() == _stamp(platform.python_version())
+    return DIALECT.is_file() and _serves(wanted, platform.python_version())
 
 
-def set_up() -> None:
+def set_up(wanted: str) -> None:
     with _one_at_a_time():
         version = _usable_version()
-        if version and _read_stamp() == _stamp(version) and DIALECT.is_file():
+        if version and _serves(wanted, version) and DIALECT.is_file():
             return  # another run has just done it
+        if wanted == DEMO and version and _was_for(DEVELOPMENT):
+            wanted = DEVELOPMENT  # it stays what it is
         if version is None:
             _create()
         elif _read_stamp():
             STAMP.write_text(UNFINISHED, encoding="utf-8")
         _run(
             "2/4 installing the pinned packages (minutes, the first time)",
-            _pip_install("--require-hashes", "-r", str(LOCK)),
+            _pip_install("--require-hashes", "-r", str(LOCK_OF[wanted])),
         )
-        _run(
-            "3/4 installing what is pinned without its dependencies",
-            _pip_install("--require-hashes", "--no-deps", "-r", str(LOCK_WITHOUT_DEPENDENCIES)),
-        )
+        if wanted == DEVELOPMENT:
+            _run(
+                "3/4 installing what is pinned without its dependencies",
+                _pip_install("--require-hashes", "--no-deps", "-r", str(LOCK_WITHOUT_DEPENDENCIES)),
+            )
         _run(
             "4/4 installing mav-tasks itself, editable, with its MAVLink dialect",
             _pip_install("--no-deps", "--no-build-isolation", "--editable", str(ROOT)),
@@ -73,7 +80,7 @@ def set_up() -> None:
         # pip does not compile what is editable; the dialect is large enough to notice.
         _call([str(VENV_PYTHON), "-m", "compileall", "-q", str(DIALECT)])
         version = _version_of(VENV_PYTHON) or ""
-        STAMP.write_text(_stamp(version), encoding="utf-8")
+        STAMP.write_text(_stamp(version, wanted), encoding="utf-8")
         _say(f"ready: {VENV.name} has Python {version}{_note_on_pybullet()}")
 
 
@@ -110,11 +117,20 @@ def _remove_old() -> None:
         shutil.rmtree(old)
 
 
-def _stamp(version: str) -> str:
+def _serves(wanted: str, version: str) -> bool:
+    """Return whether all that is wanted is installed, of these very versions."""
+    return _read_stamp() in (_stamp(version, wanted), _stamp(version, DEVELOPMENT))
+
+
+def _was_for(wanted: str) -> bool:
+    return (_read_stamp() or "").splitlines()[-1:] == [wanted]
+
+
+def _stamp(version: str, wanted: str) -> str:
     digest = hashlib.sha256()
     for name in INPUTS:
         digest.update((ROOT / name).read_bytes())
-    return f"{_origin(version)}\n{digest.hexdigest()}\n"
+    return f"{_origin(version)}\n{digest.hexdigest()}\n{wanted}\n"
 
 
 def _origin(version: str) -> str:
@@ -187,7 +203,7 @@ def _note_on_pybullet() -> str:
 @contextmanager
 def _one_at_a_time() -> Iterator[None]:
     # A lock on a file that is always there leaves nothing behind, and ends with the process.
-    with LOCK.open(encoding="utf-8") as file:
+    with LOCK_OF[DEVELOPMENT].open(encoding="utf-8") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -205,10 +221,14 @@ def main() -> int:
     parser.add_argument(
         "--is-current", action="store_true", help="do nothing; 0 if there is nothing to do"
     )
-    if parser.parse_args().is_current:
-        return 0 if is_current() else 1
+    parser.add_argument(
+        "wanted", nargs="?", choices=LOCK_OF, default=DEVELOPMENT, help="default: %(default)s"
+    )
+    arguments = parser.parse_args()
+    if arguments.is_current:
+        return 0 if is_current(arguments.wanted) else 1
     try:
-        set_up()
+        set_up(arguments.wanted)
     except SetupError as error:
         print(f"setup: {error}", file=sys.stderr)
         return 1

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -249,7 +250,7 @@ def test_the_gate_repeats_at_its_end_what_it_skipped(
 
 
 def test_every_pin_has_a_hash_and_the_set_up_asks_for_it() -> None:
-    for name in ("requirements.txt", "without_dependencies.txt"):
+    for name in ("demo.txt", "requirements.txt", "without_dependencies.txt"):
         text = (ROOT / "tools" / "lock" / name).read_text("utf-8")
         pins = [block for block in text.replace("\\\n", " ").splitlines() if "==" in block]
         assert pins
@@ -261,3 +262,17 @@ def test_every_pin_has_a_hash_and_the_set_up_asks_for_it() -> None:
     assert len(installs) == 3
     for line in installs:
         assert '"--require-hashes"' in line or '"--no-build-isolation"' in line
+
+
+def pins_of(name: str) -> set[str]:
+    """Return the pins of a lock, each as name==version."""
+    text = (ROOT / "tools" / "lock" / name).read_text("utf-8")
+    return set(re.findall(r"^[^ #]+==[^ ]+", text, flags=re.MULTILINE))
+
+
+def test_the_demo_installs_a_part_of_what_the_tests_install_at_the_same_versions() -> None:
+    demo, everything = pins_of("demo.txt"), pins_of("requirements.txt")
+    assert demo < everything
+    names = {pin.partition("==")[0] for pin in demo}
+    assert {"pymavlink", "matplotlib", "hatchling"} <= names
+    assert not names & {"pytest", "mypy", "ruff", "mavsdk", "pip-audit", "hypothesis"}
