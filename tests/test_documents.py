@@ -127,15 +127,11 @@ def test_the_tour_goes_as_it_is_told(tmp_path: Path) -> None:
 @pytest.mark.timeout(150)
 def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
     broken, *told = commands(BROKEN)
-    with stand(tmp_path) as it:
-        it.rover.end()
-        port = str(it.rover_port)
-        rover = ("-m", "rover_sim", "--port", port, "--body", "kinematic", *rover_options(broken))
-        with process(*rover, folder=tmp_path, name="broken rover"):
-            ended = [
-                mav_tasks(*shlex.split(command)[1:], server=f"udpout:127.0.0.1:{it.client_port}")
-                for command in told
-            ]
+    with stand(tmp_path, rover_options=rover_options(broken)) as it:
+        ended = [
+            mav_tasks(*shlex.split(command)[1:], server=f"udpout:127.0.0.1:{it.client_port}")
+            for command in told
+        ]
     assert [done.status for done in ended] == [1, 0, 0]
     moved, queue, resumed = ended
     assert "failed (stuck)" in moved.output
