@@ -49,7 +49,7 @@ from mav_tasks.plan_files import (
 )
 from mav_tasks.services.mission_item import Item
 from mav_tasks.tasks.goal import Drive, Move, Rotate
-from mav_tasks.tasks.lifecycle import ACTIVE, WAITING, TaskReason
+from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 DEFAULT_LINK = "udpout:127.0.0.1:14560"
@@ -61,7 +61,8 @@ STOP_WITHIN = 3.0  # s
 KILL = 1.0  # param2 of TASK_CANCEL
 RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
 EPOCHS = 1 << 24  # that a float32 tells apart
-PAGE = 16  # waiting tasks that one request shows
+PAGE = 16  # tasks that one request shows
+NO_HISTORY = "the server does not list finished tasks: it is older than this client"
 OVERTAKEN = "a STOP has overtaken this: ask for it again if it is still meant"
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
 
@@ -320,6 +321,26 @@ class Client:
             page = await self._ask.page(system_id, first, count, begun=begun, known=tasks)
             tasks |= {task.id: task for task in page}
         return queue_status_of(overview, system_id, tuple(tasks.values())[:limit], current)
+
+    async def history(
+        self, *, vehicle: int | None = None, limit: int = 20
+    ) -> tuple[TaskStatus, ...]:
+        """Ask for the tasks of a rover that are over, newest first, up to ``limit``.
+
+        ``ended_ago`` of each says when it ended. Raise Refused if the server is too old to list
+        them.
+        """
+        system_id = self._which(vehicle)
+        overview = await self._ask.overview(system_id)
+        over = sum(overview.counts[state] for state in TERMINAL)
+        tasks: dict[int, TaskStatus] = {}
+        for first in range(0, min(over, limit), PAGE):
+            size = min(PAGE, over - first)
+            page = await self._ask.finished(system_id, first, size, known=tasks)
+            if not page and not tasks:
+                raise Refused(NO_HISTORY, result=MavResult.UNSUPPORTED, reason=TaskReason.NONE)
+            tasks |= {task.id: task for task in page}
+        return tuple(tasks.values())[:limit]
 
     async def stop(
         self, *, clear: bool = False, vehicle: int | None = None, within: float = STOP_WITHIN

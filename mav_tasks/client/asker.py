@@ -23,6 +23,7 @@ T = TypeVar("T")
 ANSWER_WITHIN = 10.0  # s
 PAGE_TRIES = 6
 PAGE_WITHIN = 0.3  # s after its ack, in which the rest of a page comes
+FINISHED = 1.0  # param4 of REQUEST_MESSAGE: tasks that are over
 LATER = 1.0  # s, after which what was one request too many is sent again
 MOST_HEARD = 1000  # texts that wait to be read
 
@@ -197,15 +198,46 @@ class Asker:
                     whole.set()
 
         request = request_message(vehicle, m.TaskStatus.id, 0.0, float(first))
+        await self._until_whole(request, take, whole, vehicle)
+        return sorted(found.values(), key=_place)
+
+    async def finished(
+        self, vehicle: int, first: int, count: int, *, known: Container[int]
+    ) -> list[TaskStatus]:
+        """Ask for tasks that are over, newest first; if some are lost on the way, again.
+
+        ``known`` are those of earlier pages, which may still come.
+        """
+        found: dict[int, tuple[float, TaskStatus]] = {}  # with when it ended
+        whole, loop = asyncio.Event(), asyncio.get_running_loop()
+
+        def take(status: TaskStatus) -> None:
+            if status.vehicle != vehicle or status.ended_ago is None or status.id in known:
+                return  # without its age it is no answer to a question, but news
+            found.setdefault(status.id, (loop.time() - status.ended_ago, status))
+            if len(found) >= count:
+                whole.set()
+
+        request = request_message(vehicle, m.TaskStatus.id, 0.0, float(first), FINISHED)
+        await self._until_whole(request, take, whole, vehicle)
+        newest = sorted(found.values(), key=lambda each: each[0], reverse=True)
+        return [status for _, status in newest]
+
+    async def _until_whole(
+        self,
+        request: m.CommandLong,
+        take: Callable[[TaskStatus], None],
+        whole: asyncio.Event,
+        vehicle: int,
+    ) -> None:
         with _added(self._statuses, take):
             for _ in range(PAGE_TRIES):
-                await self.ask(request, f"the queue of rover {vehicle}", is_told_apart=True)
+                await self.ask(request, f"the tasks of rover {vehicle}", is_told_apart=True)
                 with suppress(TimeoutError):  # the ack may overtake what it announces
                     async with asyncio.timeout(PAGE_WITHIN):
                         await whole.wait()
                 if whole.is_set():
-                    break
-        return sorted(found.values(), key=_place)
+                    return
 
     async def upload(
         self, target: Address, items: tuple[Item, ...], kind: MavMissionType, *, nonce: int = 0

@@ -356,6 +356,10 @@ class SyncClient:
         """Ask what a rover does and what waits."""
         return self._call(lambda client: client.queue(vehicle=vehicle, limit=limit))
 
+    def history(self, *, vehicle: int | None = None, limit: int = 20) -> tuple[TaskStatus, ...]:
+        """Ask for the tasks of a rover that are over, newest first: see ``Client.history``."""
+        return self._call(lambda client: client.history(vehicle=vehicle, limit=limit))
+
     def stop(
         self, *, clear: bool = False, vehicle: int | None = None, within: float = STOP_WITHIN
     ) -> None:

@@ -32,6 +32,8 @@ class TaskStatus:
     of ``items`` is the item of a plan that is being driven, from 1 as in its file; of another task
     it is the leg. ``version`` grows with each change, ``halt_epoch`` with all that makes its rover
     stand. ``label`` is the name that its submitter gave it, "" for none.
+    stand. ``ended_ago``: seconds since it ended, as of the answer to a question; None: it is not
+    over, or the server does not tell.
     """
 
     id: int
@@ -56,6 +58,7 @@ class TaskStatus:
     version: int
     halt_epoch: int = 0
     label: str = ""
+    ended_ago: float | None = None
 
     @property
     def is_over(self) -> bool:
@@ -156,6 +159,8 @@ class Text:
 def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
     """Give what a TASK_STATUS says; ``vehicle`` is the system that it came from."""
     reason = reason_of(message.reason)
+    finish = known(message.time_to_finish)
+    is_over = message.state in TERMINAL
     return TaskStatus(
         id=message.task_id,
         vehicle=vehicle,
@@ -171,7 +176,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         unit=unit_of(message.remaining_unit),
         position=None if message.queue_position == UNKNOWN_POSITION else message.queue_position,
         time_to_start=known(message.time_to_start),
-        time_to_finish=known(message.time_to_finish),
+        time_to_finish=None if is_over else finish,
         execution_time=known(message.execution_time),
         item=message.step + 1,
         items=message.step_count,
@@ -179,6 +184,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         version=message.version,
         halt_epoch=message.halt_epoch,
         label=_text(message._label_raw),
+        ended_ago=-finish if is_over and finish is not None else None,
     )
 
 

@@ -7,6 +7,7 @@ Events are numbered from 1; the store reports back up to which number they are d
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import cast
 
 from mav_tasks.tasks.events import (
@@ -70,10 +71,13 @@ class TaskBook:
         counts = Counter((task.vehicle, task.state) for task in tasks)
         for (vehicle, state), count in counts.items():
             self._counts[vehicle][state] += count
+        over = [task for task in tasks if task.state in TERMINAL]
+        over.sort(
+            key=lambda task: task.submitted_at if task.changed_at is None else task.changed_at
+        )
+        self._finished.extend(task.id for task in over)
         for task in tasks:
-            if task.state in TERMINAL:
-                self._finished.append(task.id)
-            else:
+            if task.state not in TERMINAL:
                 self._note_live(task)
 
     def submit(self, draft: Draft, *, state: TaskState = TaskState.QUEUED, now: float) -> Task:
@@ -199,6 +203,11 @@ class TaskBook:
         """Give a client's latest task of a command that is not over."""
         live = self._live.get((submitter, command, vehicle))
         return self._tasks[next(reversed(live))] if live else None
+
+    def finished(self, vehicle: int, first: int, count: int) -> list[TaskId]:
+        """Return up to ``count`` tasks of a vehicle that are over, newest first; skip ``first``."""
+        over = (each for each in reversed(self._finished) if self._tasks[each].vehicle == vehicle)
+        return list(islice(over, first, first + count))
 
     def is_awaited_at(self, link: str, endpoint: str) -> bool:
         """Whether a task from a client's endpoint is not over."""

@@ -2,15 +2,13 @@
 
 from math import nan
 
-from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.driving.estimate import duration_of, time_left
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.driving.estimate import time_left
+from mav_tasks.tasks.forecast import Forecast, known_of
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R, S = TaskReason, TaskState
-
-FORESEEN = 500  # tasks ahead, beyond which nobody reckons when a task starts
 
 
 def position(tasks: VehicleTasks, task: Task) -> int | None:
@@ -21,28 +19,23 @@ def position(tasks: VehicleTasks, task: Task) -> int | None:
     return ahead + (tasks.begun is not None) + len(tasks.aside)
 
 
-def estimate(tasks: VehicleTasks, task: Task, book: TaskBook, *, now: float) -> tuple[float, float]:
-    """Give the estimated seconds until a task starts, and until it ends; NaN: not known."""
-    match task.state:
-        case S.STARTING | S.EXECUTING:
-            return 0.0, time_left(task.goal, task.progress, tasks.terms.driving)
-        case S.SCHEDULED:
-            to_start = tasks.start_time(task) - now
-        case S.QUEUED:
-            to_start = _time_ahead(tasks, task, book)
-        case _:
-            return nan, nan
-    return to_start, to_start + duration_of(task.goal, tasks.terms.driving)
+def estimate(
+    tasks: VehicleTasks, task: Task, *, forecast: Forecast | None, now: float
+) -> tuple[float, float]:
+    """Return the estimated seconds until a task starts, and until it ends; NaN: not known.
 
-
-def _time_ahead(tasks: VehicleTasks, task: Task, book: TaskBook) -> float:
-    """Give the seconds until those before it are done; NaN while nothing goes on."""
-    place = tasks.queue.position(task.id)
-    if tasks.paused or tasks.is_held_ahead or place is None or place > FORESEEN:
-        return nan
-    ahead = [book[task_id] for task_id in tasks.queue.page(0, place)]
-    begun = [task for task in (tasks.begun, *tasks.aside) if task is not None]
-    return sum(time_left(t.goal, t.progress, tasks.terms.driving) for t in (*begun, *ahead))
+    The end of one that is over is negative: so long ago. Without a ``forecast`` only what costs
+    little is told: of a task that runs, and a start time.
+    """
+    if task.state in (S.STARTING, S.EXECUTING):
+        is_kept = task.state is S.STARTING and tasks.turns.blocker_of(task.id)
+        left = time_left(task.goal, task.progress, known_of(tasks)).seconds
+        return 0.0, nan if is_kept else left
+    if forecast is None:
+        return tasks.start_time(task) - now if task.state is S.SCHEDULED else nan, nan
+    if task.state in TERMINAL:
+        return nan, nan if task.changed_at is None else min(0.0, task.changed_at - now)
+    return forecast.of(task)
 
 
 def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:

@@ -37,6 +37,8 @@ class VehicleTasks(Lineup):
         #: of tasks that are held
         self.releases = Releases(self)
         self._jumps = JumpWatch()
+        #: the vehicle at the last look
+        self.seen: VehicleView | None = None
 
     # coming, changing, going
 
@@ -308,6 +310,7 @@ class VehicleTasks(Lineup):
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Begin what can begin, and give what the vehicle must be made to do now."""
+        self.seen = seen
         has_jumped = self._jumps.has_jumped(seen.motion, driving=self.settings.driving)
         if has_jumped and self.is_driving:
             self.hold(R.FRAME_RESET, now=now)

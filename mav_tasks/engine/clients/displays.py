@@ -1,6 +1,5 @@
 """What a client is shown because it asks: messages on request, and the rates of streams."""
 
-from functools import partial
 from math import isfinite
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -15,8 +14,9 @@ from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
@@ -24,7 +24,7 @@ R = TaskReason
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
 EVERYBODY = Address(0, 0)
 NO_INTERVAL = -1  # of MESSAGE_INTERVAL: it is not sent
-PAGE = 16  # waiting tasks that one request shows
+PAGE = 16  # waiting, or finished, tasks that one request shows
 MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
 
 
@@ -113,8 +113,8 @@ class Displays:
                 self._show_queue(client, tasks, address, heard_at=None, now=now)
             case m.TaskStatus.id:
                 task_id = translate.task_id_of(command)
-                first = max(0, translate.first_index_of(command))
-                for each in (task_id,) if task_id else tasks.page(first, PAGE):
+                forecast = Forecast(tasks, self._book, now=now)
+                for each in (task_id,) if task_id else self._page(tasks, command):
                     task = self._book.get(each)
                     if task is None:
                         raise Rejection(R.NOT_FOUND, f"no task {each}")
@@ -124,7 +124,7 @@ class Displays:
                         tasks,
                         address,
                         reader=packet.source,
-                        with_position=True,
+                        forecast=forecast,
                         now=now,
                     )
             case m.TaskTiming.id:  # it needs the rate of the rover's setpoints
@@ -139,7 +139,7 @@ class Displays:
         if task is not None:
             to = task.submitter.system_id, task.submitter.component_id
             reader = address_of(*to) if client.submitted(task) else EVERYBODY
-            self._send_status(client, task, reader=reader, with_position=False, now=now)
+            self._send_status(client, task, reader=reader, is_full=False, now=now)
 
     def _send_status(
         self,
@@ -147,23 +147,20 @@ class Displays:
         task: Task,
         *,
         reader: Address,
-        with_position: bool,
+        is_full: bool = True,
         now: float,
     ) -> None:
-        """Send a task's TASK_STATUS, from the task server of its vehicle."""
+        """Send a task's TASK_STATUS, from the task server of its vehicle.
+
+        ``is_full``: with what is known of its place in the queue, and of its times.
+        """
         vehicle = self._vehicles.look_at(task.vehicle)
-        if vehicle is None:
-            return
-        address = vehicle.server_address
-        self._send(
-            client,
-            task,
-            vehicle.tasks,
-            address,
-            reader=reader,
-            with_position=with_position,
-            now=now,
-        )
+        if vehicle is not None:
+            forecast = Forecast(vehicle.tasks, self._book, now=now) if is_full else None
+            address = vehicle.server_address
+            self._send(
+                client, task, vehicle.tasks, address, reader=reader, forecast=forecast, now=now
+            )
 
     def _send(
         self,
@@ -173,16 +170,15 @@ class Displays:
         address: Address,
         *,
         reader: Address,
-        with_position: bool,
+        forecast: Forecast | None,
         now: float,
     ) -> None:
         status = translate.task_status(
             task,
             tasks,
-            self._book,
             reader=reader,
             link_number=self._gcs.link_numbers.get(task.submitter.link, 0),
-            with_position=with_position,
+            forecast=forecast,
             now=now,
         )
         client.outlet.send(status, address)
@@ -203,20 +199,34 @@ class Displays:
         client.outlet.send(status, address)
 
     def _show_tasks(self, asked: Asked, *, now: float) -> None:
+        client, vehicle, reader = asked.client, asked.vehicle, asked.packet.source
         task_id = translate.task_id_of(asked.command)
-        send = partial(
-            self._send_status, asked.client, reader=asked.packet.source, with_position=True, now=now
-        )
         if task_id == 0:
-            first = max(0, translate.first_index_of(asked.command))
-            for waiting in asked.vehicle.tasks.page(first, PAGE):
-                send(self._book[waiting])
+            forecast = Forecast(vehicle.tasks, self._book, now=now)
+            address = vehicle.server_address
+            for each in self._page(vehicle.tasks, asked.command):
+                self._send(
+                    client,
+                    self._book[each],
+                    vehicle.tasks,
+                    address,
+                    reader=reader,
+                    forecast=forecast,
+                    now=now,
+                )
             return
         task = self._book.get(task_id)
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
-        asked.client.follow(task_id)
-        send(task)
+        client.follow(task_id)
+        self._send_status(client, task, reader=reader, now=now)
+
+    def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
+        """Return the tasks that a request without a task id is about: what waits, or is over."""
+        first = max(0, translate.first_index_of(command))
+        if translate.is_of_finished(command):
+            return self._book.finished(tasks.vehicle, first, PAGE)
+        return tasks.page(first, PAGE)
 
     def _show_timing(self, asked: Asked, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)

@@ -11,7 +11,6 @@ from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import SET_FAILSAFE
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.guidance import Leg
 from mav_tasks.tasks.driving.itinerary import present_goal
 from mav_tasks.tasks.driving.legs import first_leg, leg_count, leg_of, length_of
@@ -26,6 +25,7 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
+from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
@@ -87,6 +87,8 @@ CALM = frozenset(
 
 STATES = tuple(state.name.lower() for state in TaskState)  # in words, by number
 
+FINISHED = 1.0  # param4 of REQUEST_MESSAGE(TASK_STATUS, 0): tasks that are over
+
 UNIT_NONE = 0  # TASK_UNIT
 UNIT_METRES = 1
 UNIT_RADIANS = 2
@@ -106,20 +108,19 @@ def result_of(reason: int) -> MavResult:
 def task_status(
     task: Task,
     tasks: VehicleTasks,
-    book: TaskBook,
     *,
     reader: Address,
     link_number: int,
-    with_position: bool,
+    forecast: Forecast | None,
     now: float,
 ) -> m.TaskStatus:
-    """Give the TASK_STATUS of a task of this vehicle, for the client at ``reader``."""
+    """Return the TASK_STATUS of a task of this vehicle, for the client at ``reader``.
+
+    ``forecast``: of the vehicle's tasks; None: its place and times are not asked for.
+    """
     reason = wait_reason(tasks, task)
-    ahead = position(tasks, task) if with_position else None
-    is_costly = task.state is TaskState.QUEUED  # it depends on all that are ahead
-    to_start, to_finish = nan, nan
-    if with_position or not is_costly:
-        to_start, to_finish = map(_float32, estimate(tasks, task, book, now=now))
+    ahead = position(tasks, task) if forecast is not None else None
+    to_start, to_finish = map(_float32, estimate(tasks, task, forecast=forecast, now=now))
     progress, submitter = task.progress, task.submitter
     leg = _leg(task)
     unit, length = _size_of(leg)
@@ -258,8 +259,13 @@ def task_id_of(command: Command) -> int:
 
 
 def first_index_of(command: Command) -> int:
-    """Give the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 for nonsense."""
+    """Return the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 for nonsense."""
     return _whole(command.params[2])
+
+
+def is_of_finished(command: Command) -> bool:
+    """Return whether param4 of REQUEST_MESSAGE(TASK_STATUS, 0) asks for tasks that are over."""
+    return command.params[3] == FINISHED
 
 
 def _float32(value: float) -> float:

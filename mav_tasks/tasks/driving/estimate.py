@@ -1,36 +1,137 @@
-"""How long tasks take, roughly: for people who wait, never for a decision."""
+"""How long tasks take, roughly: for people who wait, never for a decision.
 
-from math import nan, sqrt
+A goal is followed leg by leg from where the vehicle is, without its neighbours on the road: nothing
+is known of corrections near the end, of pauses, or of a car's bends.
+"""
+
+from math import cos, nan, sin, sqrt
+from typing import NamedTuple
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Leg
-from mav_tasks.tasks.driving.legs import first_leg, leg_of, length_of
+from mav_tasks.tasks.driving.guidance import Leg, wrap
+from mav_tasks.tasks.driving.itinerary import begun, following, is_over, present_goal
+from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.path import Follow
-from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate
-from mav_tasks.tasks.task import Progress
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    GlobalPlace,
+    Goal,
+    GoTo,
+    Head,
+    LocalPlace,
+    Move,
+    Plan,
+    Rotate,
+    SetSpeed,
+    SingleGoal,
+)
+from mav_tasks.tasks.task import Pose, Progress
 
 SETTLING = 1.5  # s from one task's end to motion, and from near its end to a measured standstill
+MOST_STEPS = 300  # of a plan, beyond which nobody reckons when it ends
+SOMEWHERE = Pose(0.0, 0.0, 0.0)
 
 
-def duration_of(goal: Goal, driving: Driving) -> float:
-    """Give the seconds that a task takes from its start; NaN where its way is not known yet."""
-    leg = None if isinstance(goal, Plan) else first_leg(goal)
-    return nan if leg is None else SETTLING + _seconds(leg, length_of(leg), driving)
+class Known(NamedTuple):
+    """What an estimate starts from; None: not known."""
+
+    driving: Driving
+    pose: Pose | None = None
+    home: GlobalPlace | None = None
+    origin: GlobalPlace | None = None
 
 
-def time_left(goal: Goal, progress: Progress, driving: Driving) -> float:
-    """Give the seconds that a begun task still takes."""
-    if progress.anchor is None or isinstance(goal, Plan):
-        return duration_of(goal, driving)
-    leg = leg_of(goal, progress)
-    left = max(0.0, length_of(leg) - progress.done)
-    return SETTLING + _seconds(leg, left, driving)
+class Estimate(NamedTuple):
+    """Seconds that a goal takes, NaN: not known; and where the vehicle is then."""
+
+    seconds: float
+    pose: Pose | None
 
 
-def _seconds(leg: Leg, left: float, driving: Driving) -> float:
+UNKNOWN = Estimate(nan, None)
+
+
+def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
+    """Return how long a task still takes, all of it if it has not begun."""
+    if isinstance(goal, Plan):
+        return _time_of_plan(goal, progress, known)
+    return _time_of_goal(goal, progress, known, known.driving.speed)
+
+
+def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
+    progress = progress if progress.step >= 0 else begun(plan, progress)
+    speed = progress.speed or known.driving.speed
+    seconds, pose = 0.0, known.pose
+    for _ in range(MOST_STEPS):
+        for step in progress.pending:
+            present = plan.steps[step]
+            if isinstance(present, SetSpeed):
+                speed = present.speed or known.driving.speed
+        if is_over(plan, progress):
+            return Estimate(seconds, pose)
+        goal = present_goal(plan, progress)
+        took, pose = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
+        seconds += took
+        after = following(plan, progress)
+        if after is None or took != took:  # the way from an unknown place is not known either
+            break
+        progress = after
+    return UNKNOWN
+
+
+def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: float) -> Estimate:
+    target = progress.target
+    if target is None and isinstance(goal, GoTo):
+        target = local_place(known.home if goal.place is None else goal.place, known.origin)
+    pose = known.pose
+    if progress.anchor is None and isinstance(goal, GoTo) and target is None:
+        return UNKNOWN
+    if pose is None and progress.anchor is None and isinstance(goal, GoTo | Face):
+        return UNKNOWN
+    at, seconds = pose or SOMEWHERE, SETTLING
+    for number in range(progress.leg, leg_count(goal)):
+        is_present = number == progress.leg and progress.anchor is not None
+        if is_present:
+            leg, done = leg_of(goal, progress), progress.done
+            anchor = progress.anchor or at
+        else:
+            anchor, done = anchor_of(goal, number, at, target), 0.0
+            leg = leg_of(goal, Progress(anchor=anchor, leg=number, target=target))
+        seconds += _seconds(leg, max(0.0, length_of(leg) - done), known.driving, speed)
+        at = _end_of(leg, anchor, target if number == WAY else None)
+    return Estimate(seconds, None if pose is None and progress.anchor is None else at)
+
+
+def _end_of(leg: Leg, anchor: Pose, place: LocalPlace | None) -> Pose:
+    """Return where a leg ends that begins at ``anchor``; ``place``: where a go-to ends."""
+    north, east, yaw = anchor.north, anchor.east, anchor.yaw
+    if place is not None:
+        return Pose(place.north, place.east, yaw)
     match leg:
-        case Move(speed=speed) | Follow(speed=speed):
-            return _ramped(left, speed or driving.speed, driving.acceleration)
+        case Move(distance=way):
+            return Pose(north + way * cos(yaw), east + way * sin(yaw), yaw)
+        case Rotate(angle=angle):
+            return Pose(north, east, wrap(yaw + angle))
+        case Head(yaw=heading, forward=forward, duration=duration):
+            way = forward * duration
+            return Pose(north + way * cos(heading), east + way * sin(heading), heading)
+        case Drive(forward=forward, yaw_rate=rate, duration=duration):
+            end = yaw + rate * duration
+            chord = forward * duration
+            if abs(rate * duration) > 1e-6:
+                chord = 2 * forward / rate * sin(rate * duration / 2)
+            middle = (yaw + end) / 2
+            return Pose(north + chord * cos(middle), east + chord * sin(middle), wrap(end))
+        case _:
+            return anchor
+
+
+def _seconds(leg: Leg, left: float, driving: Driving, speed: float) -> float:
+    match leg:
+        case Move(speed=own) | Follow(speed=own):
+            return _ramped(left, own or speed, driving.acceleration)
         case Rotate(rate=rate):
             return _ramped(left, rate or driving.turn_rate, driving.turn_acceleration)
         case _:

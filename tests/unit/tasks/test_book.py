@@ -184,3 +184,17 @@ class TestTheLatest:
             finish(each, 2)
             finish(each, 1)
             assert each.latest(SOMEBODY, TASK_MOVE, vehicle=1) is None
+
+
+def test_finished_tasks_are_listed_by_vehicle_the_newest_first_also_after_a_restart() -> None:
+    book = TaskBook()
+    tasks = [book.submit(draft(vehicle=1 + number % 2), now=0.0) for number in range(6)]
+    for at, task in enumerate(reversed(tasks)):  # the last one submitted ends first
+        book.change(task.id, S.CANCELLED, reason=R.CANCELLED, actor="x", now=float(at))
+    assert book.finished(1, 0, 16) == [1, 3, 5]
+    assert book.finished(2, 0, 2) == [2, 4]
+    assert book.finished(2, 2, 2) == [6]
+    assert book.finished(2, 3, 2) == book.finished(9, 0, 2) == []
+    after = TaskBook()
+    after.restore(book.all(), next_id=7)
+    assert after.finished(1, 0, 16) == [1, 3, 5]

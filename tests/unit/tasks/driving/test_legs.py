@@ -1,12 +1,11 @@
 """What a goal comes down to, leg after leg, and how a rover that obeys drives it."""
 
-from math import hypot, nan, pi, radians
+from math import hypot, pi, radians
 
 import pytest
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.course import Course
-from mav_tasks.tasks.driving.estimate import SETTLING, duration_of, time_left
 from mav_tasks.tasks.driving.guidance import ZERO, Leg, Motion, Velocity, wrap
 from mav_tasks.tasks.driving.legs import (
     FACE,
@@ -31,10 +30,9 @@ from mav_tasks.tasks.goal import (
     SingleGoal,
     Wait,
 )
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.outlook import estimate
+from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.task import Frame, Pose, Progress
-from tests.unit.tasks.rig import BY, Rig, Rover, run_until
+from tests.unit.tasks.rig import Rig, Rover, run_until
 from tests.unit.tasks.samples import ORIGIN, motion
 
 S = TaskState
@@ -251,44 +249,3 @@ class TestDriven:
         assert rover.pose.yaw == pytest.approx(pi / 2, abs=0.1)
         assert rover.pose.east > 0.5
         assert rig.task(1).progress.done == pytest.approx(5.2, abs=0.2)  # until it stands
-
-
-class TestEstimate:
-    @pytest.mark.parametrize(
-        ("goal", "seconds"),
-        [
-            (Move(-5.0, 0.5), 11.0),  # 10 s at 0.5 m/s, and 1 s for ramps of 0.5 m/s²
-            (Move(0.02), 0.4),  # ramps only: 2 * sqrt(0.02 / 0.5)
-            (Drive(1.0, 0.0, 7.0), 7.0),
-            (Wait(3.0), 3.0),
-            (Head(0.0, 1.0, 4.0), 4.0),
-        ],
-    )
-    def test_before_the_start(self, goal: SingleGoal, seconds: float) -> None:
-        assert duration_of(goal, DRIVING) == pytest.approx(SETTLING + seconds)
-        assert time_left(goal, Progress(), DRIVING) == duration_of(goal, DRIVING)
-
-    def test_of_a_way_that_is_not_known_yet(self) -> None:
-        assert duration_of(GoTo(EAST_3), DRIVING) == pytest.approx(nan, nan_ok=True)
-
-    def test_on_the_way(self) -> None:
-        left = time_left(Move(5.0, 0.5), Progress(anchor=ORIGIN, done=2.0), DRIVING)
-        assert left == pytest.approx(SETTLING + 7.0)
-        past = time_left(Wait(5.0), Progress(anchor=ORIGIN, done=6.0), DRIVING)
-        assert past == pytest.approx(SETTLING)
-
-    def test_of_the_queue_is_the_sum_of_what_is_before_and_nan_while_nothing_goes_on(self) -> None:
-        rig = Rig().executing(Wait(100.0))
-        second, third = rig.submit(Wait(10.0)), rig.submit(Wait(20.0))
-        first_left = 100.0 + SETTLING
-        for task, start, length in ((second, first_left, 10), (third, first_left + 11.5, 20)):
-            assert estimate(rig.tasks, task, rig.book, now=rig.now) == pytest.approx(
-                (start, start + SETTLING + length)
-            )
-        late = rig.submit(Wait(10.0))
-        late = rig.modify(late.id, start_at=rig.now + 50.0)
-        assert estimate(rig.tasks, late, rig.book, now=rig.now) == pytest.approx((50.0, 61.5))
-        rig.tasks.pause(TaskReason.OPERATOR, actor=BY, now=rig.now)
-        assert estimate(rig.tasks, second, rig.book, now=rig.now) == pytest.approx(
-            (nan, nan), nan_ok=True
-        )

@@ -1,0 +1,133 @@
+"""When the tasks of one vehicle will start and end, if all goes as it stands now.
+
+The queue is played through once: the best ready task runs, its end lets others go on, start times
+come. Not foreseen are pauses, pre-emption, tasks of other vehicles and aging. Made for one answer
+to a client; what nobody asks for is not reckoned.
+"""
+
+from heapq import heapify, heappop, heappush
+from math import isnan, nan
+
+from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.driving.estimate import SETTLING, UNKNOWN, Estimate, Known, time_left
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
+from mav_tasks.tasks.queue import Rank
+from mav_tasks.tasks.task import Pose, Task, TaskId
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+
+S = TaskState
+
+FORESEEN = 500  # tasks, beyond which nobody reckons when one starts
+
+#: seconds until a task starts and until it ends; NaN: not known
+Times = tuple[float, float]
+
+
+class Forecast:
+    """The starts and ends of one vehicle's tasks as of ``now``."""
+
+    def __init__(self, tasks: VehicleTasks, book: TaskBook, *, now: float) -> None:
+        self._tasks = tasks
+        self._book = book
+        self._now = now
+        self._known = known_of(tasks)
+        self._times: dict[TaskId, Times] | None = None  # None: not reckoned yet
+        self._ready: list[tuple[Rank, TaskId]] = []
+        self._due: list[tuple[float, TaskId]] = []  # seconds from now
+        self._dependents: dict[int, list[Task]] = {}
+        self._done = {tasks.begun.id} if tasks.begun is not None else set()
+
+    def __repr__(self) -> str:
+        return f"Forecast({self._tasks.vehicle}, at {self._now})"
+
+    def of(self, task: Task) -> Times:
+        """Return the seconds until a waiting task starts, and until it ends."""
+        if self._times is None:
+            self._times = {}
+            self._play(self._times)
+        return self._times.get(task.id, (nan, nan))
+
+    def _play(self, times: dict[TaskId, Times]) -> None:
+        self._line_up(times)
+        clock, pose = self._when_free()
+        while not isnan(clock) and (self._ready or self._due) and len(times) < FORESEEN:
+            if not self._ready:
+                clock = max(clock, self._due[0][0])
+            while self._due and self._due[0][0] <= clock:
+                task = self._book[heappop(self._due)[1]]
+                if not task.terms.is_staged and not self._is_blocked(task):
+                    heappush(self._ready, (self._tasks.room.rank(task), task.id))
+            if not self._ready:
+                continue
+            task = self._book[heappop(self._ready)[1]]
+            seconds, pose = time_left(task.goal, task.progress, self._known._replace(pose=pose))
+            times[task.id] = (clock, clock + seconds)
+            clock += seconds
+            self._done.add(task.id)
+            for dependent in self._dependents.pop(task.id, []):
+                self._let_go(dependent)
+
+    def _line_up(self, times: dict[TaskId, Times]) -> None:
+        """Sort what waits by what it waits for."""
+        tasks = self._tasks
+        self._ready = [(tasks.queue.rank(each), each) for each in tasks.queue.page(0, FORESEEN)]
+        for aside in tasks.aside:
+            if aside.state is S.PAUSED:
+                self._ready.append((tasks.room.rank(aside), aside.id))
+        heapify(self._ready)
+        if tasks.room.count(tasks.vehicle) == len(tasks.queue):
+            return
+        for task_id in tasks.waiting[len(tasks.queue) :][:FORESEEN]:
+            task = self._book[task_id]
+            if task.state is S.SCHEDULED:
+                due = tasks.start_time(task) - self._now
+                times[task_id] = (due, nan)  # at the earliest, whatever else is in its way
+                heappush(self._due, (due, task_id))
+            elif not task.terms.is_staged and not self._is_blocked(task):
+                self._let_go(task)
+
+    def _let_go(self, task: Task) -> None:
+        """Line a task up that waits for no other one any more, unless for its time."""
+        due = self._tasks.start_time(task) - self._now
+        if due > 0:
+            heappush(self._due, (due, task.id))
+        else:
+            heappush(self._ready, (self._tasks.room.rank(task), task.id))
+
+    def _is_blocked(self, task: Task) -> bool:
+        """Return whether a task whose time has come waits for another one, and note that."""
+        ahead = self._book.get(task.terms.after) if task.terms.after else None
+        if ahead is None or ahead.state in TERMINAL or ahead.id in self._done:
+            return False
+        self._dependents.setdefault(ahead.id, []).append(task)
+        return True
+
+    def _when_free(self) -> Estimate:
+        """Return when the vehicle is free for the next task, and where; UNKNOWN if nothing runs."""
+        tasks = self._tasks
+        is_up = tasks.seen is not None and tasks.seen.heard
+        if tasks.paused or tasks.is_held_ahead or tasks.is_halting or not is_up:
+            return UNKNOWN
+        begun = tasks.begun
+        if begun is None:
+            first = tasks.queue.first()
+            blocked = first is not None and tasks.turns.blocker_of(first)
+            return UNKNOWN if blocked else Estimate(0.0, self._known.pose)
+        if begun.state is S.CANCELLING:
+            return Estimate(SETTLING, self._known.pose)
+        if begun.state not in (S.STARTING, S.EXECUTING) or tasks.turns.blocker_of(begun.id):
+            return UNKNOWN
+        return time_left(begun.goal, begun.progress, self._known)
+
+
+def known_of(tasks: VehicleTasks) -> Known:
+    """Return what an estimate of a vehicle's tasks starts from."""
+    seen, pose = tasks.seen, _pose_of(tasks)
+    if seen is None:
+        return Known(tasks.terms.driving)
+    return Known(tasks.terms.driving, pose, seen.home, seen.origin)
+
+
+def _pose_of(tasks: VehicleTasks) -> Pose | None:
+    seen = tasks.seen
+    return None if seen is None or seen.motion is None else seen.motion.pose
