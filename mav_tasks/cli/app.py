@@ -9,10 +9,12 @@ import typer
 from mav_tasks.cli import config, control, exit_codes, halts, keys, plans, submit
 from mav_tasks.cli.demo import demo
 from mav_tasks.cli.dialect import dialect
+from mav_tasks.cli.history import history
 from mav_tasks.cli.log import log
 from mav_tasks.cli.probe import probe
 from mav_tasks.cli.qgc_actions import qgc_actions
 from mav_tasks.cli.queue import queue
+from mav_tasks.cli.ready import ready
 from mav_tasks.cli.replay import replay
 from mav_tasks.cli.root import Root, root
 from mav_tasks.cli.serve import serve
@@ -38,6 +40,7 @@ app.command(context_settings=PASSED_ON, add_help_option=False)(demo)
 app.add_typer(submit.app, name="submit")
 app.command()(status)
 app.command()(queue)
+app.command()(history)
 app.command()(control.cancel)
 app.command()(control.clear)
 app.command()(halts.stop)
@@ -46,6 +49,7 @@ app.command()(halts.resume)
 app.command()(control.modify)
 app.command()(control.release)
 app.command()(vehicles)
+app.command()(ready)
 app.command()(probe)
 app.add_typer(plans.mission, name="mission")
 app.add_typer(plans.fence, name="fence")

@@ -10,6 +10,12 @@ from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common, Deadline, StartAt, StartIn, TaskId, seconds_of, start_of
 from mav_tasks.errors import UsageError
 
+RELEASED = {
+    "again": "all of it is driven again, from here",
+    "remainder": "the remainder is driven",
+    "skip": "it is skipped",
+}
+
 MaybeTaskId = Annotated[
     int | None, typer.Argument(metavar="[ID]", min=1, help="Of the task; without: the running one.")
 ]
@@ -29,12 +35,13 @@ async def cancel(
     async with opened(common) as client:
         if task_id is not None:
             task = await find_task(client, common, task_id)
+            rover = task.vehicle
             await (task.kill() if kill else task.cancel())
         else:
+            rover = client.vehicle
             task_id = await (client.kill() if kill else client.cancel())
-    output.say_done(
-        common.json, "kill" if kill else "cancel", f"task {task_id} is called off", task=task_id
-    )
+    words = f"rover {rover}: task {task_id} is called off"
+    output.say_done(common.json, "kill" if kill else "cancel", words, task=task_id, vehicle=rover)
 
 
 @command
@@ -49,9 +56,11 @@ async def clear(
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     async with opened(common) as client:
+        rover = client.vehicle
         await client.clear(running_too=everything)
-    which = "all tasks are" if everything else "all tasks that waited are"
-    output.say_done(common.json, "clear", f"{which} called off", running_too=everything)
+    which = "all tasks are" if everything else "all waiting tasks are"
+    words = f"rover {rover}: {which} called off"
+    output.say_done(common.json, "clear", words, running_too=everything, vehicle=rover)
 
 
 @command
@@ -101,7 +110,8 @@ async def modify(
                 at=start.at,
                 label=label,
             )
-    output.say_done(common.json, "modify", f"task {task_id} is changed", task=task_id)
+    words = f"rover {task.vehicle}: task {task_id} is changed"
+    output.say_done(common.json, "modify", words, task=task_id, vehicle=task.vehicle)
 
 
 @command
@@ -131,10 +141,12 @@ async def release(
         if named:
             task = await find_task(client, common, int(named[0]))
             await task.release(chosen)
-            task_id = task.id
+            task_id, rover = task.id, task.vehicle
         else:
+            rover = client.vehicle
             task_id = await client.release(None, chosen)
-    output.say_done(common.json, "release", f"task {task_id}: {how}", task=task_id, how=how)
+    words = f"rover {rover}: task {task_id}: {RELEASED[chosen]}"
+    output.say_done(common.json, "release", words, task=task_id, how=how, vehicle=rover)
 
 
 def _confirm(question: str) -> None:

@@ -26,7 +26,7 @@ TABLE = """\b
 Exit status:
   0  done
   1  a task ended otherwise than completed, or a request was refused
-  2  wrong usage: what is said tells what to change
+  2  usage error; the message says how to fix it
   3  no answer in time
   130  Ctrl-C"""
 
@@ -43,7 +43,9 @@ def tell(error: BaseException) -> int:
             _let_go_of_output()
             return READER_GONE
         case NoAnswer(nonce=nonce) if nonce:
-            _say(f"{error}; it may be there all the same: --nonce {nonce} has it there only once")
+            _say(
+                f"{error}; the task may exist: repeat with --nonce {nonce}, and it is added only once"
+            )
         case NoSuchVehicle():
             _say(f"{error} (--vehicle N)")
         case _:

@@ -35,7 +35,7 @@ class View(Protocol):
 async def follow(client: Client, task: Task, *, as_json: bool) -> None:
     """Show a task until it is over; TaskFailed unless it has completed."""
     try:
-        with _view(as_json=as_json) as view:
+        with _view(task.vehicle, as_json=as_json) as view:
             looking = asyncio.create_task(_look(client, task, view))
             try:
                 async for status in task.updates():
@@ -43,7 +43,8 @@ async def follow(client: Client, task: Task, *, as_json: bool) -> None:
             finally:
                 looking.cancel()
     except asyncio.CancelledError:
-        goes_on = f"task {task.id} goes on; to call it off: mav-tasks cancel {task.id}"
+        name = f"rover {task.vehicle}: task {task.id}"
+        goes_on = f"{name} goes on; to call it off: mav-tasks cancel {task.id}"
         sys.stderr.write(f"mav-tasks: {goes_on}\n")
         raise
     await task.done()
@@ -57,11 +58,11 @@ async def _look(client: Client, task: Task, view: View) -> None:
 
 
 @contextmanager
-def _view(*, as_json: bool) -> Iterator[View]:
+def _view(rover: int, *, as_json: bool) -> Iterator[View]:
     if as_json:
         yield Objects()
     elif not output.is_drawn_on():
-        yield Lines()
+        yield Lines(rover)
     else:
         bar = Bar()
         with Live(
@@ -76,7 +77,8 @@ def _view(*, as_json: bool) -> Iterator[View]:
 class Lines:
     """A line for each change of state, and for a silence."""
 
-    def __init__(self) -> None:
+    def __init__(self, rover: int) -> None:
+        self._rover = rover
         self._told = ""
         self._is_silent = False
 
@@ -91,7 +93,7 @@ class Lines:
         """Whether nothing is heard."""
         if is_silent != self._is_silent:
             self._is_silent = is_silent
-            output.say("nothing is heard of the rover" if is_silent else "the rover is heard again")
+            output.say(f"rover {self._rover}: {'silent' if is_silent else 'heard again'}")
 
 
 class Objects:
@@ -138,8 +140,8 @@ class Bar:
             return grid
         status = self.status
         state = words.state_of(status)
-        why = "nothing is heard" if self._is_silent else words.why_of(status)
-        cells: list[str | ProgressBar] = [f"task {status.id}", state]
+        why = "rover silent" if self._is_silent else words.why_of(status)
+        cells: list[str | ProgressBar] = [words.name_of(status), state]
         if width >= BAR_FROM:
             done = status.progress or 0.0
             cells.append(ProgressBar(total=1.0, completed=done, width=min(BAR_WIDTH, width // 3)))

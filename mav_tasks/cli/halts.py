@@ -89,10 +89,10 @@ async def resume(
 
         async def resume_one(rover: int) -> str:
             await client.resume(epoch=epoch, vehicle=rover)
-            with suppress(ClientError):  # it is resumed all the same
+            with suppress(ClientError):  # the resume was accepted before
                 first = (await client.queue(limit=0, vehicle=rover)).current
                 if first is not None and first.state is TaskState.HELD:
-                    return f"goes on after {line_of(first)}"
+                    return f"goes on after {line_of(first).removeprefix(f'rover {rover}: ')}"
             return "goes on"
 
         await _each(rovers, resume_one, common, "resume")

@@ -51,10 +51,6 @@ def _fields(
     status: "TaskStatus", timing: "TaskTiming | None", silence: str
 ) -> list[tuple[str, str]]:
     from mav_tasks.cli import words  # noqa: PLC0415
-    from mav_tasks.cli.times import format_duration  # noqa: PLC0415
-
-    def lasting(seconds: float | None) -> str:
-        return "" if not seconds else format_duration(seconds)
 
     ahead = "" if not status.is_waiting or status.position is None else str(status.position)
     return [
@@ -63,16 +59,30 @@ def _fields(
         ("label", status.label),
         ("what", words.what_of(status)),
         ("state", words.state_of(status)),
-        ("why", words.why_of(status)),
+        ("why", words.end_of(status)),
         ("priority", str(status.priority)),
         ("after task", str(status.after or "")),
         ("ahead of it", ahead),
         ("done", words.percent_of(status)),
         ("left", words.left_of(status)),
         ("item", f"{status.item} of {status.items}" if status.items > 1 else ""),
-        ("starts in", lasting(status.time_to_start)),
-        ("ends in", lasting(status.time_to_finish)),
-        ("has run for", lasting(status.execution_time)),
+        ("starts in", words.starts_of(status)),
+        ("ends in", words.ends_of(status)),
+        ("has run for", words.took_of(status)),
+        ("ended", _ended(status)),
         ("setpoints", words.timing_of(timing)),
         ("from", status.submitter),
     ]
+
+
+def _ended(status: "TaskStatus") -> str:
+    from datetime import datetime  # noqa: PLC0415
+
+    from mav_tasks.cli.times import moment_ago, spoken_duration  # noqa: PLC0415
+
+    if status.ended_ago is None:
+        return ""
+    now = datetime.now().astimezone()
+    return (
+        f"{moment_ago(status.ended_ago, now=now)} {now:%Z}, {spoken_duration(status.ended_ago)} ago"
+    )

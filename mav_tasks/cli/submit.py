@@ -163,8 +163,8 @@ async def tell_submitted(
     from mav_tasks.cli import output  # noqa: PLC0415
 
     if not common.json:
-        output.say(f"task {task.id}{hint}")
-        if not is_awaited:  # else each reason is shown as it comes
+        output.say(f"rover {task.vehicle}: task {task.id}{hint}")
+        if not is_awaited:  # who waits sees each reason when it changes
             output.warn(await _why_it_waits(client, task))
     if is_awaited:
         from mav_tasks.cli.follow import follow  # noqa: PLC0415
@@ -176,7 +176,7 @@ async def tell_submitted(
 
         try:
             output.say_json(task_json(await task.refresh()))
-        except ClientError:  # it is there all the same, and its number must not get lost
+        except ClientError:  # the task exists, and its number must not get lost
             output.say_json({"id": task.id, "vehicle": task.vehicle})
 
 
@@ -188,7 +188,7 @@ async def _why_it_waits(client: "Client", task: "Task") -> str:
     try:
         status = await task.refresh()
         queue = await client.queue(vehicle=task.vehicle, limit=0)
-    except ClientError:  # it is there all the same
+    except ClientError:  # the task exists
         return ""
     return words.why_it_waits(status, queue)
 

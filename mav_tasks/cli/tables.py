@@ -1,6 +1,7 @@
-"""Queues and rovers as tables that fit a width."""
+"""Queues, finished tasks and rovers as tables that fit a width."""
 
 from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
 from math import degrees, inf
 from typing import Generic, NamedTuple, TypeVar
 
@@ -10,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mav_tasks.cli import words
-from mav_tasks.cli.times import format_duration
+from mav_tasks.cli.times import format_duration, moment_ago
 from mav_tasks.client.values import QueueStatus, TaskStatus, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskState
 
@@ -24,6 +25,8 @@ STYLES = {
     TaskState.PAUSED: "yellow",
     TaskState.CANCELLING: "yellow",
     TaskState.HELD: "red",
+    TaskState.FAILED: "red",
+    TaskState.EXPIRED: "red",
 }
 
 
@@ -40,23 +43,25 @@ class Column(NamedTuple, Generic[T]):
     is_right: bool = False
 
 
-def _starts(status: TaskStatus) -> str:
-    seconds = status.time_to_start
-    return format_duration(seconds) if seconds and status.is_waiting else ""
+class Row(NamedTuple):
+    """A task of a queue, and why it waits."""
+
+    status: TaskStatus
+    why: str
 
 
-TASK_COLUMNS: tuple[Column[TaskStatus], ...] = (
-    Column("id", lambda s: str(s.id), is_right=True),
-    Column("prio", lambda s: str(s.priority), worth=3, is_right=True),
-    Column("state", words.state_of),
-    Column("label", lambda s: s.label, worth=1, is_words=True),
-    Column("what", words.what_of, is_words=True),
-    Column("why", words.why_of, worth=1, is_words=True),
-    Column("done", words.percent_of, worth=2, is_right=True),
-    Column("left", words.left_of, worth=4, is_right=True),
-    Column("starts in", _starts, worth=5, is_right=True),
-    Column("after", lambda s: str(s.after or ""), worth=6, is_right=True),
-    Column("from", lambda s: s.submitter, worth=7, is_right=True),
+TASK_COLUMNS: tuple[Column[Row], ...] = (
+    Column("id", lambda row: str(row.status.id), is_right=True),
+    Column("prio", lambda row: str(row.status.priority), worth=6, is_right=True),
+    Column("state", lambda row: words.state_of(row.status)),
+    Column("label", lambda row: row.status.label, worth=1, is_words=True),
+    Column("what", lambda row: words.what_of(row.status), is_words=True),
+    Column("why", lambda row: row.why, worth=1, is_words=True),
+    Column("starts in", lambda row: words.starts_of(row.status), worth=2, is_right=True),
+    Column("ends in", lambda row: words.ends_of(row.status), worth=3, is_right=True),
+    Column("done", lambda row: words.percent_of(row.status), worth=4, is_right=True),
+    Column("left", lambda row: words.left_of(row.status), worth=5, is_right=True),
+    Column("from", lambda row: row.status.submitter, worth=7, is_right=True),
 )
 
 
@@ -73,15 +78,36 @@ def queue_table(queue: QueueStatus, *, width: int, rows: int | None = None) -> G
     # in a window that is drawn again each line has its place; elsewhere the way on is not cut off
     parts: list[Text | Table] = [Text(text) if rows is None else _line(text) for text in above]
     if tasks:
-        parts.append(task_table(tasks, width=width))
+        waits = words.waits_of(queue)
+        shown = [Row(each, waits.get(each.id, words.why_of(each))) for each in tasks]
+        styles = {"state": lambda row: STYLES.get(row.status.state, "")}
+        parts.append(_table(TASK_COLUMNS, shown, width, styles=styles))
         if count > len(tasks):
             parts.append(_line(f"and {count - len(tasks)} more"))
     return Group(*parts)
 
 
-def task_table(tasks: Sequence[TaskStatus], *, width: int) -> Table:
-    """Return tasks, one a line, with the columns for which there is room."""
-    return _table(TASK_COLUMNS, tasks, width, styles={"state": lambda s: STYLES.get(s.state, "")})
+def history_table(tasks: Sequence[TaskStatus], *, now: datetime, width: int) -> Table:
+    """Return finished tasks, one a line, with the columns for which there is room.
+
+    ``now`` is of the zone in which times are shown.
+    """
+
+    def ended(status: TaskStatus) -> str:
+        return "" if status.ended_ago is None else moment_ago(status.ended_ago, now=now)
+
+    columns: tuple[Column[TaskStatus], ...] = (
+        Column("id", lambda status: str(status.id), is_right=True),
+        Column("state", words.state_of),
+        Column("label", lambda status: status.label, worth=1, is_words=True),
+        Column("what", words.what_of, is_words=True),
+        Column("why", words.end_of, worth=1, is_words=True),
+        Column(f"ended ({now:%Z})", ended, worth=2, is_right=True),
+        Column("took", words.took_of, worth=3, is_right=True),
+        Column("done", words.percent_of, worth=4, is_right=True),
+        Column("from", lambda status: status.submitter, worth=5, is_right=True),
+    )
+    return _table(columns, tasks, width, styles={"state": lambda s: STYLES.get(s.state, "")})
 
 
 def vehicle_table(vehicles: Sequence[VehicleStatus], *, width: int) -> Table:

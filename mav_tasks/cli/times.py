@@ -50,6 +50,25 @@ def format_duration(seconds: float) -> str:
     return "".join(f"{value}{unit}" for value, unit in parts if value)
 
 
+def spoken_duration(seconds: float) -> str:
+    """Return seconds as they are read, in whole seconds and at most two units: "1 min 20 s"."""
+    minutes, rest = divmod(round(max(seconds, 0.0)), 60)
+    hours, minutes = divmod(minutes, 60)
+    days, hours = divmod(hours, 24)
+    parts = [(days, "d"), (hours, "h"), (minutes, "min"), (rest, "s")]
+    while len(parts) > 1 and not parts[0][0]:
+        del parts[0]
+    return " ".join(f"{value} {unit}" for value, unit in parts[:2] if value or len(parts) == 1)
+
+
+def moment_ago(seconds: float, *, now: datetime) -> str:
+    """Return the time of day so long before ``now``, with the day if that is another one."""
+    moment = now - timedelta(seconds=seconds)
+    if moment.date() == now.date():
+        return moment.strftime("%H:%M:%S")
+    return moment.strftime("%Y-%m-%d %H:%M")
+
+
 def _next(text: str, now: datetime, zone: tzinfo | None) -> datetime | None:
     try:
         hour = time.fromisoformat(text)

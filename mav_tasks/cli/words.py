@@ -1,9 +1,10 @@
 """What a client learns, in words and as JSON. Pure. Angles are degrees here."""
 
+from datetime import datetime, timedelta
 from math import degrees, inf
 from typing import Any
 
-from mav_tasks.cli.times import format_duration
+from mav_tasks.cli.times import format_duration, spoken_duration
 from mav_tasks.client.fleet_view import SILENT_AFTER
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Unit, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
@@ -48,6 +49,43 @@ def why_of(status: TaskStatus) -> str:
     return f"{why}: {says.removesuffix(')')}" if colon else why
 
 
+def waits_of(queue: QueueStatus) -> dict[int, str]:
+    """Return why each waiting task of a queue waits, by the task's id: "behind task 4"."""
+    waits: dict[int, str] = {}
+    before = None if queue.current is None else queue.current.id
+    for status in queue.waiting:
+        is_known = before is not None and status.reason is TaskReason.BEHIND_OTHERS
+        why = f"behind task {before}" if is_known else why_of(status)
+        if status.after and status.reason is TaskReason.DEPENDENCY:
+            why = f"after task {status.after}"
+        elif status.after and status.reason is TaskReason.START_TIME:
+            why = f"{why}, after task {status.after}"
+        waits[status.id] = why
+        if status.state is TaskState.QUEUED:
+            before = status.id
+    return waits
+
+
+def time_of(seconds: float | None) -> str:
+    """Return an expected time from now; None: "unknown"."""
+    return "unknown" if seconds is None else spoken_duration(seconds)
+
+
+def starts_of(status: TaskStatus) -> str:
+    """Return in how long a task starts that waits."""
+    return time_of(status.time_to_start) if status.is_waiting else ""
+
+
+def ends_of(status: TaskStatus) -> str:
+    """Return in how long a task ends that is not over."""
+    return "" if status.is_over else time_of(status.time_to_finish)
+
+
+def took_of(status: TaskStatus) -> str:
+    """Return how long a task was driven; "" if it was not."""
+    return format_duration(status.execution_time) if status.execution_time else ""
+
+
 def way_on_of(status: TaskStatus) -> str:
     """Give what lets it go on, nothing if that is not for the operator to say."""
     is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released, and waits to begin
@@ -57,14 +95,24 @@ def way_on_of(status: TaskStatus) -> str:
 
 
 def line_of(status: TaskStatus) -> str:
-    """Give it in one line."""
-    why = f" ({why_of(status)})" if status.reason else ""
-    took = status.execution_time if status.is_over else None
-    took_words = f", in {format_duration(took)}" if took else ""
+    """Return a task in one line."""
+    why = f" ({end_of(status)})" if end_of(status) else ""
+    took = f", in {took_of(status)}" if status.is_over and took_of(status) else ""
     way_on = f"; {way_on_of(status)}" if way_on_of(status) and not status.is_over else ""
     label = f" '{status.label}'" if status.label else ""
-    what = f"{what_of(status)}{label}"
-    return f"task {status.id}: {what}: {state_of(status)}{why}{took_words}{way_on}"
+    what = f"{name_of(status)}: {what_of(status)}{label}"
+    return f"{what}: {state_of(status)}{why}{took}{way_on}"
+
+
+def name_of(status: TaskStatus) -> str:
+    """Return by what people know a task: "rover 1: task 3"."""
+    return f"rover {status.vehicle}: task {status.id}"
+
+
+def end_of(status: TaskStatus) -> str:
+    """Return why a task is in its state, unless the state says that: "cancelled: cancelled"."""
+    why = why_of(status)
+    return "" if why == state_of(status) else why
 
 
 def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
@@ -78,22 +126,31 @@ def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
     elif queue.paused is not None:
         why = f"the queue is paused ({words_of(queue.paused)})"
         way_on = "to go on: mav-tasks resume"
-    text = f"task {status.id} waits, rover {status.vehicle}: {why}"
+    text = f"{name_of(status)} waits: {why}"
     return f"{text}; {way_on}" if way_on else text
 
 
 def percent_of(status: TaskStatus) -> str:
-    """Give how much of it is done."""
-    return "" if status.progress is None else f"{status.progress * 100:.0f} %"
+    """Return how much of a task is done."""
+    if status.progress is None:
+        return ""
+    percent = f"{status.progress * 100:.0f} %"
+    return f"at least {percent}" if is_of_last_save(status) else percent
 
 
 def left_of(status: TaskStatus) -> str:
-    """Give what is left of it: "1.10 m"."""
+    """Return what is left of a task: "1.10 m"."""
     amount, unit = left(status)
     if amount is None or unit is None or status.is_over:
         return ""
     digits = {"m": 2, "items": 0}.get(unit, 1)
-    return f"{amount:.{digits}f} {unit}"
+    words = f"{amount:.{digits}f} {unit}"
+    return f"at most {words}" if is_of_last_save(status) else words
+
+
+def is_of_last_save(status: TaskStatus) -> bool:
+    """Return whether a task was driven on after its progress was saved, by a server that died."""
+    return status.state is TaskState.HELD and status.reason is TaskReason.OUTCOME_UNKNOWN
 
 
 def left(status: TaskStatus) -> tuple[float | None, str | None]:
@@ -134,6 +191,17 @@ def headline_of(queue: QueueStatus) -> str:
 def counts_of(queue: QueueStatus) -> str:
     """Give how many tasks are in which state."""
     return ", ".join(f"{count} {state.name.lower()}" for state, count in queue.counts.items())
+
+
+def history_json(status: TaskStatus, *, now: datetime) -> dict[str, Any]:
+    """Return a finished task as JSON has it."""
+    ago = status.ended_ago
+    ended_at = None if ago is None else now - timedelta(seconds=ago)
+    return task_json(status) | {
+        "why": end_of(status) or None,
+        "ended_ago": _rounded(ago),
+        "ended_at": None if ended_at is None else ended_at.isoformat(timespec="seconds"),
+    }
 
 
 def task_json(status: TaskStatus) -> dict[str, Any]:
@@ -189,7 +257,8 @@ def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
 
 
 def queue_json(queue: QueueStatus) -> dict[str, Any]:
-    """Give a queue as JSON has it."""
+    """Return a queue as JSON has it."""
+    waits = waits_of(queue)
     return {
         "vehicle": queue.vehicle,
         "running": queue.running,
@@ -201,7 +270,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
         "capacity": queue.capacity,
         "counts": {state.name.lower(): count for state, count in queue.counts.items()},
         "current": None if queue.current is None else task_json(queue.current),
-        "waiting": [task_json(status) for status in queue.waiting],
+        "waiting": [task_json(each) | {"why": waits[each.id] or None} for each in queue.waiting],
     }
 
 

@@ -379,6 +379,13 @@ class Client:
         seen = await self._seen(vehicle, epoch)
         await self._control(vehicle, MavCmd.DO_PAUSE_CONTINUE, RESUME, seen)
 
+    @property
+    def vehicle(self) -> int:
+        """The rover that is meant where a call names none. Raise NoSuchVehicle if it is not there,
+        or if there are several and ``vehicle`` was not given.
+        """
+        return self._which(None)
+
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Give the rovers of the server, as they were heard last."""
         return self._open.session.vehicles(now=self._now)

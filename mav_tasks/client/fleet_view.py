@@ -205,7 +205,7 @@ class FleetView:
 
 def _there_are(ids: Sequence[int]) -> str:
     if not ids:
-        return "there is none"
+        return "the server has no rover"
     if len(ids) == 1:
         return f"there is rover {ids[0]}"
     return f"there are rovers {', '.join(map(str, ids))}"

@@ -47,7 +47,7 @@ class VehicleText:
 
     def __str__(self) -> str:
         part = "" if self.component == AUTOPILOT else f", component {self.component},"
-        return f"vehicle {self.vehicle}{part} says: {self.text}"
+        return f"rover {self.vehicle}{part} says: {self.text}"
 
 
 @dataclass(slots=True)
@@ -130,7 +130,7 @@ class VehicleTexts:
             _say(text)
         for vehicle, talk in self._talks.items():
             if talk.left_out and now >= talk.tell_at:
-                log.warning("vehicle %d says too much: %d texts left out", vehicle, talk.left_out)
+                log.warning("rover %d says too much: %d texts left out", vehicle, talk.left_out)
                 talk.left_out, talk.tell_at = 0, inf
         self._plan()
 

@@ -25,7 +25,7 @@ class TaskSubmitted:
     def __str__(self) -> str:
         task = self.task
         return (
-            f"task {task.id} of vehicle {task.vehicle}: {describe(task.goal)}, "
+            f"rover {task.vehicle}: task {task.id}: {describe(task.goal)}, "
             f"priority {task.priority}, from {task.submitter}"
         )
 
@@ -52,7 +52,9 @@ class TaskChanged:
         why = f": {words_of(self.reason)}" if self.reason else ""
         who = "" if self.actor == SERVER else f", by {self.actor}"
         driven = f"; {self.timing}" if self.timing and self.old is TaskState.EXECUTING else ""
-        return f"task {self.task_id} {self.new.name.lower()}{why}{who}{driven}"
+        return (
+            f"rover {self.vehicle}: task {self.task_id} {self.new.name.lower()}{why}{who}{driven}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +70,7 @@ class TaskAdvanced:
 
     def __str__(self) -> str:
         item = f"item {self.item}, " if self.item > 0 else ""
-        return f"task {self.task_id}: {item}leg {self.progress.leg + 1} begun"
+        return f"rover {self.vehicle}: task {self.task_id}: {item}leg {self.progress.leg + 1} begun"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,8 @@ class TaskProgressed:
     at: float
 
     def __str__(self) -> str:
-        return f"task {self.task_id}: {self.progress.execution_time:.0f} s driven"
+        driven = f"{self.progress.execution_time:.0f} s driven"
+        return f"rover {self.vehicle}: task {self.task_id}: {driven}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +104,8 @@ class StepReached:
 
     def __str__(self) -> str:
         item = f"item {self.item}" if self.item > 0 else "home"
-        return f"task {self.task_id}: {item} {'sent' if self.performs else 'reached'}"
+        done = "sent" if self.performs else "reached"
+        return f"rover {self.vehicle}: task {self.task_id}: {item} {done}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +125,7 @@ class PlanStored:
 
     def __str__(self) -> str:
         what = ("mission", "fence", "rally points")[self.kind]
-        return f"vehicle {self.vehicle}: {what} {self.plan_id or 'cleared'}, by {self.actor}"
+        return f"rover {self.vehicle}: {what} {self.plan_id or 'cleared'}, by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +140,7 @@ class TaskModified:
     at: float
 
     def __str__(self) -> str:
-        return f"task {self.task_id} modified, by {self.actor}"
+        return f"rover {self.vehicle}: task {self.task_id} modified, by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +158,7 @@ class TaskWaits:
 
     def __str__(self) -> str:
         words = f": {self.words}" if self.words else ""
-        return f"task {self.task_id} waits: {words_of(self.reason)}{words}"
+        return f"rover {self.vehicle}: task {self.task_id} waits: {words_of(self.reason)}{words}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +170,7 @@ class TaskWithdrawn:
     at: float
 
     def __str__(self) -> str:
-        return f"task {self.task_id} withdrawn: not stored in time"
+        return f"rover {self.vehicle}: task {self.task_id} withdrawn: not stored in time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +190,8 @@ class SubmissionRefused:
     def __str__(self) -> str:
         what = f"command {self.command}" if self.command > 0 else f"message {-self.command}"
         what = what if self.command else "upload"
-        return f"{what} of {self.actor} refused: {self.text}"
+        rover = f"rover {self.vehicle}: " if self.vehicle else ""
+        return f"{rover}{what} of {self.actor} refused: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,8 +205,8 @@ class QueuePaused:
 
     def __str__(self) -> str:
         if self.reason is TaskReason.STOPPED:
-            return f"STOP of vehicle {self.vehicle} by {self.actor}: nothing runs until continued"
-        return f"queue of vehicle {self.vehicle} paused: {words_of(self.reason)}, by {self.actor}"
+            return f"rover {self.vehicle}: STOP by {self.actor}, nothing runs until continued"
+        return f"rover {self.vehicle}: queue paused: {words_of(self.reason)}, by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +218,7 @@ class QueueContinued:
     at: float
 
     def __str__(self) -> str:
-        return f"queue of vehicle {self.vehicle} continued by {self.actor}"
+        return f"rover {self.vehicle}: queue continued by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +235,7 @@ class VehicleHalted:
     at: float
 
     def __str__(self) -> str:
-        words = f"vehicle {self.vehicle}: halt {self.epoch}, {words_of(self.reason)}"
+        words = f"rover {self.vehicle}: halt {self.epoch}, {words_of(self.reason)}"
         return words if self.actor == SERVER else f"{words}, by {self.actor}"
 
 
@@ -243,7 +248,7 @@ class VehicleIdentified:
     at: float
 
     def __str__(self) -> str:
-        return f"vehicle {self.vehicle}: its unique id is {self.uid}"
+        return f"rover {self.vehicle}: its unique id is {self.uid}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +268,7 @@ class VehicleHomeSet:
     def __str__(self) -> str:
         place = f"{self.latitude_degE7 / 1e7:.7f}, {self.longitude_degE7 / 1e7:.7f}"
         who = "first armed there" if self.actor == SERVER else f"by {self.actor}"
-        return f"vehicle {self.vehicle}: its home is {place}, {who}"
+        return f"rover {self.vehicle}: its home is {place}, {who}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +281,7 @@ class VehicleArmingSet:
 
     def __str__(self) -> str:
         words = "may be armed again" if self.may_arm else "is armed only after a continue"
-        return f"vehicle {self.vehicle} {words}"
+        return f"rover {self.vehicle} {words}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,7 +295,7 @@ class VehicleSpeedSet:
 
     def __str__(self) -> str:
         speed = "as configured" if self.speed is None else f"{self.speed:g} m/s"
-        return f"vehicle {self.vehicle}: default speed {speed}, by {self.actor}"
+        return f"rover {self.vehicle}: default speed {speed}, by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,7 +307,7 @@ class VehicleSeen:
     at: float
 
     def __str__(self) -> str:
-        return f"vehicle {self.vehicle}: {self.text}"
+        return f"rover {self.vehicle}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,7 +319,7 @@ class VehicleNoted:
     at: float
 
     def __str__(self) -> str:
-        return f"vehicle {self.vehicle}: {self.text}"
+        return f"rover {self.vehicle}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,9 +334,9 @@ class ServerStopped:
 
     def __str__(self) -> str:
         if not self.unconfirmed:
-            return "server stopped: no vehicle is being driven"
+            return "server stopped: no rover is being driven"
         names = ", ".join(map(str, self.unconfirmed))
-        return f"server stopped: vehicle {names} told to stop, not yet seen standing in HOLD"
+        return f"server stopped: rover {names} told to stop, not yet seen standing in HOLD"
 
 
 Event = (

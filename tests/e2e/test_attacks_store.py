@@ -57,7 +57,7 @@ def restarted(running: Stand, folder: Path, *options: str) -> Iterator[Process]:
     serve += ["--vehicle", f"udpout:127.0.0.1:{running.rover_port}"]
     serve += ["--store", str(folder / "tasks.sqlite3")]
     with process(*serve, folder=folder, name="second") as server:
-        server.wait_for("vehicle 1: found")
+        server.wait_for("rover 1: found")
         yield server
 
 

@@ -15,7 +15,7 @@ def test_without_a_flag_the_server_finds_the_rover(tmp_path: Path) -> None:
     ):
         sim.wait_for("rover 1 .*14580")
         serve.wait_for("clients on udpin:127.0.0.1:14560")
-        serve.wait_for("vehicle 1: found")
+        serve.wait_for("rover 1: found")
         assert serve.end() < 1.5
         assert serve.popen.returncode == 0
         sim.end()

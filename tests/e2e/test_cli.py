@@ -67,7 +67,7 @@ def test_help_names_every_command_and_the_exit_statuses_and_is_quick() -> None:
     named = {"submit", "status", "queue", "cancel", "clear", "stop", "pause", "resume", "modify"}
     named |= {"release", "vehicles", "mission", "fence", "rally", "serve", "sim", "demo"}
     assert named <= set(commands)
-    for line in ("0  done", "1  a task", "2  wrong usage", "3  no answer"):
+    for line in ("0  done", "1  a task", "2  usage error", "3  no answer"):
         assert line in done.output
     assert "--install-completion" in done.output
 
@@ -152,19 +152,19 @@ def test_a_process_ends_with_the_same_status() -> None:
 def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> None:
     began = mav_tasks("submit", "wait", "60s", "--priority", "8", server=server)
     assert (began.status, began.error) == (0, "")
-    first = int(began.output.removeprefix("task "))
+    first = int(began.output.removeprefix("rover 1: task "))
 
     (waiting,) = called("submit", "move", "-2", "--in", "1h", "--json", server=server).objects
     assert waiting["id"] > first
     assert (waiting["what"], waiting["state"]) == ("move -2 m", "scheduled")
     assert (waiting["left"], waiting["left_unit"], waiting["vehicle"]) == (2.0, "m", 1)
-    assert 3500 < waiting["time_to_start"] <= 3600
+    assert 3500 < waiting["time_to_start"] <= 3620
 
     named = called("modify", str(waiting["id"]), "--label", "dock 3", server=server)
-    assert named.lines == [f"task {waiting['id']} is changed"]
+    assert named.lines == [f"rover 1: task {waiting['id']} is changed"]
 
     changed = called("modify", str(waiting["id"]), "--priority", "9", server=server)
-    assert changed.lines == [f"task {waiting['id']} is changed"]
+    assert changed.lines == [f"rover 1: task {waiting['id']} is changed"]
 
     (queue,) = called("queue", "--json", server=server).objects
     assert (queue["running"], queue["paused"], queue["waiting_count"]) == (first, None, 1)
@@ -184,11 +184,53 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert "label       dock 3" in shown.lines
     assert "why         start time" in shown.lines
 
-    assert called("cancel", "--json", server=server).objects == [{"done": "cancel", "task": first}]
+    assert called("cancel", "--json", server=server).objects == [
+        {"done": "cancel", "task": first, "vehicle": 1}
+    ]
     (gone,) = called("status", str(first), "--json", server=server).objects
     assert gone["state"] in ("cancelling", "cancelled")
-    assert called("clear", server=server).lines == ["all tasks that waited are called off"]
+    assert called("clear", server=server).lines == ["rover 1: all waiting tasks are called off"]
     assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "over")
+
+
+def test_finished_tasks_are_listed_newest_first(server: str, client: SyncClient) -> None:
+    done = client.submit(Wait(0.1))
+    done.done(timeout=20.0)
+    gone = client.submit(Move(1.0), delay=600.0)
+    gone.cancel()
+    last, before = called("history", "--limit", "2", "--json", server=server).objects
+    assert (last["id"], last["state"], last["why"]) == (gone.id, "cancelled", None)
+    assert (before["id"], before["state"]) == (done.id, "completed")
+    assert before["execution_time"] > 0
+    ended = datetime.fromisoformat(before["ended_at"])
+    assert abs((datetime.now(UTC) - ended).total_seconds()) < 60
+
+    headline, names, *rows = called("history", "--limit", "2", server=server).lines
+    assert headline == "rover 1: the last 2 finished tasks"
+    assert names.split()[:3] == ["id", "state", "what"]
+    assert [row.split()[0] for row in rows] == [str(gone.id), str(done.id)]
+    shown = called("status", str(done.id), server=server)
+    assert any(re.match(r"ended       \d\d:\d\d:\d\d .*ago$", line) for line in shown.lines)
+
+
+def test_a_queue_says_when_each_task_runs_and_why_it_waits(server: str, client: SyncClient) -> None:
+    running = client.submit(Wait(60.0))
+    wait_until(lambda: client.queue().running == running.id, within=10, what="a task that runs")
+    behind = client.submit(Wait(30.0))
+    after = client.submit(Wait(1.0), after=behind)
+    (queue,) = called("queue", "--json", server=server).objects
+    first, second = queue["waiting"]
+    assert (first["id"], first["why"]) == (behind.id, f"behind task {running.id}")
+    assert (second["id"], second["why"]) == (after.id, f"after task {behind.id}")
+    assert 55 < first["time_to_start"] < 62
+    assert 28 < first["time_to_finish"] - first["time_to_start"] < 35
+    assert second["time_to_start"] == pytest.approx(first["time_to_finish"], abs=0.1)
+    narrow = mav_tasks("queue", server=server, COLUMNS="40")
+    assert f"behind task {running.id}" in narrow.output
+    client.pause()
+    (queue,) = called("queue", "--json", server=server).objects
+    assert queue["waiting"][0]["time_to_start"] is None
+    assert "unknown" in called("status", str(behind.id), server=server).output
 
 
 def test_each_goal_becomes_what_it_says(server: str, client: SyncClient) -> None:
@@ -252,10 +294,10 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     done = called("submit", "move", "1", server=server)
     assert done.status == 0
     (line,) = done.lines
-    number = line.removeprefix("task ")
+    number = line.removeprefix("rover 1: task ")
     why = {"pause": "operator", "stop": "stopped"}[halt]
     assert done.error == (
-        f"mav-tasks: task {number} waits, rover 1: the queue is paused ({why});"
+        f"mav-tasks: rover 1: task {number} waits: the queue is paused ({why});"
         " to go on: mav-tasks resume\n"
     )
     assert called("submit", "move", "1", "--json", server=server).error == ""
@@ -306,17 +348,18 @@ def test_waiting_tells_each_change_and_ends_as_the_task_does(server: str) -> Non
     done = called("submit", "wait", "0.2s", "--wait", server=server)
     assert done.status == 0
     task = done.lines[0]
+    number = int(task.removeprefix("rover 1: task "))
     told = [line.removeprefix(f"{task}: wait 0.2 s: ") for line in done.lines[1:]]
     assert told[-1].startswith("completed")
     assert "executing" in told
 
     objects = called("submit", "wait", "0.2s", "-w", "--json", server=server).objects
-    assert {each["id"] for each in objects} == {int(task.removeprefix("task ")) + 1}
+    assert {each["id"] for each in objects} == {number + 1}
     assert objects[-1]["state"] == "completed"
     assert objects[-1]["progress"] == 1.0
 
-    late = called("status", task.removeprefix("task "), "--wait", server=server)
-    assert (late.status, late.lines[-1].split(": ")[2].split(",")[0]) == (0, "completed")
+    late = called("status", str(number), "--wait", server=server)
+    assert (late.status, late.lines[-1].split(": ")[3].split(",")[0]) == (0, "completed")
 
 
 def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
@@ -330,14 +373,14 @@ def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
         env=surroundings(server),
     )
     assert waiting.stdout is not None
-    assert (
-        waiting.stdout.readline()
-        == f"task {first.id}: plan of 2 items: queued (queue paused); to go on: mav-tasks resume\n"
+    assert waiting.stdout.readline() == (
+        f"rover 1: task {first.id}: plan of 2 items: queued (queue paused);"
+        " to go on: mav-tasks resume\n"
     )
     client.cancel(first.id)
     output, error = waiting.communicate(timeout=20)
     assert waiting.returncode == 1
-    assert output.startswith(f"task {first.id}: plan of 2 items: cancelled")
+    assert output.startswith(f"rover 1: task {first.id}: plan of 2 items: cancelled")
     assert error.startswith(f"mav-tasks: task {first.id} cancelled")
 
 
@@ -385,7 +428,7 @@ def test_a_mission_goes_up_waits_is_driven_and_comes_back(server: str, tmp_path:
     way = tmp_path / "way.waypoints"
     way.write_text(WAY, encoding="utf-8")
     staged = called("mission", "upload", str(way), "--stage", server=server)
-    assert re.fullmatch(r"task \d+ waits: mav-tasks mission start\n", staged.output)
+    assert re.fullmatch(r"rover 1: task \d+ waits: mav-tasks mission start\n", staged.output)
 
     for name in ("back.waypoints", "back.plan"):
         back = tmp_path / name
@@ -414,13 +457,13 @@ def test_a_mission_is_a_task_with_terms(server: str, client: SyncClient, tmp_pat
     for start in (("--in", "1h"), ("--at", in_an_hour.isoformat())):
         (task,) = called(*upload, *start, server=server).objects
         assert (task["state"], task["priority"], task["items"]) == ("scheduled", 7, 2)
-        assert 3590 < task["time_to_start"] <= 3601
+        assert 3590 < task["time_to_start"] <= 3630  # the second one is behind the first
         assert client.status(task["id"]).state is TaskState.SCHEDULED
     moment = in_an_hour.astimezone().replace(tzinfo=None).isoformat(timespec="minutes")
     late = ("submit", "rotate", "-90", "--at", moment, "--deadline", "2h", "--after")
     (later,) = called(*late, str(task["id"]), "--json", server=server).objects
     assert (later["what"], later["after"]) == ("rotate -90 deg", task["id"])
-    assert 3500 < later["time_to_start"] <= 3601
+    assert 3500 < later["time_to_start"] <= 3630
 
 
 def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(

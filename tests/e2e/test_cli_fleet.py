@@ -1,5 +1,6 @@
 """The command line with two rovers: which of them is meant, and which need not be named."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,8 +22,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         process(*sim, folder=folder, name="rovers"),
         process(*serve, folder=folder, name="server") as running,
     ):
-        running.wait_for("vehicle 1: found")
-        running.wait_for("vehicle 2: found")
+        running.wait_for("rover 1: found")
+        running.wait_for("rover 2: found")
         yield f"udpout:127.0.0.1:{client}"
 
 
@@ -113,13 +114,31 @@ def test_a_silent_rover_keeps_no_other_from_being_paused(tmp_path: Path) -> None
         process(*sim(2), folder=tmp_path, name="second") as second,
         process(*serve, "--store", ":memory:", folder=tmp_path, name="server") as running,
     ):
-        running.wait_for("vehicle 1: found")
-        running.wait_for("vehicle 2: found")
+        running.wait_for("rover 1: found")
+        running.wait_for("rover 2: found")
+        heard = called("ready", server=server)
+        assert (heard.status, heard.lines) == (0, ["ready: the server hears rovers 1, 2"])
         with frozen(second):
-            running.wait_for("vehicle 2: silent")
+            running.wait_for("rover 2: silent")
+            half = called("ready", "--json", server=server)
+            assert half.status == 1
+            assert re.fullmatch(
+                r"mav-tasks: the server answers, but rover 2 is silent for [\d.]+s\n", half.error
+            )
+            assert half.objects[0]["ready"] is False
+            assert [each["heard"] for each in half.objects[0]["rovers"]] == [True, False]
+            one = called("ready", "--vehicle", "1", server=server)
+            assert (one.status, one.lines) == (0, ["ready: the server hears rover 1"])
             done = called("pause", "--all", server=server)
             assert done.status == 1
             assert done.lines == ["rover 1: paused. To go on: mav-tasks resume --vehicle 1"]
             assert done.error.startswith("mav-tasks: rover 2: paused, but")
             headlines = [line for line in called("queue", server=server).lines if "rover" in line]
             assert "rover 2 (silent for" in headlines[1]
+
+
+def test_a_server_that_does_not_answer_is_not_ready() -> None:
+    (nowhere,) = free_udp_ports(1)
+    done = called("ready", "--within", "0.3", server=f"udpout:127.0.0.1:{nowhere}")
+    assert (done.status, done.output) == (3, "")
+    assert "no task server answered" in done.error

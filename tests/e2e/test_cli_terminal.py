@@ -103,9 +103,9 @@ def test_ctrl_c_leaves_the_task_and_says_how_to_call_it_off(
         screen.wait_for(lambda text: "executing" in text)
         screen.type(CTRL_C)
         assert screen.end() == 130
-    number = int(screen.lines[0].removeprefix("task "))
+    number = int(screen.lines[0].removeprefix("rover 1: task "))
     assert screen.lines[-1] == (
-        f"mav-tasks: task {number} goes on; to call it off: mav-tasks cancel {number}"
+        f"mav-tasks: rover 1: task {number} goes on; to call it off: mav-tasks cancel {number}"
     )
     assert "Traceback" not in screen.text
     assert screen.written.rstrip().endswith(str(number).encode())
@@ -151,7 +151,7 @@ def test_who_waits_is_told_of_a_silence(there: Stand, client: SyncClient) -> Non
     with at(there, "status", str(task.id), "--wait") as screen:
         screen.wait_for(lambda text: "queue paused" in text)
         with frozen(there.server):
-            screen.wait_for(lambda text: "nothing is heard" in text)
+            screen.wait_for(lambda text: "rover silent" in text)
         screen.wait_for(lambda text: "queue paused" in text)
         client.resume()
         assert screen.end() == 0

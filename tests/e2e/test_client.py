@@ -270,7 +270,7 @@ async def test_handles_outlive_the_server(
     rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *exact)
     with process(*rover, folder=tmp_path, name="rover"):
         with serve(tmp_path, client_port, rover_port, "first") as server:
-            server.wait_for("vehicle 1: found")
+            server.wait_for("rover 1: found")
             tasks = Client(f"udpout:127.0.0.1:{client_port}")
             tasks.open()
             await tasks.found()
@@ -283,7 +283,7 @@ async def test_handles_outlive_the_server(
                     break
             server.end(number)
         with serve(tmp_path, client_port, rover_port, "second") as server:
-            server.wait_for("vehicle 1: found")
+            server.wait_for("rover 1: found")
             async for status in driving.updates():
                 if status.state is state:
                     break
@@ -309,6 +309,6 @@ async def test_a_server_that_knows_nothing_any_more_says_so(tmp_path: Path) -> N
             ending = asyncio.ensure_future(task.done())
             it.server.end(signal.SIGKILL)
             with serve(tmp_path, it.client_port, it.rover_port, "second") as again:
-                again.wait_for("vehicle 1: found")
+                again.wait_for("rover 1: found")
                 with pytest.raises(TaskFailed, match="does not know it any more"):
                     await ending

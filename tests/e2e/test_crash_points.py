@@ -211,7 +211,7 @@ def running(folder: Path, point: str) -> Any:
     with process(*rover, "--truth", str(truth), folder=folder, name="rover") as rover_process:
         module = ("tests.kit.crashing", point) if ":" in point else ("mav_tasks.cli",)
         with serving(folder, client_port, rover_port, *module, name="first") as server:
-            server.wait_for("vehicle 1: found")
+            server.wait_for("rover 1: found")
             wait_until(truth.exists, within=20, what="the truth file")
             yield Stand(server, rover_process, client_port, rover_port, push_port, truth)
 
@@ -246,7 +246,7 @@ def test_killed_at_any_point(
         stand.close()
         port, rover_port = stand.client_port, stand.rover_port
         with serving(tmp_path, port, rover_port, "mav_tasks.cli", name="second") as server:
-            server.wait_for("vehicle 1: found")
+            server.wait_for("rover 1: found")
             try:
                 check(story, Story(stand, stand.connect()), point, record_property)
             finally:

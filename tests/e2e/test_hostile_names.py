@@ -115,7 +115,7 @@ def test_no_text_from_the_wire_is_a_path(tmp_path: Path) -> None:
             to_clients = ("127.0.0.1", client_port)
             for number in (0, 7, 47, 92, 255):  # / is 47 and \ is 92, should anybody write them so
                 rover.sendto(Encoder(Address(number, 1)).encode(heartbeat()), server)
-            running.wait_for("vehicle 7: found")
+            running.wait_for("rover 7: found")
             ours, theirs = Encoder(Address(255, 190)), Encoder(Address(7, 1))
             client.sendto(ours.encode(heartbeat(8, 6)), to_clients)
             sent = 0
@@ -128,7 +128,7 @@ def test_no_text_from_the_wire_is_a_path(tmp_path: Path) -> None:
                     wait_until(lambda: hears(client, ours, to_clients), within=10, what="an answer")
             move = m.CommandLong(7, 191, 54000, 0, 1.0, 0, 0, 5, 0, 0, 5)
             client.sendto(ours.encode(move), to_clients)
-            running.wait_for("task 1 of vehicle 7")
+            running.wait_for("rover 7: task 1")
             events = opened_by(tmp_path, running, out)
     assert sent > 500
     assert of_canary(events) == []

@@ -115,12 +115,12 @@ def test_what_a_rover_says_is_in_the_log_and_gives_no_orders_to_the_terminal(
             for _ in range(40):
                 talker.sendto(text, server)
             talker.sendto(rover.encode(m.Statustext(7, b"that is all")), server)
-            running.server.wait_for("DEBUG vehicle 42 says: that is all")
+            running.server.wait_for("DEBUG rover 42 says: that is all")
             running.server.end()
-            lines = [line for line in running.server.text.splitlines() if "vehicle 42" in line]
+            lines = [line for line in running.server.text.splitlines() if "rover 42" in line]
     assert [line.split(" ", 1)[1] for line in lines] == [
-        "WARNING vehicle 42 says: PreArm: [31mred ERROR forged",
-        "DEBUG vehicle 42 says: that is all",
+        "WARNING rover 42 says: PreArm: [31mred ERROR forged",
+        "DEBUG rover 42 says: that is all",
     ] + [line.split(" ", 1)[1] for line in lines[2:]]
     assert "\x1b" not in running.server.text
     assert any("more in" in line for line in lines[2:])
@@ -217,7 +217,7 @@ def test_who_has_read_enough_ends_it_quietly(full: Path, follow: tuple[str, ...]
     with begun(full, *follow, stdout=subprocess.PIPE) as it:
         assert it.stdout is not None
         assert it.stderr is not None
-        assert it.stdout.readline().endswith(b" vehicle 1: seen 0\n")
+        assert it.stdout.readline().endswith(b" rover 1: seen 0\n")
         if follow:  # all of it, and then nobody waits for more
             while b"seen 4999" not in it.stdout.readline():
                 pass

@@ -96,13 +96,13 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
         serve += ["--vehicle", f"udpout:127.0.0.1:{port}", "--set", f"vehicles.profiles={known}"]
         serve += ["--set", "rules.loss_failsafe=accept"]
         with process(*serve, folder=tmp_path, name="server") as server:
-            server.wait_for("vehicle 1: found")
+            server.wait_for("rover 1: found")
             stand = Stand(server, server, clients, port, push, tmp_path / "truth.csv")
             client = stand.connect()
             (known / "rover.toml").write_bytes(Path(file).read_bytes())
             server.popen.send_signal(signal.SIGHUP)
             server.wait_for("vehicles.profiles: read again, 1 in force")
-            server.wait_for("vehicle 1: profile of .* is used")
+            server.wait_for("rover 1: profile of .* is used")
             yaw = degrees(truth(tmp_path)[-1]["yaw"])
             submit(client, ROTATE, 90)
             server.wait_for("task 1 completed")

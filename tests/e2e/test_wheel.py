@@ -62,7 +62,7 @@ def serving(python: str, folder: Path, *sim_options: str) -> Iterator[tuple[Proc
         process(*sim, folder=folder, name="sim", python=python) as rover,
         process(*serve, folder=folder, name="serve", python=python) as server,
     ):
-        server.wait_for("vehicle 1: found")
+        server.wait_for("rover 1: found")
         yield rover, f"udpout:127.0.0.1:{client_port}"
 
 

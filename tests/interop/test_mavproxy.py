@@ -61,7 +61,7 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
         it.ask("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^ARMED")
         assert it.ask("long 54000 20 0 0 0 0 0 nan", TASK_SHOWN % 54000)[1] == "1"
-        running.server.wait_for("task 1 of vehicle 1: move 20 m, priority 5")
+        running.server.wait_for("rover 1: task 1: move 20 m, priority 5")
         wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
         it.ask("long 54003", TASK_SHOWN % 54003)
         running.server.wait_for("task 1 killed: stop")
@@ -74,7 +74,7 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
             assert place(running) == pytest.approx((2.0, 0.0), abs=0.4)
         lat, lon = PLACES[1]
         it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
-        running.server.wait_for(r"task (\d) of vehicle 1: go to(.|\n)*task \1 executing")
+        running.server.wait_for(r"rover 1: task (\d): go to(.|\n)*task \1 executing")
         it.ask("disarm", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^DISARMED")
         assert it.complaints(but="fence breach") == []

@@ -52,7 +52,7 @@ def test_with_our_dialect_each_request_tells_its_task(
         assert "goto [(0, 2)]" in said
         mission = re.search(r"mission (\d+)$", said, re.MULTILINE)
         assert mission is not None, said
-        assert f"vehicle 1: mission {mission[1]}, by" in log
+        assert f"rover 1: mission {mission[1]}, by" in log
         assert "task 1 completed" in log
         for goal in ("move", "go to"):
             assert log.count(f" of vehicle 1: {goal}") == 1, "sent again, it is the same task"

@@ -240,7 +240,7 @@ def test_the_same_bytes_again_do_nothing_not_even_after_sigkill(
     rover += ["--noise", "off"]  # exact arithmetic
     with process(*rover, folder=tmp_path, name="rover"):
         with process(*serve, folder=tmp_path, name="first") as first:
-            first.wait_for("vehicle 1: found")
+            first.wait_for("rover 1: found")
             client = Signing(port, secrets["py"])
             client.hello()
             task = submit(client.link, TASK_MOVE, 30.0)
@@ -248,7 +248,7 @@ def test_the_same_bytes_again_do_nothing_not_even_after_sigkill(
             assert not is_heard(raw, port)
             first.end(signal.SIGKILL)
         with process(*serve, folder=tmp_path, name="second") as second:
-            second.wait_for("vehicle 1: found")
+            second.wait_for("rover 1: found")
             assert not is_heard(raw, port)
             client.hello()  # whose time goes on
             again = command_long(client.link, TASK_MOVE, 0.1)
@@ -348,7 +348,7 @@ def test_a_pymavlink_rover_believes_every_setpoint(tmp_path: Path) -> None:
     serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}?key=r1"]
     with process(*serve, folder=tmp_path, name="server") as server:
         server.wait_for("signed only, key r1, waiting for the first heartbeat")
-        rover.live(15, until=lambda: "vehicle 1: found" in server.text)
+        rover.live(15, until=lambda: "rover 1: found" in server.text)
         rover.live(2)
         client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=255)
         client.mav.heartbeat_send(6, 8, 0, 0, 4)

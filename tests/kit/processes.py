@@ -210,7 +210,7 @@ def stand(
         way(rover_port) as url,
         process(*serve, "--vehicle", url, folder=folder, name="server") as server_process,
     ):
-        server_process.wait_for("vehicle 1: found")
+        server_process.wait_for("rover 1: found")
         wait_until(truth.exists, within=START_LIMIT, what="the truth file")
         it = Stand(server_process, rover_process, client_port, rover_port, push_port, truth)
         try:

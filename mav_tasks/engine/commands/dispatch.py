@@ -328,7 +328,7 @@ class Commands:
         if silent:
             result, param2 = MavResult.FAILED, int(R.VEHICLE_SILENT)
             words = ", ".join(map(str, silent))
-            client.tell(f"STOP kept: vehicle {words} silent", MavSeverity.ERROR, source, now=now)
+            client.tell(f"STOP kept: rover {words} silent", MavSeverity.ERROR, source, now=now)
         else:
             result, param2 = MavResult.ACCEPTED, next((k for k in killed if k), 0)
         if is_to_clear and not clear and client.may_be_refused(now=now):
@@ -351,7 +351,7 @@ class Commands:
         self._submissions.held(vehicle, asked.submitter)
         paused = vehicle.joint.pause(actor=asked.actor, now=now)
         if not vehicle.is_heard(now=now):  # paused all the same
-            words = f"paused, but vehicle {vehicle.system_id} is silent"
+            words = f"paused, but rover {vehicle.system_id} is silent"
             raise Rejection(R.VEHICLE_SILENT, words)
         return paused
 

@@ -102,6 +102,6 @@ def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -
     else:
         reason = int(R.VEHICLE_SILENT)
         answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
-        words = f"command {command}: no answer from vehicle {vehicle.system_id}"
+        words = f"command {command}: no answer from rover {vehicle.system_id}"
         client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
     client.answer(answer, asker.source)

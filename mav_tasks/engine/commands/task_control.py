@@ -148,7 +148,7 @@ class TaskControl:
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         if task.vehicle != asked.vehicle.system_id:
-            raise Rejection(R.NOT_FOUND, f"task {task_id} is one of vehicle {task.vehicle}")
+            raise Rejection(R.NOT_FOUND, f"task {task_id} is one of rover {task.vehicle}")
         if task.state in TERMINAL:
             raise Rejection(R.WRONG_STATE, f"task {task_id} is over, {_words(task)}")
         return task

@@ -1,7 +1,8 @@
-"""Queues as tables of any width and height, and tasks in words."""
+"""Queues and finished tasks as tables of any width and height, and tasks in words."""
 
 import io
 from dataclasses import replace
+from datetime import datetime, timedelta, timezone
 from math import inf, pi
 
 import pytest
@@ -9,7 +10,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from mav_tasks.cli import words
-from mav_tasks.cli.tables import queue_table, vehicle_table
+from mav_tasks.cli.tables import history_table, queue_table, vehicle_table
 from mav_tasks.client.values import QueueStatus, TaskStatus, Unit, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
@@ -47,6 +48,7 @@ WAITING = replace(
     unit=Unit.METRES,
     position=0,
     time_to_start=75.0,
+    time_to_finish=82.0,
     after=12,
 )
 QUEUE = QueueStatus(
@@ -74,28 +76,115 @@ def drawn(queue: QueueStatus, *, width: int, rows: int | None = None) -> list[st
     return [line.rstrip() for line in captured.get().splitlines()]
 
 
-def test_a_wide_window_shows_all_that_there_is() -> None:
-    table = [
+def test_a_terminal_of_80_columns_shows_why_each_task_waits_and_when_it_runs() -> None:
+    lines = [
         "rover 1: task 12 executing; 1 waiting",
         "1 queued, 1 executing",
-        "id  prio  state      what           why            done      left  starts in  after",
-        "12     8  executing  rotate 90 deg                 45 %  45.0 deg",
-        "13     8  queued     move 2 m       behind others   0 %    1.20 m      1m15s     12",
+        "id  prio  state      what           why              starts in     ends in  done",
+        "12     8  executing  rotate 90 deg                                     2 s  45 %",
+        "13     8  queued     move 2 m       behind task 12  1 min 15 s  1 min 22 s   0 %",
     ]
-    assert drawn(QUEUE, width=90) == table
+    assert drawn(QUEUE, width=80) == lines
     wider = drawn(QUEUE, width=120)
-    assert [line[:84].rstrip() for line in wider] == table
-    assert [line[84:].strip() for line in wider[2:]] == ["from", "244/190", "244/190"]
+    assert [line.split()[0] for line in wider[2:]] == ["id", "12", "13"]
+    for name in ("left", "from"):
+        assert name in wider[2].split()
 
 
 def test_a_narrow_window_shows_what_matters_most() -> None:
-    assert drawn(QUEUE, width=40) == [
+    assert drawn(QUEUE, width=44) == [
         "rover 1: task 12 executing; 1 waiting",
         "1 queued, 1 executing",
         "id  state      what           why",
         "12  executing  rotate 90 deg",
-        "13  queued     move 2 m       behind ot…",
+        "13  queued     move 2 m       behind task 12",
     ]
+
+
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_no_id_is_cut_off(width: int) -> None:
+    ids = [1_053_687_421, 1_053_687_422]
+    tasks = [replace(WAITING, id=number, state=TaskState.SCHEDULED) for number in ids]
+    lines = drawn(replace(QUEUE, waiting=tuple(tasks)), width=width)
+    assert max(map(cell_len, lines)) <= width
+    assert [line.split()[0] for line in lines[4:]] == [str(number) for number in ids]
+
+
+WAITS = {
+    13: (TaskState.QUEUED, TaskReason.BEHIND_OTHERS, 0, "behind task 12"),
+    14: (TaskState.QUEUED, TaskReason.BEHIND_OTHERS, 0, "behind task 13"),
+    15: (TaskState.BLOCKED, TaskReason.DEPENDENCY, 13, "after task 13"),
+    16: (TaskState.SCHEDULED, TaskReason.START_TIME, 0, "start time"),
+    17: (TaskState.SCHEDULED, TaskReason.START_TIME, 14, "start time, after task 14"),
+    18: (TaskState.BLOCKED, TaskReason.WAITING_FOR_START, 0, "waiting for start"),
+    19: (TaskState.QUEUED, TaskReason.DISARMED, 0, "disarmed"),
+}
+
+
+def test_each_waiting_task_says_why_it_waits() -> None:
+    tasks = [
+        replace(WAITING, id=number, state=state, reason=reason, after=after, words="wait 1 s: x")
+        for number, (state, reason, after, _) in WAITS.items()
+    ]
+    queue = replace(QUEUE, waiting=tuple(tasks))
+    assert words.waits_of(queue) == {number: each[3] for number, each in WAITS.items()}
+    shown = words.queue_json(queue)["waiting"]
+    assert [each["why"] for each in shown] == [each[3] for each in WAITS.values()]
+
+
+def test_a_time_that_nobody_knows_is_unknown() -> None:
+    paused = replace(WAITING, time_to_start=None, time_to_finish=None)
+    line = drawn(replace(QUEUE, waiting=(paused,)), width=80)[-1]
+    assert line.split()[-8:-4] == ["task", "12", "unknown", "unknown"]
+
+
+def test_what_was_saved_before_a_crash_is_a_bound() -> None:
+    held = replace(HELD, reason=TaskReason.OUTCOME_UNKNOWN, progress=0.57)
+    assert words.percent_of(held) == "at least 57 %"
+    assert words.left_of(held) == "at most 45.0 deg"
+    assert words.percent_of(HELD) == "45 %"
+
+
+NOW = datetime(2026, 11, 24, 14, 3, 12, tzinfo=timezone(timedelta(hours=1), "CET"))
+DONE = replace(
+    RUNNING,
+    state=TaskState.COMPLETED,
+    words="rotate 90 deg: completed",
+    progress=1.0,
+    time_to_finish=None,
+    execution_time=12.34,
+    ended_ago=72.0,
+)
+CANCELLED = replace(
+    DONE,
+    id=9,
+    state=TaskState.CANCELLED,
+    reason=TaskReason.CANCELLED,
+    words="move 2 m: cancelled (cancelled)",
+    progress=0.0,
+    execution_time=None,
+    ended_ago=86_400.0,
+)
+STUCK = replace(DONE, id=8, state=TaskState.FAILED, reason=TaskReason.STUCK, ended_ago=None)
+
+
+def test_finished_tasks_say_how_and_when_they_ended() -> None:
+    console = Console(file=io.StringIO(), width=80, color_system=None)
+    with console.capture() as captured:
+        console.print(history_table([DONE, CANCELLED, STUCK], now=NOW, width=80))
+    assert [line.rstrip() for line in captured.get().splitlines()] == [
+        "id  state      what           why         ended (CET)   took   done     from",
+        "12  completed  rotate 90 deg                 14:02:00  12.3s  100 %  244/190",
+        " 9  cancelled  move 2 m              2026-11-23 14:03           0 %  244/190",
+        " 8  failed     rotate 90 deg  stuck                    12.3s  100 %  244/190",
+    ]
+
+
+def test_a_finished_task_as_json_has_the_moment_of_its_end() -> None:
+    done = words.history_json(DONE, now=NOW)
+    assert (done["ended_ago"], done["ended_at"]) == (72.0, "2026-11-24T14:02:00+01:00")
+    assert (done["state"], done["why"]) == ("completed", None)
+    assert words.history_json(STUCK, now=NOW)["ended_at"] is None
 
 
 @pytest.mark.parametrize("width", [20, 27, 40, 57, 80, 133])
@@ -138,9 +227,9 @@ def test_the_first_line_says_what_is_in_the_way_and_what_to_do(
 
 
 def test_a_task_in_one_line_says_what_it_is_and_why_it_ended() -> None:
-    assert words.line_of(WAITING) == "task 13: move 2 m: queued (behind others)"
+    assert words.line_of(WAITING) == "rover 1: task 13: move 2 m: queued (behind others)"
     stuck = replace(RUNNING, state=TaskState.FAILED, reason=TaskReason.STUCK, execution_time=12.34)
-    assert words.line_of(stuck) == "task 12: rotate 90 deg: failed (stuck), in 12.3s"
+    assert words.line_of(stuck) == "rover 1: task 12: rotate 90 deg: failed (stuck), in 12.3s"
 
 
 def test_why_it_waits_has_the_rovers_own_words() -> None:
@@ -164,24 +253,24 @@ def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     [
         (
             replace(WAITING, reason=TaskReason.RESTARTED),
-            "task 13: move 2 m: queued (restarted); to go on: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (restarted); to go on: mav-tasks resume",
         ),
         (
             replace(WAITING, reason=TaskReason.QUEUE_PAUSED),
-            "task 13: move 2 m: queued (queue paused); to go on: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (queue paused); to go on: mav-tasks resume",
         ),
         (
             replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.TAKEOVER),
-            "task 12: rotate 90 deg: paused (takeover); to go on: mav-tasks resume",
+            "rover 1: task 12: rotate 90 deg: paused (takeover); to go on: mav-tasks resume",
         ),
         (
             replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.PREEMPTED),
-            "task 12: rotate 90 deg: paused (preempted)",
+            "rover 1: task 12: rotate 90 deg: paused (preempted)",
         ),
         (
             HELD,
             (
-                "task 12: rotate 90 deg: held (off track); "
+                "rover 1: task 12: rotate 90 deg: held (off track); "
                 "decide: mav-tasks release 12 again|remainder|skip"
             ),
         ),
@@ -213,7 +302,7 @@ def test_json_has_degrees_names_and_nulls() -> None:
     waiting = words.task_json(WAITING)
     assert (waiting["reason"], waiting["left"], waiting["after"]) == ("behind_others", 1.2, 12)
     assert words.queue_json(QUEUE)["current"] == task
-    assert words.queue_json(QUEUE)["waiting"] == [waiting]
+    assert words.queue_json(QUEUE)["waiting"] == [waiting | {"why": "behind task 12"}]
     assert words.queue_json(replace(QUEUE, paused=TaskReason.TAKEOVER))["paused"] == "takeover"
 
 
@@ -273,7 +362,7 @@ NEW = replace(WAITING, reason=TaskReason.QUEUE_PAUSED, words="move 2 m: queued (
 def test_a_new_task_that_does_not_run_says_why(
     status: TaskStatus, queue: QueueStatus, said: str
 ) -> None:
-    expected = f"task 13 waits, rover 1: {said}" if said else ""
+    expected = f"rover 1: task 13 waits: {said}" if said else ""
     assert words.why_it_waits(status, queue) == expected
 
 

@@ -5,7 +5,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from mav_tasks.cli.times import format_duration, parse_duration, parse_moment
+from mav_tasks.cli.times import format_duration, parse_duration, parse_moment, spoken_duration
 from mav_tasks.errors import UsageError
 
 EAST = timezone(timedelta(hours=2))
@@ -130,3 +130,21 @@ def test_the_next_half_past_two_is_that_of_the_clock_on_the_wall() -> None:
 def test_what_is_no_time_to_come_is_named(text: str, why: str) -> None:
     with pytest.raises(UsageError, match=f"--at {text}.*{why}"):
         parse_moment("--at", text, now=NOW, zone=EAST)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (-3.0, "0 s"),
+        (0.4, "0 s"),
+        (59.4, "59 s"),
+        (59.6, "1 min"),
+        (80.0, "1 min 20 s"),
+        (3600.0, "1 h"),
+        (7530.0, "2 h 5 min"),
+        (86_400.0 + 59, "1 d"),
+        (3 * 86_400.0 + 4 * 3600 + 59, "3 d 4 h"),
+    ],
+)
+def test_a_duration_is_read_in_two_units_at_most(seconds: float, words: str) -> None:
+    assert spoken_duration(seconds) == words

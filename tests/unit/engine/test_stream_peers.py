@@ -154,7 +154,7 @@ def test_a_vehicle_that_is_gone_may_be_back_at_once_from_anywhere(rig: Rig) -> N
     rig.peer("v", NEW, up=True)
     rig.now = 0.2
     rig.rover(NEW, seq=1)
-    assert "vehicle 1: is at ('10.0.0.1', 2) now" in " ".join(map(str, rig.engine.take_events()))
+    assert "rover 1: is at ('10.0.0.1', 2) now" in " ".join(map(str, rig.engine.take_events()))
     sent = rig.passes(2.0)
     assert 0 in ids(sent, "v", NEW)
     assert ids(sent, "v", OLD) == []

@@ -45,7 +45,7 @@ def test_a_text_is_said_with_its_severity(
         texts.took_in(Packets("rovers", [(PEER, packet("PreArm: x", severity))]), now=1.0)
         (line,) = said(caplog)
         level, _, words = line.partition(" ")
-        assert words == "vehicle 1 says: PreArm: x"
+        assert words == "rover 1 says: PreArm: x"
         levels.append(level)
     assert levels == ["ERROR"] * 4 + ["WARNING", "INFO", "INFO", "DEBUG"]
 
@@ -56,7 +56,7 @@ def test_other_components_are_named_and_clients_are_not_heard(
     gimbal = Encoder(Address(1, 154))
     texts.took_in(Packets("clients", [(PEER, packet("no"))]), now=1.0)
     texts.took_in(Packets("rovers", [(PEER, packet("hot", encoder=gimbal))]), now=1.0)
-    assert said(caplog) == ["WARNING vehicle 1, component 154, says: hot"]
+    assert said(caplog) == ["WARNING rover 1, component 154, says: hot"]
 
 
 def test_texts_are_found_beside_other_packets_and_in_mavlink_1(
@@ -70,7 +70,7 @@ def test_texts_are_found_beside_other_packets_and_in_mavlink_1(
     broken = packet("broken")[:-1] + b"?"
     texts.took_in(Packets("rovers", [(PEER, beat + packet("new") + beat)]), now=1.0)
     texts.took_in(Packets("rovers", [(PEER, old), (PEER, broken), (PEER, b"\xfd\0\0")]), now=1.0)
-    assert said(caplog) == ["WARNING vehicle 1 says: new", "ERROR vehicle 1 says: old"]
+    assert said(caplog) == ["WARNING rover 1 says: new", "ERROR rover 1 says: old"]
 
 
 def test_on_a_stream_a_text_may_be_cut_anywhere(
@@ -82,7 +82,7 @@ def test_on_a_stream_a_text_may_be_cut_anywhere(
         texts.took_in(PeerChanged("line", PEER, up=True), now=now)
         texts.took_in(Packets("line", [(PEER, data[:at])]), now=now)
         texts.took_in(Packets("line", [(PEER, data[at:])]), now=now + 0.1)
-        assert said(caplog) == ["WARNING vehicle 1 says: one", "WARNING vehicle 1 says: two"]
+        assert said(caplog) == ["WARNING rover 1 says: one", "WARNING rover 1 says: two"]
 
 
 def test_a_long_text_is_one_line_and_a_part_is_said_when_the_rest_does_not_come(
@@ -90,15 +90,15 @@ def test_a_long_text_is_one_line_and_a_part_is_said_when_the_rest_does_not_come(
 ) -> None:
     parts = [ROVER.encode(each) for each in chunks(MavSeverity.ERROR, "a" * 80, text_id=5)]
     texts.took_in(Packets("rovers", [(PEER, part) for part in parts]), now=1.0)
-    assert said(caplog) == [f"ERROR vehicle 1 says: {'a' * 80}"]
+    assert said(caplog) == [f"ERROR rover 1 says: {'a' * 80}"]
     texts.took_in(Packets("rovers", [(PEER, parts[0])]), now=2.0)
     texts.took_in(None, now=3.0)
     assert said(caplog) == []
     texts.took_in(None, now=10.0)
-    assert said(caplog) == [f"ERROR vehicle 1 says: {'a' * 50}[…]"]
+    assert said(caplog) == [f"ERROR rover 1 says: {'a' * 50}[…]"]
     texts.took_in(Packets("rovers", [(PEER, parts[0])]), now=11.0)
     texts.close()
-    assert said(caplog) == [f"ERROR vehicle 1 says: {'a' * 50}[…]"]
+    assert said(caplog) == [f"ERROR rover 1 says: {'a' * 50}[…]"]
 
 
 def test_a_text_gives_no_orders_to_a_terminal(
@@ -106,7 +106,7 @@ def test_a_text_gives_no_orders_to_a_terminal(
 ) -> None:
     words = "a\x1b[2J\nERROR forged\r\x07"
     texts.took_in(Packets("rovers", [(PEER, packet(words)), (PEER, packet(" \n"))]), now=1.0)
-    assert said(caplog) == ["WARNING vehicle 1 says: a[2J ERROR forged"]
+    assert said(caplog) == ["WARNING rover 1 says: a[2J ERROR forged"]
 
 
 def test_a_thousand_texts_a_second_are_counted(
@@ -119,8 +119,8 @@ def test_a_thousand_texts_a_second_are_counted(
     assert shown <= BURST + RATE * 10 + 1
     other = Encoder(Address(2, 1))
     texts.took_in(Packets("rovers", [(PEER, packet("me", encoder=other))]), now=11.0)
-    assert said(caplog) == ["WARNING vehicle 2 says: me"]
+    assert said(caplog) == ["WARNING rover 2 says: me"]
     texts.took_in(None, now=2.0 + TELL)
-    assert said(caplog) == [f"WARNING vehicle 1 says too much: {10_000 - shown} texts left out"]
+    assert said(caplog) == [f"WARNING rover 1 says too much: {10_000 - shown} texts left out"]
     texts.took_in(None, now=100.0)
     assert said(caplog) == []

@@ -89,7 +89,7 @@ def test_a_whole_record_is_replayed_and_its_events_are_shown(whole: Path) -> Non
     code, words = said(whole)
     assert code == 0
     first, *_, last = words.splitlines()
-    assert first == "2025-11-21T12:00:01.001000Z vehicle 1: found (ardupilot)"
+    assert first == "2025-11-21T12:00:01.001000Z rover 1: found (ardupilot)"
     assert last.startswith("same: ")
     assert said(whole, "--quiet") == (0, last + "\n")
     assert whole.stat().st_mode & 0o777 == 0o600
@@ -105,7 +105,7 @@ def test_json_is_one_object_a_line(whole: Path) -> None:
         "now": now,
         "time": "2025-11-21T12:00:01.001Z",
         "level": "info",
-        "message": "vehicle 1: found (ardupilot)",
+        "message": "rover 1: found (ardupilot)",
         "event": "VehicleSeen",
         "vehicle": 1,
         "text": "found (ardupilot)",

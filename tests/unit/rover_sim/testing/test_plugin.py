@@ -52,7 +52,7 @@ def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
             "tasks:",
             "     1 of rover 1: move 2 m: completed",
             "journal:",
-            "*task 1 of vehicle 1: move 2 m, priority 5, from *",
+            "*rover 1: task 1: move 2 m, priority 5, from *",
             "*task 1 completed; * setpoints at 20 Hz: p50 50.0, p99 50.0, max 50.0 ms, 0 late",
             "texts:",
             "* s  1/191  Task 1 done",
@@ -311,7 +311,7 @@ def test_code_with_a_socket_of_its_own_has_real_processes(
     result = pytester.runpytest_subprocess(*PLUGIN)  # pymavlink loads numpy, which cannot be undone
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["*- simulated rover -*", "seed *", "rover_sim:", "mav_tasks.cli:"])
-    result.stdout.fnmatch_lines(["*vehicle 2: found*"])
+    result.stdout.fnmatch_lines(["*rover 2: found*"])
 
 
 def test_every_fixture_does_its_part(pytester: pytest.Pytester) -> None:

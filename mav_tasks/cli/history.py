@@ -1,0 +1,56 @@
+"""``mav-tasks history``: the tasks that are over."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from mav_tasks.client.values import TaskStatus
+
+
+@command
+async def history(
+    common: Common,
+    limit: Annotated[
+        int, typer.Option(min=1, metavar="NUMBER", help="Show so many tasks of each rover.")
+    ] = 20,
+) -> None:
+    """List finished tasks, newest first.
+
+    Of every rover, unless one is named. 'mav-tasks log' has all that happened.
+    """
+    from datetime import datetime  # noqa: PLC0415
+
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+
+    async with opened(common) as client:
+        rovers = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
+        found = {rover: await client.history(vehicle=rover, limit=limit) for rover in rovers}
+    now = datetime.now().astimezone()
+    for rover, tasks in found.items():
+        _show(rover, tasks, now=now, as_json=common.json)
+
+
+def _show(rover: int, tasks: "tuple[TaskStatus, ...]", *, now: "datetime", as_json: bool) -> None:
+    from mav_tasks.cli import output, words  # noqa: PLC0415
+
+    if as_json:
+        for each in tasks:
+            output.say_json(words.history_json(each, now=now))
+        return
+    from mav_tasks.cli.tables import history_table  # noqa: PLC0415
+
+    output.say(f"rover {rover}: {_headline(len(tasks))}")
+    if tasks:
+        output.show(history_table(tasks, now=now, width=output.console().width))
+
+
+def _headline(count: int) -> str:
+    if not count:
+        return "no finished task"
+    return "the last finished task" if count == 1 else f"the last {count} finished tasks"

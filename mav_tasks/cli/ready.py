@@ -1,0 +1,50 @@
+"""``mav-tasks ready``: the health check of a server, for a service manager or a container."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mav_tasks.cli.command import command
+from mav_tasks.cli.options import Common
+
+if TYPE_CHECKING:
+    from mav_tasks.client.values import VehicleStatus
+
+WITHIN = 2.0  # s
+
+
+@command
+async def ready(
+    common: Common,
+    wait_for: Annotated[
+        float, typer.Option("--within", min=0.1, metavar="SECONDS", help="For the answer.")
+    ] = WITHIN,
+) -> None:
+    """Check that the server answers and that it hears its rovers.
+
+    Exit status 0: it does; 1: a rover is silent; 3: no answer from a server.
+    """
+    from mav_tasks.cli import output, words  # noqa: PLC0415
+    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.errors import Refused  # noqa: PLC0415
+
+    async with opened(replace(common, timeout=wait_for)) as client:
+        rovers = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
+    silent = [_silence(each) for each in rovers if not each.is_heard]
+    if common.json:
+        is_ready = bool(rovers) and not silent
+        output.say_json(
+            {"ready": is_ready, "rovers": [words.vehicle_json(each) for each in rovers]}
+        )
+    if silent:
+        raise Refused(f"the server answers, but {', '.join(silent)}", result=0, reason=0)
+    if not common.json:
+        ids = ", ".join(str(each.id) for each in rovers)
+        output.say(f"ready: the server hears rover{'s' if len(rovers) > 1 else ''} {ids}")
+
+
+def _silence(rover: "VehicleStatus") -> str:
+    from mav_tasks.cli import words  # noqa: PLC0415
+
+    return f"rover {rover.id} is {words.silence_of(rover.heartbeat_age) or 'silent'}"
