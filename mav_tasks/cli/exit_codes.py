@@ -43,9 +43,8 @@ def tell(error: BaseException) -> int:
             _let_go_of_output()
             return READER_GONE
         case NoAnswer(nonce=nonce) if nonce:
-            _say(
-                f"{error}; the task may exist: repeat with --nonce {nonce}, and it is added only once"
-            )
+            again = f"repeat with --nonce {nonce}, and it is added only once"
+            _say(f"{error}; the task may exist: {again}")
         case NoSuchVehicle():
             _say(f"{error} (--vehicle N)")
         case _:

@@ -33,10 +33,8 @@ async def ready(
         rovers = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
     silent = [_silence(each) for each in rovers if not each.is_heard]
     if common.json:
-        is_ready = bool(rovers) and not silent
-        output.say_json(
-            {"ready": is_ready, "rovers": [words.vehicle_json(each) for each in rovers]}
-        )
+        shown = [words.vehicle_json(each) for each in rovers]
+        output.say_json({"ready": not silent, "rovers": shown})
     if silent:
         raise Refused(f"the server answers, but {', '.join(silent)}", result=0, reason=0)
     if not common.json:
