@@ -29,4 +29,4 @@ def test_several_rovers_are_all_found(tmp_path: Path) -> None:
         process("-m", "mav_tasks.cli", "serve", folder=tmp_path, name="serve") as serve,
     ):
         for number in (1, 2, 3):
-            serve.wait_for(f"vehicle {number}: found")
+            serve.wait_for(f"rover {number}: found")

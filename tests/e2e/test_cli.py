@@ -268,6 +268,9 @@ def test_after_a_restart_of_the_rover_it_is_said_how_to_go_on_and_that_works(
 ) -> None:
     with stand(tmp_path) as there, SyncClient(f"udpout:127.0.0.1:{there.client_port}") as client:
         server = f"udpout:127.0.0.1:{there.client_port}"
+        # a rover shows its restart by a clock that goes back: so it must have been up for longer
+        # than it takes to start
+        client.submit(Wait(4.0)).done(timeout=30.0)
         task = client.submit(Move(1.0))
         wait_until(lambda: there.speed() > 0.3, within=15, what="the rover at speed")
         there.rover.popen.kill()
