@@ -10,12 +10,12 @@ from mav_tasks.engine.inputs import KeysChanged, LinkSide, Outgoing, Packets, Sh
 from mav_tasks.links.memory import MemoryLink, MemoryNet
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.observer import EngineObserver
 from mav_tasks.pump import Pump
 from mav_tasks.runner import TAKES_ALL, link_changed
 from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore, Store
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.witness import Witness
 
 CLIENT_LINK = "server:clients"
 VEHICLE_LINK = "server:vehicles"
@@ -32,7 +32,7 @@ class InMemoryServer:
         settings: Settings | None = None,
         store: Store | None = None,
         restored: Restored | None = None,
-        witnesses: Sequence[Witness] = (),
+        observers: Sequence[EngineObserver] = (),
         wall_offset: float | None = None,  # UTC less the caller's time, s; None: not known
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: tuple[Key, ...] | None = None,
@@ -41,7 +41,7 @@ class InMemoryServer:
         """``policies`` by CLIENT_LINK and VEHICLE_LINK; ``keys`` None: there is no key ring."""
         self.engine = Engine(settings or Settings(), now=now, restored=restored)
         self.store = store or MemoryStore()
-        self.pump = Pump(self.engine, self.store, self._send, witnesses=witnesses)
+        self.pump = Pump(self.engine, self.store, self._send, observers=observers)
         clients = net.link(CLIENT_LINK)
         towards = net.link(VEHICLE_LINK, peers=vehicles)
         self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, towards)}
@@ -55,7 +55,7 @@ class InMemoryServer:
         self.pump.turn(now=now)
 
     def next_deadline(self) -> float | None:
-        """Give when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` has something to do, unless something arrives before."""
         return None if self.pump.is_over else self.engine.next_deadline()
 
     def turn(self, *, now: float) -> None:

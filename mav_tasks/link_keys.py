@@ -2,7 +2,7 @@
 
 from mav_tasks.errors import InsecureLinkError, KeyRingError, UsageError
 from mav_tasks.key_ring.ring import KeyRing
-from mav_tasks.links.asked import AskedLink, links_of
+from mav_tasks.links.config_check import ConfiguredLink, links_of
 from mav_tasks.links.policy import MEANT, is_nearby
 from mav_tasks.settings import Links
 
@@ -24,7 +24,7 @@ def check_keys(links: Links, ring: KeyRing | None, *, where: str) -> None:
             )
 
 
-def _check_key(link: AskedLink, ring: KeyRing, where: str) -> None:
+def _check_key(link: ConfiguredLink, ring: KeyRing, where: str) -> None:
     try:
         key = ring.usable_key(link.policy.key)
     except KeyRingError as error:
@@ -38,8 +38,8 @@ def _check_key(link: AskedLink, ring: KeyRing, where: str) -> None:
         )
 
 
-def in_words(link: AskedLink, *, has_ring: bool) -> str:
-    """Give what is asked of signatures on a link; without keys and questions nothing."""
+def in_words(link: ConfiguredLink, *, has_ring: bool) -> str:
+    """Return what is asked of signatures on a link; without keys and questions nothing."""
     own = f", key {link.policy.key}" if link.policy.key else ""
     if link.policy.takes_unsigned:
         return f", unsigned, too{own}" if has_ring else own

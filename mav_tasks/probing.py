@@ -11,11 +11,11 @@ from collections.abc import Callable
 
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
+from mav_tasks.links.link_limits import TO_VEHICLES
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.policy import is_nearby, unsigned_beyond
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import parse_url
-from mav_tasks.links.way_out import TO_VEHICLES
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.mavlink.stream import StreamSplitter
@@ -41,7 +41,7 @@ async def run_probe(
     parsed = parse_url(url)
     if not (insecure or key is not None or is_nearby(parsed)):
         raise unsigned_beyond(f"link {parsed}")
-    link = open_link(parsed, way=TO_VEHICLES)
+    link = open_link(parsed, limits=TO_VEHICLES)
     if isinstance(link, UdpLink) and link.note:
         on_stage(link.note)
     face = _Face(link, options, None if key is None else ClientSignatures(key), on_stage)
@@ -152,7 +152,7 @@ class _Face:
 
     def _send_last_words(self) -> None:
         for _ in range(LAST_WORDS):
-            for data in self.probe.last_words():
+            for data in self.probe.emergency_stop_packets():
                 self._send(data)
 
     def _send(self, data: bytes) -> None:
@@ -184,5 +184,5 @@ class _Face:
 
     def _tend(self, link: StreamLink) -> None:
         self._tending = self._loop.call_later(TEND_PERIOD, self._tend, link)
-        link.tend()
+        link.poll()
         self._guarded(lambda: self._take_changes(link))

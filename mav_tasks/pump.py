@@ -11,9 +11,9 @@ from contextlib import suppress
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Committed, HaltNotStored, Input, Outgoing, StoreFailed
 from mav_tasks.logs.rendering import level_of
+from mav_tasks.observer import EngineObserver, EngineObservers
 from mav_tasks.store import HaltNotKept, Kept, NotKept, Outcome, Store
 from mav_tasks.tasks.events import Event, ServerStopped
-from mav_tasks.witness import Witness, Witnesses
 
 log = logging.getLogger("mav_tasks")
 
@@ -27,23 +27,23 @@ class Pump:
         store: Store,
         send: Callable[[Outgoing], None],
         *,
-        witnesses: Sequence[Witness] = (),
+        observers: Sequence[EngineObserver] = (),
     ) -> None:
         self.engine = engine
         self._store = store
         self._send = send
-        self._witnesses = Witnesses(witnesses)
+        self._observers = EngineObservers(observers)
         self._store_is_away = False
         self.is_over = False
 
     def handle(self, item: Input, *, now: float) -> None:
         """Take one input in; ``turn`` brings out what follows."""
-        self._witnesses.took_in(item, now=now)
+        self._observers.on_input(item, now=now)
         self.engine.handle(item, now=now)
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what the time asks for; ``turn`` brings out what follows."""
-        self._witnesses.took_in(None, now=now)
+        self._observers.on_input(None, now=now)
         self.engine.handle_deadline(now=now)
 
     def turn(self, *, now: float) -> None:
@@ -55,7 +55,7 @@ class Pump:
                 self._send(outgoing)
             events = self.engine.take_events()
             if packets or events:
-                self._witnesses.gave_out(packets, events, now=now)
+                self._observers.on_output(packets, events, now=now)
             if events:
                 self._store.append(events)
                 noted += events
@@ -68,12 +68,12 @@ class Pump:
         self._note(noted)  # last: whoever waits for an answer does not wait for the log
 
     def close(self) -> None:
-        """Let the witnesses end."""
-        self._witnesses.close()
+        """Let the observers end."""
+        self._observers.close()
 
     def send_last_words(self) -> None:
         """Stop every vehicle that is being driven; of the engine it needs its signature at most."""
-        for outgoing in self.engine.last_words:
+        for outgoing in self.engine.emergency_stop_packets:
             sealed = outgoing
             with suppress(Exception):  # a rover that asks for no signature takes it without one
                 sealed = self.engine.signatures.sealed_late(outgoing)

@@ -85,7 +85,7 @@ def file_of(
     file_type: str = MAVLINK_ACTIONS,
     component: int = MavComponent.ONBOARD_COMPUTER,
 ) -> str:
-    """Give the text of an actions file."""
+    """Return the text of an actions file."""
     entries = [
         {
             "label": action.label,

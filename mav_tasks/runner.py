@@ -35,10 +35,10 @@ from mav_tasks.link_reader import DRAIN, LinkReader
 from mav_tasks.links.base import TEND_PERIOD, Link, PacedLink, PeerChange, PeerState, StreamLink
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.observer import EngineObserver
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
 from mav_tasks.store import Kept, Store
-from mav_tasks.witness import Witness
 
 log = logging.getLogger("mav_tasks")
 
@@ -60,7 +60,7 @@ TAKES_ALL = LinkPolicy()
 
 
 def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> LinkChanged:
-    """Give the input that says that a link is up."""
+    """Return the input that says that a link is up."""
     return LinkChanged(
         link.name,
         side,
@@ -75,7 +75,7 @@ def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> 
 
 
 def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion:
-    """Give the input that says what became of a peer."""
+    """Return the input that says what became of a peer."""
     match change.state:
         case PeerState.UP | PeerState.DOWN as state:
             return PeerChanged(link.name, change.peer, up=state is PeerState.UP)
@@ -118,7 +118,7 @@ class Runner:
         *,
         clients: Sequence[Link],
         vehicles: Sequence[Link],
-        witnesses: Sequence[Witness] = (),
+        observers: Sequence[EngineObserver] = (),
         reload: Reload | None = None,
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: Keys | None = None,
@@ -136,7 +136,7 @@ class Runner:
         self._streams = [link for link, _ in self._sides if isinstance(link, StreamLink)]
         self._store = store
         self._store_fd = store.fileno()
-        self._pump = Pump(engine, store, self._send, witnesses=witnesses)
+        self._pump = Pump(engine, store, self._send, observers=observers)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._due = inf  # when the timer comes, by the engine's time
@@ -247,7 +247,7 @@ class Runner:
         loop.call_later(TEND_PERIOD, self._tend, loop)
         self._wake()
         for link in self._streams:
-            link.tend()
+            link.poll()
             self._note(link, link.take_changes())
 
     def _on_stored(self) -> None:

@@ -19,24 +19,24 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
-from mav_tasks.links.asked import faults_of, links_of, pushing_url
 from mav_tasks.links.base import Link
+from mav_tasks.links.config_check import faults_of, links_of, pushing_url
+from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES, LinkLimits
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint
-from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES, WayOut
 from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.logs.vehicle_texts import VehicleTexts
-from mav_tasks.recording import witnesses
+from mav_tasks.observer import EngineObserver
+from mav_tasks.recording import observers
 from mav_tasks.runner import Runner
 from mav_tasks.settings import Links, Retention, ServerSettings
 from mav_tasks.store import MemoryStore
 from mav_tasks.store.place import note_latest, path_of_store
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.witness import Witness
 
 
 def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
@@ -120,7 +120,7 @@ def open_store(path: str | None, retention: Retention | None = None) -> SqliteSt
 
 
 def _watched_ring(links: Links) -> RingWatch:
-    """Give the key ring, and look at it for changes later; UsageError if the links need others.
+    """Return the key ring, and look at it for changes later; UsageError if the links need others.
 
     That the user's own is not there is no fault: then there is none yet.
     """
@@ -133,9 +133,9 @@ def _watched_ring(links: Links) -> RingWatch:
 
 
 def _open(
-    opened: ExitStack, url: LinkUrl | SerialUrl, way: WayOut, *, push: tuple[Any, ...] = ()
+    opened: ExitStack, url: LinkUrl | SerialUrl, limits: LinkLimits, *, push: tuple[Any, ...] = ()
 ) -> Link:
-    link = open_link(url, way=way, push=push)
+    link = open_link(url, limits=limits, push=push)
     opened.callback(link.close)
     return link
 
@@ -154,11 +154,11 @@ async def _run(
     engine = Engine(settings.engine, now=now, restored=restored)  # what the store gave back
     for why in engine.not_in_force:
         say(f"not in force, though set before: {why}")
-    recorders = witnesses(settings.recording, settings.engine, restored, now=now)
+    recorders = observers(settings.recording, settings.engine, restored, now=now)
     for recorder in recorders:
         say(f"{recorder}")
     tame_collector()
-    listeners: list[Witness] = [VehicleTexts(), *recorders]
+    listeners: list[EngineObserver] = [VehicleTexts(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
     runner = Runner(
@@ -167,7 +167,7 @@ async def _run(
         clients=clients,
         vehicles=vehicles,
         reload=reload,
-        witnesses=listeners,
+        observers=listeners,
         policies={str(link.url): link.policy for link in links_of(settings.links)},
         keys=keys,
     )

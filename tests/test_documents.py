@@ -64,12 +64,12 @@ WAY = """QGC WPL 110
 
 
 def blocks(language: str, text: str = ALL) -> list[str]:
-    """Give the fenced blocks of one language."""
+    """Return the fenced blocks of one language."""
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
 def commands(text: str) -> list[str]:
-    """Give the commands of its console blocks."""
+    """Return the commands of its console blocks."""
     return re.findall(r"^\$ (.*)$", "".join(blocks("console", text)), flags=re.MULTILINE)
 
 

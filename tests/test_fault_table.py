@@ -14,14 +14,14 @@ NAMED = re.compile(r"`([\w/]+\.py)::(\w+)`")
 
 
 def rows() -> list[list[str]]:
-    """Give the cells of the table, line by line."""
+    """Return the cells of the table, line by line."""
     lines = README[README.index(HEAD) :].split("\n\n")[0].splitlines()[2:]
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
 @cache
 def names_in(path: Path) -> frozenset[str]:
-    """Give the names that pytest collects from a file: functions, classes, hypothesis' machines."""
+    """Return what pytest collects from a file: functions, classes, hypothesis' machines."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):

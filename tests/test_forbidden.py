@@ -59,7 +59,7 @@ ALLOWED = {
 
 
 def forbidden(source: str) -> Iterator[tuple[int, str, str]]:
-    """Give (line, what, why) of all that a source does and may not."""
+    """Yield (line, what, why) of all that a source does and may not."""
     tree = ast.parse(source)
     names = dict(_imported(tree))
     for node in ast.walk(tree):
@@ -82,7 +82,7 @@ def forbidden(source: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _imported(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """Give the names that imports bind, with what they stand for."""
+    """Yield the names that imports bind, with what they stand for."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:

@@ -45,11 +45,11 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
-    "mav_tasks.witness": frozenset({"mav_tasks.engine", "mav_tasks.tasks"}),
+    "mav_tasks.observer": frozenset({"mav_tasks.engine", "mav_tasks.tasks"}),
     "mav_tasks.recording": frozenset(
         {
             "mav_tasks.logs",
-            "mav_tasks.witness",
+            "mav_tasks.observer",
             "mav_tasks.engine",
             "mav_tasks.store",
             "mav_tasks.tasks",
@@ -74,7 +74,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.pump": frozenset(
         {
             "mav_tasks.logs",
-            "mav_tasks.witness",
+            "mav_tasks.observer",
             "mav_tasks.engine",
             "mav_tasks.store",
             "mav_tasks.tasks",
@@ -90,7 +90,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.mavlink",
             "mav_tasks.pump",
             "mav_tasks.logs",
-            "mav_tasks.witness",
+            "mav_tasks.observer",
             "mav_tasks.engine",
             "mav_tasks.links",
             "mav_tasks.store",
@@ -102,7 +102,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         {
             "mav_tasks.mavlink",
             "mav_tasks.pump",
-            "mav_tasks.witness",
+            "mav_tasks.observer",
             "mav_tasks.engine",
             "mav_tasks.links",
             "mav_tasks.store",
@@ -136,7 +136,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.config",
             "mav_tasks.key_ring",
             "mav_tasks.link_keys",
-            "mav_tasks.witness",
+            "mav_tasks.observer",
             "mav_tasks.logs",
             "mav_tasks.engine",
             "mav_tasks.links",

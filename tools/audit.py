@@ -65,7 +65,7 @@ class Found(NamedTuple):
 
 
 def rounds(texts: list[str]) -> list[list[str]]:
-    """Give the pins of lock files, in lists in which no package stands twice.
+    """Return the pins of lock files, in lists in which no package stands twice.
 
     A lock has two versions of a package where one Python wants another than the next.
     """

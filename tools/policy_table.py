@@ -19,7 +19,7 @@ Group = tuple[Row, list[str]]
 
 
 def table() -> str:
-    """Give kinds, commands and messages in words, each group of equal rows in one line."""
+    """Return kinds, commands and messages in words, each group of equal rows in one line."""
     kinds = [f"| {kind.name.lower()} | {kind.value} |" for kind in KINDS]
     commands = _lines(of_commands.COMMANDS.items(), (*of_commands.BY_WORDS, NAMELESS))
     messages = _lines(of_messages.MESSAGES.items(), (*of_messages.BY_WORDS, NAMELESS))

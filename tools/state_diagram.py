@@ -7,7 +7,7 @@ from mav_tasks.tasks.lifecycle import INITIAL, TERMINAL, TRANSITIONS, TaskState
 
 
 def diagram() -> str:
-    """Give the table as a Mermaid state diagram. KILLED is left to one line: all lead to it."""
+    """Return the table as a Mermaid state diagram. KILLED is left to one line: all lead to it."""
     lines = ["```mermaid", "stateDiagram-v2"]
     lines += [f"    [*] --> {_name(state)}" for state in sorted(INITIAL)]
     for old, edges in TRANSITIONS.items():

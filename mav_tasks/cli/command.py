@@ -45,7 +45,7 @@ def _similar(name: str, known: list[str]) -> str:
 
 
 def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
-    """Give what Typer takes for a command; it runs ``body`` on a loop of its own."""
+    """Return what Typer takes for a command; it runs ``body`` on a loop of its own."""
     groups: dict[str, Any] = {
         name: parameter.annotation
         for name, parameter in inspect.signature(body).parameters.items()

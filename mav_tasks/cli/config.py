@@ -83,7 +83,7 @@ def init(
 
 
 def _parameters(settings: "ServerSettings") -> dict[str, float]:
-    """Give what clients have set as MAVLink parameters, as far as the store can be looked at."""
+    """Return what clients have set as MAVLink parameters, as far as the store can be looked at."""
     from mav_tasks.store.place import path_of_store  # noqa: PLC0415
     from mav_tasks.store.reading import read_parameters  # noqa: PLC0415
 

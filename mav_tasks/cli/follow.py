@@ -132,7 +132,7 @@ class Bar:
         self._draw()
 
     def drawn(self) -> Table | Group:
-        """Give the line, as wide as the window at this moment, and below it what to do."""
+        """Return the line, as wide as the window at this moment, and below it what to do."""
         width = 80 if self.live is None else self.live.console.width
         grid = Table.grid(padding=(0, 1), expand=False)
         if self.status is None:

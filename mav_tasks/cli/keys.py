@@ -151,7 +151,7 @@ def revoke(
 
 
 def _asked(what: str, *, is_new: bool = False) -> str:
-    """Give a secret text: asked for without echo, or the first line of standard input."""
+    """Return a secret text: asked for without echo, or the first line of standard input."""
     if sys.stdin is None:
         raise UsageError(f"{what.lower()}: standard input is closed")
     if not sys.stdin.isatty():

@@ -65,7 +65,7 @@ class Common:
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
+class TaskOptions:
     """When a new task runs, and whether it is waited for."""
 
     priority: Annotated[int, typer.Option(metavar="0..10", help="10 runs first.")] = PRIORITY
@@ -105,7 +105,7 @@ def start_of(start_in: str, start_at: str) -> Start:
 
 
 def seconds_of(name: str, text: str) -> float | None:
-    """Give the seconds of an option, None if it is not given."""
+    """Return the seconds of an option, None if it is not given."""
     if not text:
         return None
     from mav_tasks.cli.times import parse_duration  # noqa: PLC0415

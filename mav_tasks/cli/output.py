@@ -18,7 +18,7 @@ def is_drawn_on() -> bool:
 
 
 def console() -> "Console":
-    """Give what tables are printed on; without NO_COLOR and on a terminal, in colours."""
+    """Return what tables are printed on; without NO_COLOR and on a terminal, in colours."""
     from rich.console import Console  # noqa: PLC0415
 
     is_drawn = is_drawn_on()

@@ -9,7 +9,7 @@ import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
-from mav_tasks.cli.options import Common, Terms, Wait
+from mav_tasks.cli.options import Common, TaskOptions, Wait
 from mav_tasks.cli.submit import tell_submitted
 from mav_tasks.errors import UsageError
 
@@ -42,7 +42,7 @@ rally = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Rally poi
 @command
 async def upload_mission(
     file: FileIn,
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
     stage: Annotated[
         bool, typer.Option("--stage", help="Do not queue it: it waits for 'mission start'.")
@@ -53,7 +53,7 @@ async def upload_mission(
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 
     wished = read(terms)
-    if stage and terms != Terms(wait=terms.wait):
+    if stage and terms != TaskOptions(wait=terms.wait):
         raise UsageError("--stage: a mission that waits for its start has no terms")
     plan = read_plan(file)
     async with opened(common) as client:
@@ -100,7 +100,7 @@ async def download_mission(file: FileOut, common: Common, force: Force = False) 
 @fence.command("upload")
 @command
 async def upload_fence(file: PlanIn, common: Common, empty: Empty = False) -> None:
-    """Give the rover the fence of a file."""
+    """Return the rover the fence of a file."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 
@@ -128,7 +128,7 @@ async def download_fence(file: PlanOut, common: Common, force: Force = False) ->
 @rally.command("upload")
 @command
 async def upload_rally_points(file: PlanIn, common: Common, empty: Empty = False) -> None:
-    """Give the rover the rally points of a file."""
+    """Return the rover the rally points of a file."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 

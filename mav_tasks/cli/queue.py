@@ -38,7 +38,7 @@ async def queue(
 
 
 async def fetch(client: "Client", common: Common, *, limit: int) -> list["QueueStatus"]:
-    """Give the queues that are meant."""
+    """Return the queues that are meant."""
     meant = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
     return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]
 

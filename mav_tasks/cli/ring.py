@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def ring_path(asked: str) -> Path:
-    """Give the file of ``--keys``; "": that of the configuration, or the user's own."""
+    """Return the file of ``--keys``; "": that of the configuration, or the user's own."""
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
     from mav_tasks.key_ring.ring_file import path_of_ring  # noqa: PLC0415
 
@@ -19,7 +19,7 @@ def ring_path(asked: str) -> Path:
 
 
 def key_to_sign_with(name: str, asked: str) -> "Key":
-    """Give a key by its name; KeyRingError."""
+    """Return a key by its name; KeyRingError."""
     from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
 
     path = ring_path(asked)

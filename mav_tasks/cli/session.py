@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager, contextmanager
 from datetime import datetime
 from typing import NamedTuple
 
-from mav_tasks.cli.options import Common, Terms, seconds_of, start_of
+from mav_tasks.cli.options import Common, TaskOptions, seconds_of, start_of
 from mav_tasks.cli.ring import key_to_sign_with
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
@@ -13,7 +13,7 @@ from mav_tasks.errors import NoAnswer, UsageError
 
 
 class Read(NamedTuple):
-    """Terms as the library has them."""
+    """TaskOptions as the library has them."""
 
     priority: int
     after: int
@@ -24,7 +24,7 @@ class Read(NamedTuple):
     label: str
 
 
-def read(terms: Terms) -> Read:
+def read(terms: TaskOptions) -> Read:
     """Read the terms of a task; UsageError."""
     start = start_of(terms.start_in, terms.start_at)
     deadline = seconds_of("--deadline", terms.deadline) or 0.0
@@ -34,7 +34,7 @@ def read(terms: Terms) -> Read:
 
 @asynccontextmanager
 async def opened(common: Common) -> AsyncIterator[Client]:
-    """Give a client that has found the server and the rovers."""
+    """Return a client that has found the server and the rovers."""
     async with unfound(common) as client:
         await client.found()
         yield client
@@ -42,7 +42,7 @@ async def opened(common: Common) -> AsyncIterator[Client]:
 
 @asynccontextmanager
 async def unfound(common: Common) -> AsyncIterator[Client]:
-    """Give a client whose link is open, and that has heard nobody yet."""
+    """Return a client whose link is open, and that has heard nobody yet."""
     if common.keys and not common.sign:
         raise UsageError("--keys: say with which key, --sign NAME")
     client = Client(
@@ -74,7 +74,7 @@ def values_checked() -> Iterator[None]:
 
 
 async def find_task(client: Client, common: Common, task_id: int) -> Task:
-    """Give a task by its number alone: a server tells of a task whichever rover it is asked of."""
+    """Return a task by its id alone; the server knows it whichever rover is asked."""
     vehicle = common.vehicle
     if vehicle is None:
         anyone = client.vehicles()[0].id

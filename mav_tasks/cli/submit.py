@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
-from mav_tasks.cli.options import Common, Terms
+from mav_tasks.cli.options import Common, TaskOptions
 
 if TYPE_CHECKING:
     from mav_tasks.client.aio import Client
@@ -31,7 +31,7 @@ app = typer.Typer(
 @command
 async def move(
     distance: Annotated[float, typer.Argument(metavar="METRES", help="Negative: backwards.")],
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
     speed: Speed = None,
 ) -> None:
@@ -45,7 +45,7 @@ async def move(
 @command
 async def rotate(
     angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise.")],
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
     rate: Rate = None,
 ) -> None:
@@ -61,7 +61,7 @@ async def drive(
     forward: Annotated[float, typer.Argument(metavar="M/S", help="Negative: backwards.")],
     yaw_rate: Annotated[float, typer.Argument(metavar="DEG/S", help="Clockwise.")],
     duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 5s.")],
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
 ) -> None:
     """Keep a velocity for a time."""
@@ -79,7 +79,7 @@ async def goto(
         str, typer.Argument(metavar="NORTH|LAT", help="Metres, or degrees with --global.")
     ],
     east: Annotated[str, typer.Argument(metavar="EAST|LON", help="The same.")],
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
     is_global: Annotated[
         bool, typer.Option("--global", help="The numbers are latitude and longitude.")
@@ -112,7 +112,7 @@ async def goto(
 @command
 async def face(
     heading: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise from north.")],
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
     rate: Rate = None,
 ) -> None:
@@ -126,7 +126,7 @@ async def face(
 @command
 async def wait(
     duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 30s or 5m.")],
-    terms: Terms,
+    terms: TaskOptions,
     common: Common,
 ) -> None:
     """Stand for a while."""
@@ -138,14 +138,14 @@ async def wait(
 
 @app.command()
 @command
-async def home(terms: Terms, common: Common, speed: Speed = None) -> None:
+async def home(terms: TaskOptions, common: Common, speed: Speed = None) -> None:
     """Return to the rover's home."""
     from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
 
     await _submit([GoTo(None, speed=speed)], terms, common)
 
 
-async def _submit(goals: "Sequence[Goal]", terms: Terms, common: Common) -> None:
+async def _submit(goals: "Sequence[Goal]", terms: TaskOptions, common: Common) -> None:
     from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
     from mav_tasks.cli.typed_words import in_typed_words  # noqa: PLC0415
 

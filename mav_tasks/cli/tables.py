@@ -66,7 +66,7 @@ TASK_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def queue_table(queue: QueueStatus, *, width: int, rows: int | None = None) -> Group:
-    """Give a queue within ``width`` columns and ``rows`` lines, None: as many as it takes."""
+    """Return a queue within ``width`` columns and ``rows`` lines, None: as many as it takes."""
     tasks = ([queue.current] if queue.current is not None else []) + list(queue.waiting)
     count = queue.waiting_count + (queue.current is not None)
     above = [words.headline_of(queue)]

@@ -12,7 +12,7 @@ LONGEST = 366 * 86_400.0  # s
 
 
 def parse_duration(name: str, text: str) -> float:
-    """Give the seconds of "90", "30s", "5m", "1h30m" or "2d"; ``name`` is the option's."""
+    """Return the seconds of "90", "30s", "5m", "1h30m" or "2d"; ``name`` is the option's."""
     match = DURATION.fullmatch(text.strip().lower())
     if not match or not any(match.groups()):
         raise UsageError(f"{name} {text}: expected a duration such as 30s, 5m or 1h30m")
@@ -24,7 +24,7 @@ def parse_duration(name: str, text: str) -> float:
 
 
 def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = None) -> datetime:
-    """Give the moment of "2026-11-20T14:30", or the next "14:30"; ``now`` has a time zone.
+    """Return the moment of "2026-11-20T14:30", or the next "14:30"; ``now`` has a time zone.
 
     Local time unless the text names a zone ("…Z", "…+01:00"); ``zone`` None: the system's.
     """
@@ -40,7 +40,7 @@ def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = N
 
 
 def format_duration(seconds: float) -> str:
-    """Give seconds as they can be written: "4.2s", "5m", "1h30m"."""
+    """Return seconds as they can be written: "4.2s", "5m", "1h30m"."""
     if seconds < UNITS[2] - 0.05:
         return f"{seconds:.1f}".removesuffix(".0") + "s"
     minutes, rest = divmod(round(seconds), 60)

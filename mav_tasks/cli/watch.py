@@ -89,7 +89,7 @@ class Window:
         self._at = self._loop.time()
 
     def drawn(self) -> Group:
-        """Give the window's lines."""
+        """Return the window's lines."""
         if self.live is None:
             return Group()
         width, height = self.live.console.size

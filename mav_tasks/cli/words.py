@@ -30,12 +30,12 @@ COMES_BY_ITSELF = (
 
 
 def state_of(status: TaskStatus) -> str:
-    """Give the name of its state."""
+    """Return the name of its state."""
     return status.state.name.lower()
 
 
 def what_of(status: TaskStatus) -> str:
-    """Give what it is about: "move 2 m"."""
+    """Return what it is about: "move 2 m"."""
     what, colon, _ = status.words.partition(" '" if status.label else ": ")
     return what if colon else f"command {status.command}"
 
@@ -87,7 +87,7 @@ def took_of(status: TaskStatus) -> str:
 
 
 def way_on_of(status: TaskStatus) -> str:
-    """Give what lets it go on, nothing if that is not for the operator to say."""
+    """Return what lets it go on, nothing if that is not for the operator to say."""
     is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released, and waits to begin
     if status.state is TaskState.HELD and not is_decided:
         return f"decide: mav-tasks release {status.id} again|remainder|skip"
@@ -154,7 +154,7 @@ def is_of_last_save(status: TaskStatus) -> bool:
 
 
 def left(status: TaskStatus) -> tuple[float | None, str | None]:
-    """Give what is left of it as a number and its unit."""
+    """Return what is left of it as a number and its unit."""
     if status.remaining is None or status.unit is Unit.NONE:
         return None, None
     is_angle = status.unit is Unit.RADIANS
@@ -171,7 +171,7 @@ def silence_of(heartbeat_age: float | None) -> str:
 
 
 def headline_of(queue: QueueStatus) -> str:
-    """Give what a rover does, and what is in the way."""
+    """Return what a rover does, and what is in the way."""
     if queue.current is not None:
         does = f"task {queue.current.id} {state_of(queue.current)}"
         does += f" ({why_of(queue.current)})" if queue.current.reason else ""
@@ -189,7 +189,7 @@ def headline_of(queue: QueueStatus) -> str:
 
 
 def counts_of(queue: QueueStatus) -> str:
-    """Give how many tasks are in which state."""
+    """Return how many tasks are in which state."""
     return ", ".join(f"{count} {state.name.lower()}" for state, count in queue.counts.items())
 
 
@@ -205,7 +205,7 @@ def history_json(status: TaskStatus, *, now: datetime) -> dict[str, Any]:
 
 
 def task_json(status: TaskStatus) -> dict[str, Any]:
-    """Give a task as JSON has it; what is not known is null."""
+    """Return a task as JSON has it; what is not known is null."""
     amount, unit = left(status)
     return {
         "id": status.id,
@@ -233,7 +233,7 @@ def task_json(status: TaskStatus) -> dict[str, Any]:
 
 
 def timing_of(timing: TaskTiming | None) -> str:
-    """Give how evenly its setpoints left, nothing if there were none."""
+    """Return how evenly its setpoints left, nothing if there were none."""
     if timing is None or timing.p50 is None or timing.p99 is None or timing.max is None:
         return ""
     return (
@@ -243,7 +243,7 @@ def timing_of(timing: TaskTiming | None) -> str:
 
 
 def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
-    """Give it as JSON has it, in seconds; null: nothing is known of it."""
+    """Return it as JSON has it, in seconds; null: nothing is known of it."""
     if timing is None:
         return None
     return {
@@ -275,7 +275,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
 
 
 def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
-    """Give a rover as JSON has it."""
+    """Return a rover as JSON has it."""
     heading = None if vehicle.yaw is None else round(degrees(vehicle.yaw), 4) % 360.0
     return {
         "vehicle": vehicle.id,
@@ -298,5 +298,5 @@ def _age(heartbeat_age: float | None) -> float | None:
 
 
 def _rounded(value: float | None) -> float | None:
-    """Give a number without the digits that a float of 32 bits only seems to have."""
+    """Return a number without the digits that a float of 32 bits only seems to have."""
     return None if value is None else round(value, 4)

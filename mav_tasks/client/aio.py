@@ -28,7 +28,7 @@ from mav_tasks.client.values import (
     queue_status_of,
 )
 from mav_tasks.client.watch import Followed
-from mav_tasks.client.wire import Goal, WishedTerms
+from mav_tasks.client.wire import Goal, TaskOptions
 from mav_tasks.errors import ClientError, MavTasksError, NoAnswer, Refused
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink import messages as m
@@ -200,7 +200,7 @@ class Client:
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = self._submissions.delay(delay, at, mark)
-        terms = WishedTerms(priority, _id_of(after), wait, deadline)
+        terms = TaskOptions(priority, _id_of(after), wait, deadline)
         goals = goal if isinstance(goal, Sequence) and not isinstance(goal, str) else (goal,)
         if not goals:
             raise ValueError("no goals: nothing to do")
@@ -214,7 +214,7 @@ class Client:
         return task
 
     async def task(self, task_id: int, *, vehicle: int | None = None) -> Task:
-        """Give the handle of a task that is there, whoever submitted it. Refused (NOT_FOUND)."""
+        """Return the handle of a task that is there, whoever submitted it. Refused (NOT_FOUND)."""
         system_id = self._which(vehicle)
         followed = self._open.session.follow(task_id, system_id, nonce=None, now=self._now)
         task = self._handle(followed)
@@ -387,11 +387,11 @@ class Client:
         return self._which(None)
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
-        """Give the rovers of the server, as they were heard last."""
+        """Return the rovers of the server, as they were heard last."""
         return self._open.session.vehicles(now=self._now)
 
     async def texts(self) -> AsyncIterator[Text]:
-        """Give the texts that rovers and task servers say from now on."""
+        """Yield the texts that rovers and task servers say from now on."""
         with self._ask.hearing() as heard:
             while True:
                 text = await heard.get()
@@ -422,7 +422,7 @@ class Client:
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = self._submissions.delay(delay, at, mark)
-        terms = WishedTerms(priority, _id_of(after), wait, deadline)
+        terms = TaskOptions(priority, _id_of(after), wait, deadline)
         items = (*items_of(plan), wire.options_of(terms, nonce=mark))
         task = await self._submit_plan(items, system_id, mark)
         await self._complete(task, deadline=0.0, at=at, label=label, nonce=mark)
@@ -607,7 +607,7 @@ class Client:
     async def _submit_command(
         self,
         goal: Move | Rotate | Drive,
-        terms: WishedTerms,
+        terms: TaskOptions,
         vehicle: int,
         mark: int,
     ) -> Task:
@@ -655,7 +655,7 @@ class Client:
     async def _complete(
         self, task: Task, *, deadline: float, at: datetime | None, label: str, nonce: int
     ) -> None:
-        """Give a task that is there what its submission could not carry."""
+        """Return a task that is there what its submission could not carry."""
         try:
             if deadline:
                 await self._set_deadline(task, deadline)

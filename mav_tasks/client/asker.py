@@ -288,7 +288,7 @@ class Asker:
 
     @contextmanager
     def hearing(self) -> Iterator[asyncio.Queue[Text | None]]:
-        """Give a queue of the texts that come while this is open; None: there will be no more.
+        """Return a queue of the texts that come while this is open; None: there will be no more.
 
         Not an asynchronous generator: a loop that ends closes all of those at once, and one that
         waits inside another is then closed twice.

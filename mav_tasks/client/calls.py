@@ -99,7 +99,7 @@ class Calls:
                 lane.waiting.remove(call)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         due = []
         for lane in self._lanes.values():
             if lane.flying is not None and lane.flying.retry is not None:
@@ -121,7 +121,7 @@ class Calls:
             self._advance(lane, now=now)
 
     def take(self) -> list[Command]:
-        """Give what is to be sent since the last call."""
+        """Return what is to be sent since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 

@@ -9,9 +9,9 @@ from mav_tasks.client.session import Session
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.errors import LinkUrlError
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
+from mav_tasks.links.link_limits import TO_CLIENTS
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.url import parse_url
-from mav_tasks.links.way_out import TO_CLIENTS
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.stream import StreamSplitter
 
@@ -78,7 +78,7 @@ class Connection:
             self._timer = self._loop.call_at(due, self._on_timer)
 
     def close(self) -> None:
-        """Give the link back."""
+        """Return the link back."""
         self._is_closed = True
         for timer in (self._timer, self._tending):
             if timer is not None:
@@ -125,7 +125,7 @@ class Connection:
 
     def _tend(self, link: StreamLink) -> None:
         self._tending = self._loop.call_later(TEND_PERIOD, self._tend, link)
-        link.tend()
+        link.poll()
         self._take_changes(link)
 
 
@@ -133,4 +133,4 @@ def _open(link: str) -> Link:
     url = parse_url(link)
     if url.key or url.unsigned is not None:
         raise LinkUrlError(f"link {link!r}: what stands behind the question mark is for a server")
-    return open_link(url, way=TO_CLIENTS)
+    return open_link(url, limits=TO_CLIENTS)

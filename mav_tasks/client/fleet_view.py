@@ -69,7 +69,7 @@ class VehicleView:
         return now - max(heard) if heard else None
 
     def status(self, decoder: Decoder, *, now: float) -> VehicleStatus:
-        """Give what is known of it."""
+        """Return what is known of it."""
         place = self._latest(decoder, m.LocalPositionNed)
         attitude = self._latest(decoder, m.Attitude)
         monitor = self._monitor
@@ -120,11 +120,11 @@ class FleetView:
         return iter(self._views.values())
 
     def get(self, system_id: int) -> VehicleView | None:
-        """Give one, None if it was never heard."""
+        """Return one, None if it was never heard."""
         return self._views.get(system_id)
 
     def served(self) -> list[int]:
-        """Give the ids of those in which a task server has answered, the lowest first."""
+        """Return the ids of those in which a task server has answered, the lowest first."""
         return sorted(v.system_id for v in self if v.server_component is not None)
 
     def is_found(self, wished: int | None) -> bool:
@@ -135,7 +135,7 @@ class FleetView:
         return self.is_listed and bool(self._views) and are_served
 
     def why_not_found(self, wished: int | None) -> str:
-        """Give why, in words; "{where}" stands for where and how long it was listened for."""
+        """Return why, in words; "{where}" stands for where and how long it was listened for."""
         served = self.served()
         if not self._views and self.is_listed:
             return "a task server is there, but no rover was heard {where}: is it on, and linked?"
@@ -146,7 +146,7 @@ class FleetView:
         return f"rover {wished} was not found {{where}}: {_there_are(served)}"
 
     def which(self, wished: int | None) -> int:
-        """Give the vehicle that is meant, None: the only one. NoSuchVehicle."""
+        """Return the vehicle that is meant, None: the only one. NoSuchVehicle."""
         served = self.served()
         if wished is not None and wished not in served:
             raise NoSuchVehicle(f"rover {wished} is not there: {_there_are(served)}")
@@ -191,12 +191,12 @@ class FleetView:
         return view
 
     def next_deadline(self) -> float | None:
-        """Give when a task server is to be asked whether it is there."""
+        """Return when a task server is to be asked whether it is there."""
         due = [v.ask_at for v in self if v.server_component is None]
         return min(due, default=None)
 
     def to_ask(self, *, now: float) -> list[int]:
-        """Give the vehicles whose task server is to be asked now."""
+        """Return the vehicles whose task server is to be asked now."""
         due = [v for v in self if v.server_component is None and now >= v.ask_at]
         for view in due:
             view.ask_at = now + ASK_AGAIN

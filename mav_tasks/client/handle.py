@@ -66,7 +66,7 @@ class Task:
         return status
 
     async def updates(self, *, interval: float = 0.5) -> AsyncIterator[TaskStatus]:
-        """Give its status now and at each change, while it is driven each ``interval`` seconds.
+        """Yield its status now and at each change, while it is driven each ``interval`` seconds.
 
         Ends with the status in which the task is over. Who reads slowly gets the latest only.
         """

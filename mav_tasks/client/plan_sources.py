@@ -13,12 +13,12 @@ Plan = PlanFile | Sequence[Goal] | Path | str
 
 
 def file_of(plan: PlanFile | Path | str) -> PlanFile:
-    """Give what a file says. PlanFileError."""
+    """Return what a file says. PlanFileError."""
     return plan if isinstance(plan, PlanFile) else plan_files.read_plan(Path(plan))
 
 
 def items_of(plan: Plan) -> tuple[Item, ...]:
-    """Give the items of a mission. PlanFileError, and ValueError where there are none."""
+    """Return the items of a mission. PlanFileError, and ValueError where there are none."""
     items = (
         wire.items_of_file(file_of(plan).items)
         if isinstance(plan, PlanFile | Path | str)

@@ -143,7 +143,7 @@ class Session:
                     transfers.receive(message, now=now)
 
     def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         due = [
             self._texts.next_deadline(),
             self._heartbeat.next_deadline(),
@@ -173,7 +173,7 @@ class Session:
             refused.done(_reply(refused.ack, ""))
 
     def take_packets(self) -> list[bytes]:
-        """Give what is to be sent since the last call, in order."""
+        """Return what is to be sent since the last call, in order."""
         for command in self._calls.take():
             self.send(command)
         for transfers in self._transfers.values():
@@ -249,14 +249,14 @@ class Session:
         self._calls.settle(call, is_answered=is_answered, now=now)
 
     def transfers(self, target: Address) -> Transfers:
-        """Give the plans on their way to and from a component."""
+        """Return the plans on their way to and from a component."""
         transfers = self._transfers.get(target)
         if transfers is None:
             transfers = self._transfers[target] = Transfers(target)
         return transfers
 
     def vehicles(self, *, now: float) -> tuple[VehicleStatus, ...]:
-        """Give the rovers in which a task server has answered, by id."""
+        """Return the rovers in which a task server has answered, by id."""
         views = (self.fleet.get(system_id) for system_id in self.fleet.served())
         return tuple(v.status(self._decoder, now=now) for v in views if v is not None)
 
@@ -334,7 +334,7 @@ class Session:
 
 
 def request_message(vehicle: int, message_id: int, *params: float) -> m.CommandLong:
-    """Give the REQUEST_MESSAGE that asks a vehicle's task server for something."""
+    """Return the REQUEST_MESSAGE that asks a vehicle's task server for something."""
     filled = (*params, *(0.0,) * (6 - len(params)))
     return m.CommandLong(vehicle, AUTOPILOT, MavCmd.REQUEST_MESSAGE, 0, float(message_id), *filled)
 

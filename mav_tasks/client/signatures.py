@@ -53,7 +53,7 @@ class ClientSignatures:
         return f"ClientSignatures({self._named()}, {self.not_believed})"
 
     def sealed(self, raw: bytes, *, utc: float) -> bytes:
-        """Give a packet as it is to leave.
+        """Return a packet as it is to leave.
 
         DEVIATION: what the server's clock says is not taken over: of two clients with one key, that
         one which has heard the server would be ahead of the other one's clock.
@@ -77,7 +77,7 @@ class ClientSignatures:
         return True
 
     def why_silent(self) -> str:
-        """Give what may be the matter when nothing was believed, in words."""
+        """Return what may be the matter when nothing was believed, in words."""
         heard = self.not_believed
         if heard.unknown:
             return f"what is heard is signed with another key than {self._named()}"

@@ -23,7 +23,7 @@ class Submissions:
         return f"Submissions({len(self._nonces)} remembered)"
 
     def nonce(self, wished: int = 0) -> int:
-        """Give the nonce wished for, or one not used yet: from a random one on, each once.
+        """Return the nonce wished for, or one not used yet: from a random one on, each once.
 
         All scripts of an address share one set of nonces. The server takes one for a copy until 10
         minutes after its task is over: two processes rarely draw the same of 10⁹ by then.
@@ -47,7 +47,7 @@ class Submissions:
         return its_nonce != nonce and now - at < LATE_ACK
 
     def delay(self, delay: float, at: datetime | None, nonce: int) -> float:
-        """Give the seconds that a task must not run: a time of day is set once it is there.
+        """Return the seconds that a task must not run: a time of day is set once it is there.
 
         Again with the same nonce the same ones: else it were another task to the server.
         """
@@ -63,7 +63,7 @@ class Submissions:
 
 
 def utc_of(at: datetime) -> float:
-    """Give UTC seconds; ValueError for a time of day that is nobody's."""
+    """Return UTC seconds; ValueError for a time of day that is nobody's."""
     if at.tzinfo is None:
         raise ValueError(f"at {at}: a time of day without a time zone is nobody's")
     return at.timestamp()

@@ -132,7 +132,7 @@ class SyncTask:
         return self._portal.call(within())
 
     def updates(self, *, interval: float = 0.5) -> Iterator[TaskStatus]:
-        """Give its status now and at each change, while it is driven each ``interval`` seconds."""
+        """Yield its status now and at each change; while it drives, each ``interval`` seconds."""
         return _each(self._task.updates(interval=interval), self._portal)
 
     def refresh(self) -> TaskStatus:
@@ -288,7 +288,7 @@ class SyncClient:
         )
 
     def task(self, task_id: int, *, vehicle: int | None = None) -> SyncTask:
-        """Give the handle of a task that is there."""
+        """Return the handle of a task that is there."""
         return self._task(lambda client: client.task(task_id, vehicle=vehicle))
 
     def status(self, task_id: int, *, vehicle: int | None = None) -> TaskStatus:
@@ -375,7 +375,7 @@ class SyncClient:
         self._call(lambda client: client.resume(epoch=epoch, vehicle=vehicle))
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
-        """Give the rovers of the server, as they were heard last."""
+        """Return the rovers of the server, as they were heard last."""
 
         async def vehicles(client: Client) -> tuple[VehicleStatus, ...]:
             return client.vehicles()
@@ -383,7 +383,7 @@ class SyncClient:
         return self._call(vehicles)
 
     def texts(self) -> Iterator[Text]:
-        """Give the texts that rovers and task servers say from now on."""
+        """Return the texts that rovers and task servers say from now on."""
         client, portal = self._opened_here()
         return _each(client.texts(), portal)
 
@@ -468,7 +468,7 @@ class SyncClient:
 
 
 def _each(generator: AsyncIterator[T], portal: Portal) -> Iterator[T]:
-    """Give what an async generator gives, each when it is there."""
+    """Yield what an async generator gives, each when it is there."""
 
     async def following() -> T | None:
         return await anext(generator, None)

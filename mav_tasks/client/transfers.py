@@ -103,7 +103,7 @@ class Transfers:
             self._downloader.receive(message, now=now)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         begin_at = self._rests_until if self._waiting else None
         due = (self._uploader.next_deadline(), self._downloader.next_deadline(), begin_at)
         return min((at for at in due if at is not None), default=None)
@@ -120,7 +120,7 @@ class Transfers:
                 self._start(now=now)
 
     def take(self) -> list[m.Message]:
-        """Give what is to be sent since the last call."""
+        """Return what is to be sent since the last call."""
         return self._downloader.take() + self._uploader.take()
 
     def _fits(self, opaque_id: int) -> bool:

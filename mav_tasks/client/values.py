@@ -157,7 +157,7 @@ class Text:
 
 
 def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
-    """Give what a TASK_STATUS says; ``vehicle`` is the system that it came from."""
+    """Return what a TASK_STATUS says; ``vehicle`` is the system that it came from."""
     reason = reason_of(message.reason)
     finish = known(message.time_to_finish)
     is_over = message.state in TERMINAL
@@ -189,7 +189,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
 
 
 def task_timing_of(message: m.TaskTiming, vehicle: int) -> TaskTiming:
-    """Give what a TASK_TIMING says; ``vehicle`` is the system that it came from."""
+    """Return what a TASK_TIMING says; ``vehicle`` is the system that it came from."""
     return TaskTiming(
         id=message.task_id,
         vehicle=vehicle,
@@ -208,7 +208,7 @@ def queue_status_of(
     waiting: tuple[TaskStatus, ...],
     current: TaskStatus | None,
 ) -> QueueStatus:
-    """Give what a TASK_QUEUE_STATUS says, with tasks that were asked for besides."""
+    """Return what a TASK_QUEUE_STATUS says, with tasks that were asked for besides."""
     counts = {
         state: count for state, count in zip(TaskState, message.counts, strict=False) if count
     }
@@ -235,22 +235,22 @@ def heartbeat_age_of(message: m.TaskQueueStatus) -> float | None:
 
 
 def reason_of(number: int) -> TaskReason:
-    """Give a TASK_REASON; one of a newer server, that is not known here, as NONE."""
+    """Return a TASK_REASON; one of a newer server, that is not known here, as NONE."""
     return TaskReason(number) if number in TaskReason._value2member_map_ else TaskReason.NONE
 
 
 def state_of(number: int) -> TaskState:
-    """Give a TASK_STATE; one that is not known here as UNKNOWN."""
+    """Return a TASK_STATE; one that is not known here as UNKNOWN."""
     return TaskState(number) if number in TaskState._value2member_map_ else TaskState.UNKNOWN
 
 
 def unit_of(number: int) -> Unit:
-    """Give a TASK_UNIT; one that is not known here as NONE."""
+    """Return a TASK_UNIT; one that is not known here as NONE."""
     return Unit(number) if number in Unit._value2member_map_ else Unit.NONE
 
 
 def known(value: float) -> float | None:
-    """Give a number, None for NaN."""
+    """Return a number, None for NaN."""
     return value if isfinite(value) else None
 
 

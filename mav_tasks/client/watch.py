@@ -61,7 +61,7 @@ class Watch:
         self._followed, self._shed_at = held, MOST_UNHELD + 2 * len(held)
 
     def get(self, task_id: int) -> Followed | None:
-        """Give one that is followed."""
+        """Return one that is followed."""
         return self._followed.get(task_id)
 
     def receive(self, status: TaskStatus, *, now: float) -> Followed | None:
@@ -100,11 +100,11 @@ class Watch:
                 followed.patience = SILENT
 
     def next_deadline(self) -> float | None:
-        """Give when somebody waits for news that are overdue."""
+        """Return when somebody waits for news that are overdue."""
         return min((f.ask_at for f in self._followed.values() if _is_awaited(f)), default=None)
 
     def to_ask(self, *, now: float) -> list[Followed]:
-        """Give the tasks to ask about now; each time later, while they wait."""
+        """Return the tasks to ask about now; each time later, while they wait."""
         due = [f for f in self._followed.values() if _is_awaited(f) and now >= f.ask_at]
         for followed in due:
             if followed.status is not None and followed.status.is_waiting:
@@ -127,7 +127,7 @@ class Watch:
         return min(intervals, default=None)
 
     def stream_of(self, vehicle: int) -> float | None:
-        """Give the interval that is wished for, seconds."""
+        """Return the interval that is wished for, seconds."""
         return min(self._streams.get(vehicle, ()), default=None)
 
 

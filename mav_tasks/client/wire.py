@@ -41,7 +41,7 @@ OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: as configured
 
 
 @dataclass(frozen=True, slots=True)
-class WishedTerms:
+class TaskOptions:
     """On what terms a task is to run: seconds from now, an id, a priority."""
 
     priority: int = DEFAULT_PRIORITY
@@ -68,9 +68,9 @@ def is_command(goal: Goal) -> bool:
 
 
 def command_of(
-    goal: Move | Rotate | Drive, terms: WishedTerms, *, target: tuple[int, int], nonce: int
+    goal: Move | Rotate | Drive, terms: TaskOptions, *, target: tuple[int, int], nonce: int
 ) -> m.CommandLong:
-    """Give the command that submits a goal; its deadline, if any, is set afterwards."""
+    """Return the command that submits a goal; its deadline, if any, is set afterwards."""
     command, first, second, third = _own(goal)
     return m.CommandLong(
         *target,
@@ -87,7 +87,7 @@ def command_of(
 
 
 def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
-    """Give the items of a plan that drives these goals in their order."""
+    """Return the items of a plan that drives these goals in their order."""
     for goal in goals:
         if not isinstance(goal, Goal):
             raise ValueError(f"{goal!r}: expected a goal, such as Move(2.0)")
@@ -95,14 +95,14 @@ def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
 
 
 def items_of_file(items: Sequence[PlanItem]) -> tuple[Item, ...]:
-    """Give the items of a file as they are sent."""
+    """Return the items of a file as they are sent."""
     return tuple(
         Item(i.frame, i.command, 0, int(i.autocontinue), *i.params, i.x, i.y, i.z) for i in items
     )
 
 
 def file_items(items: Sequence[Item]) -> tuple[PlanItem, ...]:
-    """Give items that were fetched as a file has them: the inverse of ``items_of_file``."""
+    """Return items that were fetched as a file has them: the inverse of ``items_of_file``."""
     return tuple(
         PlanItem(
             i.command,
@@ -118,7 +118,7 @@ def file_items(items: Sequence[Item]) -> tuple[PlanItem, ...]:
 
 
 def with_home(items: Sequence[Item]) -> tuple[Item, ...]:
-    """Give items behind a home, as ArduPilot has it: each jump goes one further."""
+    """Return items behind a home, as ArduPilot has it: each jump goes one further."""
     home = Item(MavFrame.GLOBAL, MavCmd.NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
     moved = (
         item._replace(param1=item.param1 + 1) if item.command == MavCmd.DO_JUMP else item
@@ -127,8 +127,8 @@ def with_home(items: Sequence[Item]) -> tuple[Item, ...]:
     return (home, *moved)
 
 
-def options_of(terms: WishedTerms, *, nonce: int) -> Item:
-    """Give the item about the plan as a whole.
+def options_of(terms: TaskOptions, *, nonce: int) -> Item:
+    """Return the item about the plan as a whole.
 
     It goes last, so that the numbers in jumps stay right. The nonce tells this plan from an equal
     one, and has the server know it when it is sent again, however late.

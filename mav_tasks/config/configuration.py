@@ -9,7 +9,7 @@ from platformdirs import user_config_path
 from mav_tasks.config import profiles, toml_file, words
 from mav_tasks.config.given import Given, Layer
 from mav_tasks.errors import ConfigError, SettingError
-from mav_tasks.links.asked import faults_of
+from mav_tasks.links.config_check import faults_of
 from mav_tasks.setting_keys.table import BOUNDED, check_bounds
 from mav_tasks.settings import ServerSettings
 
@@ -65,7 +65,7 @@ def _named(asked: str | None, environment: Mapping[str, str]) -> str | None:
 
 
 def chosen_file(asked: str | None, environment: Mapping[str, str]) -> Path | None:
-    """Give the file to read: the one asked for, that of the environment, the user's; or None."""
+    """Return the file to read: the one asked for, that of the environment, the user's; or None."""
     named = _named(asked, environment)
     if named is not None:
         return Path(named) if named else None
@@ -77,12 +77,12 @@ def chosen_file(asked: str | None, environment: Mapping[str, str]) -> Path | Non
 
 
 def usual_file() -> Path:
-    """Give where the user's own file is, if there is one."""
+    """Return where the user's own file is, if there is one."""
     return user_config_path("mav-tasks", appauthor=False) / FILE_NAME
 
 
 def merged(layers: Sequence[Layer], *, file: Path | None = None) -> Configuration:
-    """Give settings of layers, the later before the earlier; ConfigError has all their faults."""
+    """Return settings of layers, the later before the earlier; ConfigError has all their faults."""
     given: dict[str, Given] = {}
     for layer in layers:
         given |= layer.given
@@ -116,7 +116,7 @@ def _faults_together(
 
 
 def _names(name: str, other: str, given: Mapping[str, Given]) -> str:
-    """Give where a key stands; if it does not, where the other one does."""
+    """Return where a key stands; if it does not, where the other one does."""
     if name in given:
         return given[name].names()
     return f"{given[other].where}: {name}" if other in given else name

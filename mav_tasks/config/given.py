@@ -32,7 +32,7 @@ class Given:
     where: str
 
     def names(self) -> str:
-        """Give where it stands and, unless that says it, of which key."""
+        """Return where it stands and, unless that says it, of which key."""
         return f"{self.where}: {self.key.name}" if self.source is Source.FILE else self.where
 
 
@@ -73,7 +73,7 @@ class Layer:
 
 
 def shown(plain: object) -> str:
-    """Give a value on one line, and not too much of it."""
+    """Return a value on one line, and not too much of it."""
     try:
         words = plain if isinstance(plain, str) and plain.isprintable() else literal(plain)
     except (ValueError, RecursionError):  # a number of thousands of digits, a list in lists
@@ -82,7 +82,7 @@ def shown(plain: object) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Give "; did you mean …?" if a known name is near, else nothing."""
+    """Return "; did you mean …?" if a known name is near, else nothing."""
     names = list(known)
     near = get_close_matches(name[:LONGEST], names, n=1) or [
         each for each in names if each.rpartition(".")[2] == name
@@ -91,5 +91,5 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def by_path(keys: Mapping[str, Key]) -> dict[tuple[str, ...], Key]:
-    """Give keys by the parts of their names."""
+    """Return keys by the parts of their names."""
     return {tuple(name.split(".")): key for name, key in keys.items()}

@@ -61,18 +61,18 @@ _MEANINGS = {
 
 
 def usual_folder() -> Path:
-    """Give where profiles are, unless told otherwise."""
+    """Return where profiles are, unless told otherwise."""
     return user_config_path("mav-tasks", appauthor=False) / "vehicles"
 
 
 def file_name(profile: VehicleProfile) -> str:
-    """Give the name of a rover's file in a folder."""
+    """Return the name of a rover's file in a folder."""
     which = f"-{profile.uid[:16]}" if profile.uid.isalnum() else ""
     return f"rover-{profile.system_id}{which}{SUFFIX}"
 
 
 def read(place: str) -> tuple[VehicleProfile, ...]:
-    """Give all profiles of a file or a folder, as the setting names it; ConfigError."""
+    """Return all profiles of a file or a folder, as the setting names it; ConfigError."""
     if place == NONE:
         return ()
     if place:
@@ -100,7 +100,7 @@ def read(place: str) -> tuple[VehicleProfile, ...]:
 
 
 def profile_of(text: str, *, name: str) -> VehicleProfile:
-    """Give the profile that a TOML text is; ConfigError has all that is wrong with it."""
+    """Return the profile that a TOML text is; ConfigError has all that is wrong with it."""
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -122,7 +122,7 @@ def profile_of(text: str, *, name: str) -> VehicleProfile:
 
 
 def text_of(profile: VehicleProfile) -> str:
-    """Give a profile as TOML; what is not known is left out."""
+    """Return a profile as TOML; what is not known is left out."""
     lines = ["# What mav-tasks probe has measured of a rover. Key vehicles.profiles names it."]
     for field in fields(profile):
         value = getattr(profile, field.name)

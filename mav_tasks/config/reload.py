@@ -119,7 +119,7 @@ class Reload:
 
 
 def taken(before: ServerSettings, wanted: ServerSettings) -> ServerSettings:
-    """Give the settings before, with what can change while the server runs as it is wanted."""
+    """Return the settings before, with what can change while the server runs as it is wanted."""
     settings = before
     for key in KEYS.values():
         if key.is_live:
@@ -138,7 +138,7 @@ def taken(before: ServerSettings, wanted: ServerSettings) -> ServerSettings:
 def changes_of(
     before: ServerSettings, wanted: ServerSettings, *, in_force: ServerSettings
 ) -> Iterator[Change]:
-    """Give each key that is wanted otherwise than it was."""
+    """Yield each key that is wanted otherwise than it was."""
     for key in KEYS.values():
         if key.of(wanted) != key.of(before):
             is_taken = key.of(in_force) == key.of(wanted)

@@ -16,7 +16,7 @@ ENGINE = "engine."
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """Give the keys that are meant, of a table all; UsageError names what is none. None: all."""
+    """Return the keys that are meant, of a table all; UsageError names what is none. None: all."""
     found: list[str] = []
     for name in names:
         if name in PLACES:
@@ -51,7 +51,7 @@ class Report:
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
 
     def entry(self, name: str) -> Entry:
-        """Give one key."""
+        """Return one key."""
         key, given = KEYS[name], self._configuration.given.get(name)
         parameter = NAMES.get(name, "")
         if parameter in self._parameters and parameter not in self._why_not:
@@ -63,7 +63,7 @@ class Report:
         return Entry(name, value, key.shape.unit, given.source, given.where)
 
     def as_toml(self, names: Iterable[str]) -> str:
-        """Give a line for each key, which ``config check`` takes as a file."""
+        """Return a line for each key, which ``config check`` takes as a file."""
         entries = [self.entry(name) for name in names]
         lines = [f"{entry.key} = {literal(entry.value)}" for entry in entries]
         width = min(max(map(len, lines)), 48)
@@ -73,7 +73,7 @@ class Report:
         )
 
     def as_json(self, names: Iterable[str]) -> str:
-        """Give the file that was read, and each key."""
+        """Return the file that was read, and each key."""
         file = self._configuration.file
         told = {
             "file": None if file is None else str(file),

@@ -19,7 +19,7 @@ OPENING = f"""\
 
 
 def sample() -> str:
-    """Give the text of the sample file."""
+    """Return the text of the sample file."""
     parts = [OPENING]
     for table in PLACES:
         parts.append(f"\n[{table}]\n")

@@ -24,7 +24,7 @@ _TABLES = {path[:count] for path in _KEYS for count in range(1, len(path))}
 
 
 def read_text(path: Path) -> str:
-    """Give the text of a file; ConfigError says why not."""
+    """Return the text of a file; ConfigError says why not."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):  # a pipe may never give anything, or only once
             raise ConfigError(f"{path}: not a file")
@@ -36,7 +36,7 @@ def read_text(path: Path) -> str:
 
 
 def decoded(data: bytes, *, name: str) -> str:
-    """Give the text of a file's bytes; ConfigError says why not."""
+    """Return the text of a file's bytes; ConfigError says why not."""
     if len(data) > LARGEST:
         raise ConfigError(f"{name}: larger than {LARGEST // 1000} kB")
     try:
@@ -54,7 +54,7 @@ class Parsed(NamedTuple):
 
 
 def parsed(text: str, *, name: str) -> Parsed:
-    """Give what a TOML text says; ConfigError, in which ``name`` is the file's, why it says none.
+    """Return what a TOML text says; ConfigError, in which ``name`` is the file's, why it says none.
 
     The fault never has words of the text in it, beyond one character.
     """
@@ -71,7 +71,7 @@ def parsed(text: str, *, name: str) -> Parsed:
 
 
 def layer_of(text: str, *, name: str) -> Layer:
-    """Give what a TOML text says; ``name`` is the file's, for the faults."""
+    """Return what a TOML text says; ``name`` is the file's, for the faults."""
     layer = Layer(Source.FILE)
     try:
         found = parsed(text, name=name)

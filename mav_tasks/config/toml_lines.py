@@ -36,7 +36,7 @@ class _Token(NamedTuple):
 
 
 def lines_of(text: str) -> Mapping[Path, int]:
-    """Give the line, from 1, of each key and each table by its path."""
+    """Return the line, from 1, of each key and each table by its path."""
     finder = _Finder(text)
     finder.read_all()
     return finder.lines
@@ -123,7 +123,7 @@ def _tokens(text: str) -> list[_Token]:
 
 
 def _name(text: str) -> str:
-    """Give the name that a part of a key means."""
+    """Return the name that a part of a key means."""
     if not text.startswith('"'):
         return text.strip("'")
     return str(tomllib.loads(f"x = {text}")["x"])

@@ -18,7 +18,7 @@ OTHERS = (FILE_VARIABLE, SERVER_VARIABLE, SIGN_VARIABLE)
 
 
 def variable_of(name: str) -> str:
-    """Give the environment variable of a key."""
+    """Return the environment variable of a key."""
     return STORE_VARIABLE if name == "store.path" else PREFIX + name.upper().replace(".", "_")
 
 
@@ -35,7 +35,7 @@ class Flag:
 
 
 def of_environment(environment: Mapping[str, str]) -> Layer:
-    """Give what the environment says."""
+    """Return what the environment says."""
     layer = Layer(Source.ENVIRONMENT)
     for variable in sorted(environment):
         if variable in OTHERS or not variable.startswith(PREFIX):
@@ -49,7 +49,7 @@ def of_environment(environment: Mapping[str, str]) -> Layer:
 
 
 def of_flags(flags: Sequence[Flag]) -> Layer:
-    """Give what the flags say; one key is said by one of them."""
+    """Return what the flags say; one key is said by one of them."""
     layer = Layer(Source.FLAG)
     for flag in flags:
         key = KEYS.get(flag.name)
@@ -69,11 +69,11 @@ def of_flags(flags: Sequence[Flag]) -> Layer:
 
 
 def flag_of_set(text: str) -> Flag:
-    """Give the flag that ``--set KEY=VALUE`` is; its value None where there is no "="."""
+    """Return the flag that ``--set KEY=VALUE`` is; its value None where there is no "="."""
     name, equals, value = text.partition("=")
     return Flag(f"--set {name.strip()}", name.strip(), value.strip() if equals else None)
 
 
 def given_flags(*flags: tuple[str, str, object]) -> list[Flag]:
-    """Give the flags of those (flag, key, value) that were given: whose value is not None."""
+    """Return the flags of those (flag, key, value) that were given: whose value is not None."""
     return [Flag(where, name, value) for where, name, value in flags if value is not None]

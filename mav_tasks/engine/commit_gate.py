@@ -9,7 +9,7 @@ from math import inf
 from typing import Any, Protocol, TypeVar
 
 from mav_tasks.engine.timers import Timers, Turn
-from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.registry import TaskRegistry
 
 Kind = TypeVar("Kind")
 Kind_contra = TypeVar("Kind_contra", contravariant=True)
@@ -24,9 +24,9 @@ class Step(Protocol[Kind_contra]):
 class CommitGate:
     """Values in the order of the events that they wait for."""
 
-    def __init__(self, book: TaskBook, timers: Timers, *, within: float) -> None:
+    def __init__(self, registry: TaskRegistry, timers: Timers, *, within: float) -> None:
         """``within``: so many seconds each waits at the most."""
-        self._book = book
+        self._registry = registry
         self.within = within
         #: number of the event that must be durable first, when it is given up, what it is
         self._held: deque[tuple[int, float, Any]] = deque()
@@ -43,12 +43,12 @@ class CommitGate:
 
     def hold(self, what: object, *, now: float) -> None:
         """Carry a value out when all that is recorded by now is durable, or give it up if late."""
-        if self._book.recorded <= self._book.durable:
+        if self._registry.recorded <= self._registry.durable:
             self._accept[type(what)](what, now=now)
             return
         if not self._held:
             self._timer.set(now + self.within)
-        self._held.append((self._book.recorded, now + self.within, what))
+        self._held.append((self._registry.recorded, now + self.within, what))
 
     def committed(self, through: int, *, now: float) -> None:
         """Carry out all that waited for events up to ``through``."""

@@ -9,20 +9,20 @@ from math import inf
 from typing import assert_never
 
 from mav_tasks.engine.clients.broadcasts import Broadcasts
-from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.operator_watch import OperatorWatch
-from mav_tasks.engine.clients.parameters import ParameterDesk
+from mav_tasks.engine.clients.parameters import ParameterServer
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands.dispatch import Commands
+from mav_tasks.engine.commands.forwarder import Forwarder
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.passing import Passing
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
@@ -44,10 +44,10 @@ from mav_tasks.engine.inputs import (
     StoreFailed,
     WallClock,
 )
-from mav_tasks.engine.intake import Intake
-from mav_tasks.engine.missions.mission_desk import MissionDesks
 from mav_tasks.engine.missions.mission_reports import MissionReports
+from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
+from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.engine.reception import Reception
 from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
@@ -57,10 +57,10 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.services.parameter_table import with_all
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
 from mav_tasks.tasks.events import Event, ServerStopped
 from mav_tasks.tasks.fleet import Fleet
-from mav_tasks.tasks.recollection import Recollection
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 
 UNHEARD = Word(text="no ground station is heard: paused")
@@ -76,10 +76,10 @@ class Engine:
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
-        self._intake = Intake()
+        self._intake = PacketReader()
         self._journal: list[Event] = []
-        self._book = TaskBook()
-        self._fleet = Fleet(self._book, settings)
+        self._registry = TaskRegistry()
+        self._fleet = Fleet(self._registry, settings)
         if restored is not None:
             self._fleet.restore(restored, now=now)
         packer, timers = Packer(), Timers()
@@ -108,58 +108,64 @@ class Engine:
             queue=self._packets,
             packer=packer,
             signatures=self.signatures,
-            book=self._book,
+            registry=self._registry,
             fleet=self._fleet,
             timers=timers,
             settings=settings,
         )
-        recollection = Recollection(self._book)
+        deduplicator = SubmissionDeduplicator(self._registry)
         if restored is not None:
-            recollection.restore(restored.tasks, now=now)
-        self._submissions = Submissions(self._gcs, self._book, recollection, timers, settings)
-        self._parameters = ParameterDesk(
+            deduplicator.restore(restored.tasks, now=now)
+        self._submissions = Submissions(self._gcs, self._registry, deduplicator, timers, settings)
+        self._parameters = ParameterServer(
             self._gcs,
             self._vehicles,
-            self._book,
+            self._registry,
             self._submissions,
             settings=configured,
             kept=kept,
         )
         stored = {} if restored is None else restored.plans
-        self._plans = Plans(self._book, self._fleet, settings, restored=stored)
-        self._desks = MissionDesks(
-            self._gcs, self._vehicles, self._book, self._submissions, self._plans, timers, settings
+        self._plans = Plans(self._registry, self._fleet, settings, restored=stored)
+        self._desks = MissionServers(
+            self._gcs,
+            self._vehicles,
+            self._registry,
+            self._submissions,
+            self._plans,
+            timers,
+            settings,
         )
         self._reports = MissionReports(
-            self._gcs, self._vehicles, self._book, self._plans, timers, settings, now=now
+            self._gcs, self._vehicles, self._registry, self._plans, timers, settings, now=now
         )
-        self._displays = Displays(self._gcs, self._vehicles, self._book)
-        refusals = Refusals(self._book)
+        self._displays = MessageRequests(self._gcs, self._vehicles, self._registry)
+        refusals = Refusals(self._registry)
         self._modes = ModeRequests(
-            self._gcs, self._book, self._submissions, self._plans, refusals, settings
+            self._gcs, self._registry, self._submissions, self._plans, refusals, settings
         )
         self._commands = Commands(
             self._gcs,
             self._vehicles,
-            self._book,
+            self._registry,
             self._submissions,
             self._plans,
             self._modes,
-            TaskControl(self._book, settings),
+            TaskControl(self._registry, settings),
             self._displays,
             settings,
         )
         self._publisher = Publisher(
             self._gcs,
             self._vehicles,
-            self._book,
+            self._registry,
             self._displays,
             self._submissions,
             TelemetryRates(self._gcs, self._vehicles),
             timers,
             now=now,
         )
-        self._passing = Passing(self._vehicles, refusals)
+        self._passing = Forwarder(self._vehicles, refusals)
         self._door = Door(self._vehicles, refusals)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
         self._setup = SetupSigning(self.signatures, self._vehicles, settings)
@@ -185,10 +191,10 @@ class Engine:
         self._stopped = False
         #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``:
         #: what the runner sends when the engine itself has failed
-        self.last_words: tuple[Outgoing, ...] = ()
+        self.emergency_stop_packets: tuple[Outgoing, ...] = ()
 
     def __repr__(self) -> str:
-        return f"Engine({list(self._vehicles.all)}, {list(self._gcs.clients)}, {self._book!r})"
+        return f"Engine({list(self._vehicles.all)}, {list(self._gcs.clients)}, {self._registry!r})"
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -244,9 +250,9 @@ class Engine:
         self._settle(now=now)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do; None: never, as things are."""
-        if self._vehicles.agenda.touched:  # after they were settled: by what is told of them
-            self._vehicles.agenda.plan()
+        """Return when ``handle_deadline`` has something to do; None: never, as things are."""
+        if self._vehicles.deadline_heap.touched:  # after they were settled: by what is told of them
+            self._vehicles.deadline_heap.plan()
         due = self._timers.next_deadline()
         return None if due == inf else due
 
@@ -265,7 +271,7 @@ class Engine:
                 timer.do(now=now)
 
     def take_events(self) -> list[Event]:
-        """Give what happened since the last call, to be made durable in this order.
+        """Return what happened since the last call, to be made durable in this order.
 
         They are numbered from 1 over the life of the engine; ``Committed`` counts them.
         """
@@ -273,14 +279,14 @@ class Engine:
         return events
 
     def take_packets(self) -> list[Outgoing]:
-        """Give the datagrams to send, in order."""
-        self.last_words = self._vehicles.agenda.last_words
+        """Return the datagrams to send, in order."""
+        self.emergency_stop_packets = self._vehicles.deadline_heap.emergency_stop_packets
         packets = self._packets.copy()
         self._packets.clear()  # the list itself is shared with every outlet
         return packets
 
     def snapshot(self, *, now: float) -> Snapshot:
-        """Give an immutable view of everything."""
+        """Return an immutable view of everything."""
         return Snapshot(
             vehicles=tuple(
                 VehicleSnapshot(
@@ -290,13 +296,13 @@ class Engine:
                     heard=vehicle.is_heard(now=now),
                     control=vehicle.control.phase.name,
                     paused=vehicle.tasks.paused,
-                    begun=vehicle.tasks.begun,
+                    active=vehicle.tasks.active,
                     waiting=tuple(vehicle.tasks.waiting),
                 )
                 for vehicle in self._vehicles.all
             ),
             clients=tuple(repr(client) for client in self._gcs.clients),
-            tasks=self._book.all(),
+            tasks=self._registry.all(),
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
                 f" {self.signatures.counts}, left out {self._gates.left_out} datagrams,"
@@ -322,7 +328,9 @@ class Engine:
             woken = self._vehicles.get(system_id)
             if woken is not None:
                 woken.joint.wake(now=now)
-        for vehicle in self._vehicles.agenda.settle() if self._vehicles.agenda.touched else ():
+        for vehicle in (
+            self._vehicles.deadline_heap.settle() if self._vehicles.deadline_heap.touched else ()
+        ):
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
                 deliver(self._gcs, vehicle, answered, now=now)
@@ -330,11 +338,11 @@ class Engine:
         if self._stop_by is not None:
             self._note_stopped(now=now)
         for refused in signatures.take_refused() if signatures.refused else ():
-            self._book.record(refused)
+            self._registry.record(refused)
         times = signatures.take_times()
         if times is not None:
-            self._book.record(times)
-        events = self._book.take_events()
+            self._registry.record(times)
+        events = self._registry.take_events()
         if events:
             self._publisher.publish(events, now=now)
             self._reports.publish(events, now=now)
@@ -375,4 +383,4 @@ class Engine:
             self._stopping.set(inf)
             for vehicle in self._vehicles.all:
                 vehicle.joint.note_rest(now=now)
-            self._book.record(ServerStopped(rolling, now))
+            self._registry.record(ServerStopped(rolling, now))

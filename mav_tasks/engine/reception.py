@@ -3,26 +3,26 @@
 from collections.abc import Sequence
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
-from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
+from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.operator_watch import OperatorWatch
 from mav_tasks.engine.clients.parameters import MESSAGES as PARAMETER_MESSAGES
-from mav_tasks.engine.clients.parameters import ParameterDesk
+from mav_tasks.engine.clients.parameters import ParameterServer
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.clients.setup_signing import SetupSigning
-from mav_tasks.engine.commands.asked import AskedByMessage
+from mav_tasks.engine.commands.command_request import MessageRequest
 from mav_tasks.engine.commands.dispatch import Commands
+from mav_tasks.engine.commands.forwarder import Forwarder
 from mav_tasks.engine.commands.mode_requests import ModeRequests
-from mav_tasks.engine.commands.passing import Passing
 from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.inputs import Packets
-from mav_tasks.engine.intake import Intake
-from mav_tasks.engine.missions.mission_desk import MESSAGES, MissionDesks
 from mav_tasks.engine.missions.mission_reports import MissionReports
+from mav_tasks.engine.missions.mission_server import MESSAGES, MissionServers
+from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
@@ -38,17 +38,17 @@ class Reception:
         gcs: GcsSide,
         vehicles: VehicleSide,
         gates: FloodGates,
-        intake: Intake,
+        intake: PacketReader,
         door: Door,
         broadcasts: Broadcasts,
         commands: Commands,
         modes: ModeRequests,
-        displays: Displays,
+        displays: MessageRequests,
         setup: SetupSigning,
-        desks: MissionDesks,
+        desks: MissionServers,
         operator: OperatorWatch,
-        parameters: ParameterDesk,
-        passing: Passing,
+        parameters: ParameterServer,
+        passing: Forwarder,
         publisher: Publisher,
         reports: MissionReports,
     ) -> None:
@@ -157,7 +157,7 @@ class Reception:
         elif isinstance(message, m.SetMode):
             vehicle = self._vehicles.get(message.target_system)
             if vehicle is not None:
-                asked = AskedByMessage.of(client, vehicle, packet, int(message.custom_mode))
+                asked = MessageRequest.of(client, vehicle, packet, int(message.custom_mode))
                 self._modes.heard(asked, now=now)
         elif isinstance(message, m.RequestDataStream):
             self._displays.set_streams(client, message)
@@ -172,4 +172,4 @@ class Reception:
                 self._operator.receive(message, now=now)
             elif isinstance(message, PARAMETER_MESSAGES):
                 self._parameters.receive(client, packet, message, now=now)
-            self._passing.pass_on(client, packet, message, now=now)
+            self._passing.forward(client, packet, message, now=now)

@@ -16,7 +16,7 @@ class VehicleSnapshot:
     heard: bool
     control: str  # how far our control has come
     paused: TaskReason
-    begun: Task | None
+    active: Task | None
     waiting: tuple[TaskId, ...]
 
 

@@ -91,18 +91,18 @@ class Timers:
         return f"Timers({len(self.heap)} entries, none before {self.not_before})"
 
     def timer(self, turn: Turn, do: Effect, *, number: int | None = None) -> Timer:
-        """Give a timer that never comes, until it is set; of one turn the lower number is first."""
+        """Return a timer that is not set yet; timers due in the same turn run by their number."""
         number = next(self._numbers) if number is None else number
         return Timer(self, turn, number, do, inf)
 
     def rhythm(self, turn: Turn, do: Effect, *, period: float, now: float) -> Timer:
-        """Give a timer that comes at once, and again each ``period``; late, without a burst."""
+        """Return a timer that comes at once, and again each ``period``; late, without a burst."""
         timer = Timer(self, turn, next(self._numbers), do, period)
         timer.set(now)
         return timer
 
     def next_deadline(self) -> float:
-        """Give when the first timer comes; inf: none does."""
+        """Return when the first timer comes; inf: none does."""
         heap = self.heap
         while heap:
             at, _, _, timer = heap[0]
@@ -114,7 +114,7 @@ class Timers:
         return inf
 
     def take_due(self, *, now: float) -> list[Timer]:
-        """Give the timers that come by now, in the order of their turns."""
+        """Return the timers that come by now, in the order of their turns."""
         heap, due = self.heap, list[Timer]()
         while heap and heap[0][0] <= now:
             entry = at, _, _, timer = heappop(heap)

@@ -26,12 +26,12 @@ _DIGITS = re.compile(rf"[0-9a-fA-F]{{{2 * KEY_LENGTH}}}")
 
 
 def generated() -> bytes:
-    """Give a secret that nobody has."""
+    """Return a secret that nobody has."""
     return secrets.token_bytes(KEY_LENGTH)
 
 
 def from_hex(text: str) -> bytes:
-    """Give the secret that 64 hexadecimal digits are; KeyRingError."""
+    """Return the secret that 64 hexadecimal digits are; KeyRingError."""
     if not _DIGITS.fullmatch(text):
         raise KeyRingError(f"expected {2 * KEY_LENGTH} hexadecimal digits")
     secret = bytes.fromhex(text)
@@ -41,7 +41,7 @@ def from_hex(text: str) -> bytes:
 
 
 def from_passphrase(passphrase: str, how: str) -> bytes:
-    """Give the secret of a passphrase; ``how`` is one of PASSPHRASES. KeyRingError."""
+    """Return the secret of a passphrase; ``how`` is one of PASSPHRASES. KeyRingError."""
     if len(passphrase) < LEAST_PASSPHRASE:
         raise KeyRingError(f"a passphrase has at least {LEAST_PASSPHRASE} characters")
     data = passphrase.encode("utf-8", "surrogateescape")

@@ -65,14 +65,14 @@ class KeyRing:
         return {fingerprint: secret for fingerprint, secret in secrets.items() if secret}
 
     def usable_key(self, name: str) -> Key:
-        """Give a key to sign with; KeyRingError says why there is none."""
+        """Return a key to sign with; KeyRingError says why there is none."""
         entry = self._entry(name)
         if not entry.is_usable:
             raise KeyRingError(f"key {name} was revoked{_on(entry.revoked)}")
         return entry.key
 
     def with_added(self, entry: Entry) -> "KeyRing":
-        """Give the ring with one more entry; KeyRingError says why it cannot be in it."""
+        """Return the ring with one more entry; KeyRingError says why it cannot be in it."""
         for each in self.entries:
             if each.name == entry.name:
                 was = f"was revoked{_on(each.revoked)}" if each.revoked else "is there already"
@@ -109,7 +109,7 @@ class KeyRing:
 
 
 def key_of(name: str, kind: str, secret: bytes) -> Key:
-    """Give the key of an entry: what its holder may do is nothing to clients if vehicles have it.
+    """Return the key of an entry: what its holder may do is nothing to clients if vehicles have it.
 
     KeyRingError: it cannot be named so, or there is no such role.
     """
@@ -121,7 +121,7 @@ def key_of(name: str, kind: str, secret: bytes) -> Key:
 
 
 def without_secret(key: Key) -> Key:
-    """Give a key as it is once it was revoked."""
+    """Return a key as it is once it was revoked."""
     return Key(key.name, b"", role=key.role, fingerprint=key.fingerprint)
 
 

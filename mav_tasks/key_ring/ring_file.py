@@ -31,7 +31,7 @@ class Loaded(NamedTuple):
 
 
 def path_of_ring(text: str) -> Path:
-    """Give where the ring is: "" is in the user's configuration folder. KeyRingError."""
+    """Return where the ring is: "" is in the user's configuration folder. KeyRingError."""
     if not text:
         return user_config_path("mav-tasks", appauthor=False) / FILE_NAME
     try:
@@ -41,7 +41,7 @@ def path_of_ring(text: str) -> Path:
 
 
 def mark_of(found: os.stat_result) -> Mark:
-    """Give the mark of a file."""
+    """Return the mark of a file."""
     times = (found.st_mtime_ns, found.st_ctime_ns)
     return (found.st_dev, found.st_ino, *times, found.st_size)
 

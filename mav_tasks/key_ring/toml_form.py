@@ -26,7 +26,7 @@ _MOST_FAULTS = 20
 
 
 def ring_of(text: str, *, name: str) -> KeyRing:
-    """Give the ring that a text is; KeyRingError has its faults, ``name`` is the file's."""
+    """Return the ring that a text is; KeyRingError has its faults, ``name`` is the file's."""
     try:
         values, lines = parsed(text, name=name)
     except ConfigError as error:
@@ -54,7 +54,7 @@ def ring_of(text: str, *, name: str) -> KeyRing:
 
 
 def text_of(ring: KeyRing) -> str:
-    """Give the text of a ring."""
+    """Return the text of a ring."""
     return HEADER + "".join(f"\n{table}" for table in map(_table, ring.entries))
 
 

@@ -90,7 +90,7 @@ class _Looker:
         self._looks = 0  # since it was read
 
     def look(self) -> tuple[Key, ...] | str | None:
-        """Give the keys if the file is another one, or in words why it cannot be read; or None."""
+        """Return the keys if the file has changed, a text if it cannot be read, else None."""
         self._looks += 1
         try:
             mark = mark_of(self._path.stat())

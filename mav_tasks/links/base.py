@@ -24,11 +24,11 @@ class Link(Protocol):
     is_stream: bool
 
     def fileno(self) -> int:
-        """Give the descriptor to wait on for reading; the same one for as long as it is open."""
+        """Return the descriptor to wait on for reading; the same one for as long as it is open."""
         ...
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` datagrams, or pieces, that are there now, each with its sender."""
+        """Return up to ``limit`` datagrams, or pieces, that are there now, each with its sender."""
         ...
 
     def send(self, peer: Peer, data: bytes) -> None:
@@ -47,7 +47,7 @@ class StampedLink(Link, Protocol):
     def receive_stamped(
         self, limit: int, *, longest: float
     ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Give what ``receive`` gives, and how long each had waited to be read, s.
+        """Return what ``receive`` gives, and how long each had waited to be read, s.
 
         ``longest``: nothing has waited for longer; what has no stamp may have.
         """
@@ -81,14 +81,14 @@ class StreamLink(Link, Protocol):
         ...
 
     def take_changes(self) -> list[PeerChange]:
-        """Give what became of peers since the last call, in order.
+        """Return what became of peers since the last call, in order.
 
         Who comes up in one call of ``receive`` does so before its first piece, who goes down after
         its last.
         """
         ...
 
-    def tend(self) -> None:
+    def poll(self) -> None:
         """See to what waits for a time: called about every TEND_PERIOD."""
         ...
 

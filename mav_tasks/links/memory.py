@@ -31,7 +31,7 @@ class Buffer(Protocol):
     """What datagrams wait in, on the way from one link to another."""
 
     def leaves_at(self, size: int, *, now: float) -> float | None:
-        """Give when a datagram of so many bytes leaves it; None: it is dropped."""
+        """Return when a datagram of so many bytes leaves it; None: it is dropped."""
         ...
 
 
@@ -47,7 +47,7 @@ class Radio:
         return f"Radio({self._rate} bytes/s, free at {self._free_at:.3f})"
 
     def leaves_at(self, size: int, *, now: float) -> float | None:
-        """Give when a datagram is through; None: the buffer is full."""
+        """Return when a datagram is through; None: the buffer is full."""
         begins_at = max(now, self._free_at)
         if (begins_at - now) * self._rate + size > self._buffer:
             return None
@@ -66,7 +66,7 @@ class Queue:
         return f"Queue(last at {self._last_at:.3f})"
 
     def leaves_at(self, size: int, *, now: float) -> float:  # noqa: ARG002
-        """Give when a datagram is through; never before the one in front of it."""
+        """Return when a datagram is through; never before the one in front of it."""
         self._last_at = max(self._last_at, now + self._delay(now))
         return self._last_at
 
@@ -86,7 +86,7 @@ class MemoryNet:
         self._order = count()
 
     def link(self, name: str, *, peers: tuple[str, ...] = ()) -> "MemoryLink":
-        """Give a new link whose peers know it by ``name``."""
+        """Return a new link whose peers know it by ``name``."""
         number = FIRST_NUMBER + len(self._numbered)
         link = self._links[name] = MemoryLink(self, name, peers, number)
         self._numbered.append(link)
@@ -97,7 +97,7 @@ class MemoryNet:
         return bool(self._numbered[number - FIRST_NUMBER].arrived)
 
     def conditions_between(self, source: str, target: str) -> Conditions:  # noqa: ARG002
-        """Give how bad this way is; a net whose ways differ says so here."""
+        """Return how bad this way is; a net whose ways differ says so here."""
         return self.conditions
 
     def send(self, source: str, target: str, data: bytes) -> None:
@@ -114,7 +114,7 @@ class MemoryNet:
             heapq.heappush(self._under_way, (at, next(self._order), source, target, data))
 
     def next_arrival(self) -> float | None:
-        """Give when the next datagram arrives."""
+        """Return when the next datagram arrives."""
         return self._under_way[0][0] if self._under_way else None
 
     def deliver(self) -> None:
@@ -147,11 +147,11 @@ class MemoryLink:
         return f"MemoryLink({self.name})"
 
     def fileno(self) -> int:
-        """Give a number of the link's own; no descriptor: ``MemoryNet.is_readable`` takes it."""
+        """Return a number of the link's own; no descriptor: ``MemoryNet.is_readable`` takes it."""
         return self._number
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` datagrams that have arrived."""
+        """Return up to ``limit`` datagrams that have arrived."""
         return [self.arrived.popleft() for _ in range(min(limit, len(self.arrived)))]
 
     def send(self, peer: Peer, data: bytes) -> None:

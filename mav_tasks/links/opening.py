@@ -1,16 +1,16 @@
 """From a link URL to a link."""
 
 from mav_tasks.links.base import Link
+from mav_tasks.links.link_limits import TO_VEHICLES, LinkLimits
 from mav_tasks.links.local_port import port_for
 from mav_tasks.links.tcp_in import TcpInLink
 from mav_tasks.links.tcp_out import TcpOutLink
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl, SerialUrl
-from mav_tasks.links.way_out import TO_VEHICLES, WayOut
 
 
 def open_link(
-    url: LinkUrl | SerialUrl, *, way: WayOut, push: tuple[tuple[str, int], ...] = ()
+    url: LinkUrl | SerialUrl, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()
 ) -> Link:
     """Open a link; LinkOpenError says why not. ``push`` is for a UDP link, others ignore it.
 
@@ -19,12 +19,12 @@ def open_link(
     if isinstance(url, SerialUrl):
         from mav_tasks.links.serial import SerialLink  # noqa: PLC0415  # who has none, loads none
 
-        return SerialLink(url, way=way)
+        return SerialLink(url, limits=limits)
     if url.kind == "tcpin":
-        return TcpInLink(url, way=way)
+        return TcpInLink(url, limits=limits)
     if url.kind == "tcp":
-        return TcpOutLink(url, way=way)
-    is_rover_dialled = url.kind == "udpout" and way is TO_VEHICLES
+        return TcpOutLink(url, limits=limits)
+    is_rover_dialled = url.kind == "udpout" and limits is TO_VEHICLES
     return UdpLink(
         url, push=push, local_port=port_for(url.host, url.port) if is_rover_dialled else 0
     )

@@ -44,7 +44,7 @@ class OutQueue:
         self._drop_old(now=now)
 
     def next(self, *, now: float) -> bytes:
-        """Give what is to be written next; nothing if nothing waits."""
+        """Return what is to be written next; nothing if nothing waits."""
         if self._begun:
             return self._begun
         self._drop_old(now=now)

@@ -44,7 +44,7 @@ def is_nearby(url: LinkUrl | SerialUrl) -> bool:
 def policy_of(
     url: LinkUrl | SerialUrl, side: Side, rules: Rules, *, pushes_far: bool = False
 ) -> LinkPolicy:
-    """Give what is asked on a link; ``pushes_far``: it speaks to other machines unasked.
+    """Return what is asked on a link; ``pushes_far``: it speaks to other machines unasked.
 
     Its own key is the only one that counts on a link to vehicles: nothing else is taken there,
     unless its URL says so.
@@ -75,7 +75,7 @@ def check(url: LinkUrl | SerialUrl, side: Side, policy: LinkPolicy, rules: Rules
 
 
 def unsigned_beyond(what: str) -> InsecureLinkError:
-    """Give the error for what reaches others and takes what nobody has signed."""
+    """Return the error for what reaches others and takes what nobody has signed."""
     return InsecureLinkError(
         f"{what} reaches beyond this machine and needs no signing key: "
         f"anybody there could drive the vehicle; {MEANT}"

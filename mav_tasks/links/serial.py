@@ -17,9 +17,9 @@ from mav_tasks.clock import boot_time
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.out_queue import OutQueue
 from mav_tasks.links.url import SerialUrl
-from mav_tasks.links.way_out import WayOut
 
 PIECE = 280  # bytes read at once, a MAVLink packet
 LEAD = 0.1  # s that the line is busy with what was written; two TEND_PERIODs
@@ -38,16 +38,16 @@ class SerialLink:
     #: it may be a radio, with anybody at its other end
     is_local = False
 
-    def __init__(self, url: SerialUrl, *, way: WayOut) -> None:
+    def __init__(self, url: SerialUrl, *, limits: LinkLimits) -> None:
         self.name = str(url)
         self.capacity = url.baud / BITS
         self._url = url
-        self._way = way
+        self._limits = limits
         self._selector = selectors.DefaultSelector()
         self._attempts = Attempts()
         self._changes: list[PeerChange] = []
         self._device: Serial | None = None
-        self._queue = OutQueue(max_age=way.max_age)
+        self._queue = OutQueue(max_age=limits.max_age)
         self._free_at = 0.0  # when the line has sent what was written
         self._lost = 0
         self._attempts.is_due(now=boot_time())
@@ -69,11 +69,11 @@ class SerialLink:
         return self._lost + self._queue.dropped
 
     def fileno(self) -> int:
-        """Give the descriptor that tells of the device, whichever it is at the time."""
+        """Return the descriptor that tells of the device, whichever it is at the time."""
         return self._selector.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` pieces; send what waits."""
+        """Return up to ``limit`` pieces; send what waits."""
         received: list[tuple[Peer, bytes]] = []
         while self._device is not None and len(received) < limit and self._selector.select(0):
             try:
@@ -99,11 +99,11 @@ class SerialLink:
         self._flush()
 
     def take_changes(self) -> list[PeerChange]:
-        """Give what became of the device since the last call."""
+        """Return what became of the device since the last call."""
         changes, self._changes = self._changes, []
         return changes
 
-    def tend(self) -> None:
+    def poll(self) -> None:
         """Send what waits for the line; look for congestion; open the device if it is lost."""
         now = boot_time()
         if self._device is None:
@@ -141,7 +141,7 @@ class SerialLink:
         )
         self._device = device
         self._lost += self._queue.dropped
-        self._queue, self._free_at = OutQueue(max_age=self._way.max_age), 0.0
+        self._queue, self._free_at = OutQueue(max_age=self._limits.max_age), 0.0
         self._selector.register(device.fd, selectors.EVENT_READ)
         words = self._attempts.succeeded()
         self._changes.append(PeerChange(self._url.device, PeerState.UP, words))
@@ -194,7 +194,7 @@ def _is_not_there(error: Exception) -> bool:
 
 
 def _number_of(error: Exception) -> int | None:
-    """Give the system's number of an error: termios has it, too, but not under a name."""
+    """Return the system's number of an error: termios has it, too, but not under a name."""
     if isinstance(error, termios.error):
         return int(error.args[0])
     return error.errno if isinstance(error, OSError) else None

@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 from mav_tasks.clock import boot_time
 from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.out_queue import OutQueue
 from mav_tasks.links.url import LinkUrl
-from mav_tasks.links.way_out import WayOut
 
 PIECE = 280  # bytes read at once, a MAVLink packet: a piece takes no longer to handle than one
 KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}  # s, s, times
@@ -21,10 +21,10 @@ KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}  # s, s, t
 class Connection:
     """One connection, and what waits to be sent on it."""
 
-    def __init__(self, sock: socket.socket, peer: Peer, way: WayOut) -> None:
+    def __init__(self, sock: socket.socket, peer: Peer, limits: LinkLimits) -> None:
         self.socket = sock
         self.peer = peer
-        self.queue = OutQueue(max_age=way.max_age)
+        self.queue = OutQueue(max_age=limits.max_age)
         self.is_blocked = False  # the system takes no more: told when it does again
 
     def __repr__(self) -> str:
@@ -40,14 +40,18 @@ class Connections:
     """The connections of one link, with the descriptor that tells of them."""
 
     def __init__(
-        self, way: WayOut, *, other: Callable[[], None], ended: Callable[[Connection, str], None]
+        self,
+        limits: LinkLimits,
+        *,
+        other: Callable[[], None],
+        ended: Callable[[Connection, str], None],
     ) -> None:
         """``other`` sees to what is registered beside connections; ``ended`` is told why one is."""
         self.selector = selectors.DefaultSelector()
         self._lost = 0  # packets that were for nobody, or dropped by who is gone
         self._other = other
         self._ended = ended
-        self._way = way
+        self._limits = limits
         self._by_peer: dict[Peer, Connection] = {}
         self._changes: list[PeerChange] = []
 
@@ -66,19 +70,19 @@ class Connections:
         return peer in self._by_peer
 
     def fileno(self) -> int:
-        """Give the selector's descriptor, readable when anything is to be done."""
+        """Return the selector's descriptor, readable when anything is to be done."""
         return self.selector.fileno()
 
     def add(self, sock: socket.socket, peer: Peer, words: str) -> None:
         """Take a connection that stands into use. OSError: it does no more."""
-        prepare(sock, self._way)
-        connection = Connection(sock, peer, self._way)
+        prepare(sock, self._limits)
+        connection = Connection(sock, peer, self._limits)
         self.selector.register(sock, selectors.EVENT_READ, connection)
         self._by_peer[peer] = connection
         self._changes.append(PeerChange(peer, PeerState.UP, words))
 
     def take_changes(self) -> list[PeerChange]:
-        """Give what became of peers since the last call."""
+        """Return what became of peers since the last call."""
         changes, self._changes = self._changes, []
         return changes
 
@@ -87,7 +91,7 @@ class Connections:
         self._changes.append(change)
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` pieces, of each connection one after the other; send what waits.
+        """Return up to ``limit`` pieces, the connections in turn; send what waits.
 
         Whoever has ended is the last news: the next to come may come from the very same place.
         """
@@ -150,7 +154,7 @@ class Connections:
                 self._changes.append(PeerChange(connection.peer, state))
 
     def end(self, connection: Connection, words: str | None) -> None:
-        """Give a connection back; ``words`` tell of it."""
+        """Return a connection back; ``words`` tell of it."""
         del self._by_peer[connection.peer]
         self._lost += connection.queue.dropped
         self.selector.unregister(connection.socket)
@@ -198,11 +202,11 @@ class TcpLink:
         return self._connections.lost
 
     def fileno(self) -> int:
-        """Give the descriptor of all of it."""
+        """Return the descriptor of all of it."""
         return self._connections.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` pieces, of each connection one after the other; send what waits."""
+        """Return up to ``limit`` pieces, the connections in turn; send what waits."""
         return self._connections.receive(limit)
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
@@ -210,31 +214,31 @@ class TcpLink:
         self._connections.send(peer, data, first=first)
 
     def take_changes(self) -> list[PeerChange]:
-        """Give what became of peers since the last call."""
+        """Return what became of peers since the last call."""
         return self._connections.take_changes()
 
 
-def prepare(sock: socket.socket, way: WayOut) -> None:
+def prepare(sock: socket.socket, limits: LinkLimits) -> None:
     """Have a connection send at once, keep little, and notice when nobody is there any more."""
     sock.setblocking(False)
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    if way.send_buffer is not None:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, way.send_buffer)
-    limits = {"TCP_NOTSENT_LOWAT": way.unsent, "TCP_USER_TIMEOUT": round(way.give_up * 1e3)}
-    for name, value in {**KEEPALIVE, **limits}.items():
+    if limits.send_buffer is not None:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, limits.send_buffer)
+    options = {"TCP_NOTSENT_LOWAT": limits.unsent, "TCP_USER_TIMEOUT": round(limits.give_up * 1e3)}
+    for name, value in {**KEEPALIVE, **options}.items():
         if hasattr(socket, name):  # not every system has each of them
             sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
 def resolve(host: str, port: int) -> list[tuple[socket.AddressFamily, tuple[str, int]]]:
-    """Give the addresses that a host has. OSError: it has none."""
+    """Return the addresses that a host has. OSError: it has none."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     return [(family, (str(at[0]), int(at[1]))) for family, _, _, _, at in found]
 
 
 def reason_of(error: OSError) -> str:
-    """Give an error in words."""
+    """Return an error in words."""
     if error.errno is not None and error.errno > 0:
         return os.strerror(error.errno)
     return error.strerror or str(error)

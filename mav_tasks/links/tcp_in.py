@@ -4,9 +4,9 @@ import selectors
 import socket
 
 from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
 from mav_tasks.links.url import LinkUrl
-from mav_tasks.links.way_out import WayOut
 
 BACKLOG = 64  # connections that the system keeps until they are accepted
 
@@ -14,15 +14,15 @@ BACKLOG = 64  # connections that the system keeps until they are accepted
 class TcpInLink(TcpLink):
     """A listening TCP socket and its connections."""
 
-    def __init__(self, url: LinkUrl, *, way: WayOut) -> None:
+    def __init__(self, url: LinkUrl, *, limits: LinkLimits) -> None:
         self.refused = 0  # connections
         try:
             family, address = resolve(url.host, url.port)[0]
             self._socket = _listen(family, address)
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
-        self._most = way.connections
-        super().__init__(url, Connections(way, other=self._accept, ended=self._end))
+        self._most = limits.connections
+        super().__init__(url, Connections(limits, other=self._accept, ended=self._end))
         self._is_accepting = False
         self._accept_again()
 
@@ -34,7 +34,7 @@ class TcpInLink(TcpLink):
         """The port on which it listens."""
         return int(self._socket.getsockname()[1])
 
-    def tend(self) -> None:
+    def poll(self) -> None:
         """Look for congestions."""
         self._connections.look()
         self._accept_again()

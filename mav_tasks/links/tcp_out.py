@@ -7,9 +7,9 @@ from time import monotonic
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
 from mav_tasks.links.url import LinkUrl
-from mav_tasks.links.way_out import WayOut
 
 CONNECT_LIMIT = 3.0  # s for the other end to answer
 
@@ -20,13 +20,13 @@ class TcpOutLink(TcpLink):
     The host's addresses are looked up once, at the beginning: to look again could take seconds.
     """
 
-    def __init__(self, url: LinkUrl, *, way: WayOut) -> None:
+    def __init__(self, url: LinkUrl, *, limits: LinkLimits) -> None:
         self._peer: Peer = (url.host, url.port)
         try:
             self._addresses = resolve(url.host, url.port)
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
-        super().__init__(url, Connections(way, other=self._answered, ended=self._end))
+        super().__init__(url, Connections(limits, other=self._answered, ended=self._end))
         self._attempts = Attempts()
         self._dialling: socket.socket | None = None
         self._give_up_at = 0.0
@@ -34,7 +34,7 @@ class TcpOutLink(TcpLink):
     def __repr__(self) -> str:
         return f"TcpOutLink({self.name}, {'up' if len(self._connections) else 'down'})"
 
-    def tend(self) -> None:
+    def poll(self) -> None:
         """Dial if it is time to; look for congestions."""
         self._connections.look()
         now = monotonic()

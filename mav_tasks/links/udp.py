@@ -62,11 +62,11 @@ class UdpLink:
             return _open(family, (host, 0))
 
     def fileno(self) -> int:
-        """Give the socket's descriptor."""
+        """Return the socket's descriptor."""
         return self._socket.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Give up to ``limit`` datagrams that are there now."""
+        """Return up to ``limit`` datagrams that are there now."""
         received: list[tuple[Peer, bytes]] = []
         receive_from = self._socket.recvfrom
         try:
@@ -82,7 +82,7 @@ class UdpLink:
     def receive_stamped(
         self, limit: int, *, longest: float
     ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Give what ``receive`` gives, and how long each had waited to be read, s."""
+        """Return what ``receive`` gives, and how long each had waited to be read, s."""
         received: list[tuple[Peer, bytes]] = []
         waited: list[float] = []
         try:

@@ -60,7 +60,7 @@ class SerialUrl:
 
 
 def parse_url(text: str) -> LinkUrl | SerialUrl:
-    """Give the parts of a link URL; LinkUrlError says what is wrong with it."""
+    """Return the parts of a link URL; LinkUrlError says what is wrong with it."""
     where, _, options = text.partition("?")
     unsigned, key, local = _parse_options(options, what=f"link {text!r}")
     kind, _, rest = where.partition(":")
@@ -76,7 +76,7 @@ def parse_url(text: str) -> LinkUrl | SerialUrl:
 
 
 def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
-    """Give (host, port) of ``host:port``; LinkUrlError names ``what`` they are for."""
+    """Return (host, port) of ``host:port``; LinkUrlError names ``what`` they are for."""
     host, _, port = text.removeprefix("//").rpartition(":")
     host = host.strip("[]")
     if not host or not _is_number(port) or not 0 < int(port) < 65536:

@@ -39,17 +39,17 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 
 
 def text_entry(_number: int, event: Event) -> str:
-    """Give the time and the words."""
+    """Return the time and the words."""
     return f"{utc_text(event.at)} {clean(str(event))}\n"
 
 
 def json_entry(number: int, event: Event) -> str:
-    """Give one object."""
+    """Return one object."""
     return _encode({"number": number} | event_values(event, offset=0.0)) + "\n"
 
 
 def csv_entry(number: int, event: Event) -> str:
-    """Give a row of COLUMNS; what an event does not have is empty."""
+    """Return a row of COLUMNS; what an event does not have is empty."""
     values = event_values(event, offset=0.0)
     # of a submission: what it has become by it
     values = {"new": values.get("state")} | values | {"number": number, "words": values["message"]}
@@ -58,14 +58,14 @@ def csv_entry(number: int, event: Event) -> str:
 
 
 def csv_row(cells: Sequence[Any]) -> str:
-    """Give a row of a table."""
+    """Return a row of a table."""
     row = io.StringIO()
     csv.writer(row, lineterminator="\n").writerow(cells)
     return row.getvalue()
 
 
 def parse_since(text: str, *, now: float) -> float:
-    """Give the UTC seconds that are meant: so long before ``now``, or a date. UsageError."""
+    """Return the UTC seconds that are meant: so long before ``now``, or a date. UsageError."""
     ago = re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", text)
     if ago is not None:
         return now - float(ago[1]) * _SECONDS[ago[2]]

@@ -1,6 +1,6 @@
 """What helps where a link does not work as it should: who is heard at all, and how much is useless.
 
-A witness, for ``--verbose`` only: what it tells is no event, and nobody acts on it.
+An observer, for ``--verbose`` only: what it tells is no event, and nobody acts on it.
 """
 
 import logging
@@ -28,7 +28,7 @@ log = logging.getLogger("mav_tasks")
 
 
 class FieldNotes:
-    """Implements ``Witness``. ``counts`` gives what came in so far, in words."""
+    """Implements ``EngineObserver``. ``counts`` gives what came in so far, in words."""
 
     def __init__(self, counts: Callable[[], str]) -> None:
         self._counts = counts
@@ -39,12 +39,12 @@ class FieldNotes:
     def __repr__(self) -> str:
         return f"FieldNotes({len(self._heard)} heard)"
 
-    def took_in(self, item: Input | None, *, now: float) -> None:
+    def on_input(self, item: Input | None, *, now: float) -> None:
         """Take note of who is new."""
         match item:
             case AtOnce(packets=several) | Backlog(packets=several):
                 for each in several:
-                    self.took_in(each, now=now)
+                    self.on_input(each, now=now)
             case Packets(link=link):
                 for peer, _ in item.datagrams:
                     if (link, peer) not in self._heard:
@@ -62,7 +62,9 @@ class FieldNotes:
                 log.debug("came in: %s", self._counts())
             self._count_at = now + PERIOD
 
-    def gave_out(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> None:
+    def on_output(
+        self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
+    ) -> None:
         """Take no note: what the engine does is in its events."""
 
     def close(self) -> None:

@@ -34,7 +34,7 @@ class TextLines:
     def __call__(
         self, record: logging.LogRecord, words: str, repeated: tuple[int, float] | None
     ) -> str:
-        """Give the line."""
+        """Return the line."""
         second = int(record.created)
         if second != self._second:
             self._second = second
@@ -50,7 +50,7 @@ class TextLines:
 
 
 def json_line(record: logging.LogRecord, words: str, repeated: tuple[int, float] | None) -> str:
-    """Give one object: time, level, message; of an event its kind and fields."""
+    """Return one object: time, level, message; of an event its kind and fields."""
     values: dict[str, Any] = {
         "time": utc_text(record.created),
         "level": record.levelname.lower(),
@@ -82,7 +82,7 @@ class Lines:
         return f"Lines({self._repeats})"
 
     def of(self, record: logging.LogRecord, *, now: float) -> str | None:
-        """Give the line of a record; None: it was said lately, and is counted."""
+        """Return the line of a record; None: it was said lately, and is counted."""
         words = clean(record.getMessage())
         if not _is_change(record.msg) and not self._repeats.is_new(
             (record.levelno, words), (record, words), now=now
@@ -91,19 +91,19 @@ class Lines:
         return self._line_of(record, words, None)
 
     def line(self, record: logging.LogRecord) -> str:
-        """Give the line of a record, whatever was said before."""
+        """Return the line of a record, whatever was said before."""
         return self._line_of(record, clean(record.getMessage()), None)
 
     def due(self, *, now: float) -> Iterator[str]:
-        """Give a line for all that was repeated and counted for long enough."""
+        """Return a line for all that was repeated and counted for long enough."""
         return map(self._counted, self._repeats.due(now=now))
 
     def rest(self, *, now: float) -> Iterator[str]:
-        """Give a line for all that was counted and not said yet."""
+        """Return a line for all that was counted and not said yet."""
         return map(self._counted, self._repeats.rest(now=now))
 
     def _counted(self, of: tuple[Said[tuple[logging.LogRecord, str]], float]) -> str:
-        """Give a line of now: one with the time of the first would stand after later ones."""
+        """Return a line of now: one with the time of the first would stand after later ones."""
         said, seconds = of
         record, words = copy(said.what[0]), said.what[1]
         record.created = self._wall()

@@ -41,7 +41,7 @@ _PLAIN = frozenset({int, str, bool, NoneType})
 
 
 def values_of(event: Any, *, offset: float) -> dict[str, Any]:
-    """Give the values of an event, or of another dataclass that was logged, its kind first.
+    """Return the values of an event, or of another dataclass that was logged, its kind first.
 
     ``offset`` is UTC minus the seconds that the event's times are in.
     """
@@ -52,7 +52,7 @@ def values_of(event: Any, *, offset: float) -> dict[str, Any]:
 
 
 def event_values(event: Event, *, offset: float) -> dict[str, Any]:
-    """Give what a JSON line says of an event: as in the log, but for what only a log has."""
+    """Return what a JSON line says of an event: as in the log, but for what only a log has."""
     line = {
         "time": utc_text(event.at + offset),
         "level": logging.getLevelName(level_of(event)).lower(),
@@ -62,7 +62,7 @@ def event_values(event: Event, *, offset: float) -> dict[str, Any]:
 
 
 def level_of(event: Event) -> int:
-    """Give the log level of an event: what its operator should look at is a warning."""
+    """Return the log level of an event: what its operator should look at is a warning."""
     if isinstance(event, SignaturesSeen | TaskProgressed | VehicleHalted):
         return logging.DEBUG  # beside what else is told of it
     match event:
@@ -76,7 +76,7 @@ def level_of(event: Event) -> int:
 
 
 def utc_text(utc: float) -> str | None:
-    """Give UTC seconds as ISO 8601 with milliseconds; None: it is no time."""
+    """Return UTC seconds as ISO 8601 with milliseconds; None: it is no time."""
     if not isfinite(utc):
         return None
     second, rest = divmod(round(utc * 1e6), 1_000_000)
@@ -85,7 +85,7 @@ def utc_text(utc: float) -> str | None:
 
 
 def clean(words: str) -> str:
-    """Give words without what a terminal would take for an order, on one line.
+    """Return words without what a terminal would take for an order, on one line.
 
     A client or a vehicle may have sent some of them.
     """

@@ -45,7 +45,7 @@ class Repeats(Generic[T]):
         return False
 
     def due(self, *, now: float) -> Iterator[tuple[Said[T], float]]:
-        """Give what was repeated in a window that is over, with the length of that window."""
+        """Yield what was repeated in a window that is over, with the length of that window."""
         while self._said:
             key, said = next(iter(self._said.items()))
             if now < said.since + WINDOW and len(self._said) <= MOST:
@@ -57,7 +57,7 @@ class Repeats(Generic[T]):
                     self._said[key] = Said(said.what, now)
 
     def rest(self, *, now: float) -> Iterator[tuple[Said[T], float]]:
-        """Give all that was repeated and not said yet: nothing comes any more."""
+        """Yield all that was repeated and not said yet: nothing comes any more."""
         while self._said:
             _, said = self._said.popitem(last=False)
             if said.more:

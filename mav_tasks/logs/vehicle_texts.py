@@ -1,4 +1,4 @@
-"""What vehicles say (STATUSTEXT) goes to the log. A witness: it reads, and nobody waits for it."""
+"""Log what vehicles say (STATUSTEXT). An observer: it only reads, and nobody waits for it."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from mav_tasks.engine.inputs import (
     Packets,
     PeerChanged,
 )
-from mav_tasks.engine.intake import Intake
+from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.logs.rendering import clean
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder
@@ -58,11 +58,11 @@ class _Talk:
 
 
 class VehicleTexts:
-    """Implements ``Witness``."""
+    """Implements ``EngineObserver``."""
 
     def __init__(self) -> None:
         self._links: dict[str, bool] = {}  # of vehicles; whether it is a stream
-        self._intake = Intake()
+        self._intake = PacketReader()
         self._counts = DecodeCounts()
         self._decoder = Decoder()
         self._receiver = TextReceiver()
@@ -72,14 +72,14 @@ class VehicleTexts:
     def __repr__(self) -> str:
         return f"VehicleTexts({self._receiver}, {len(self._talks)} vehicles)"
 
-    def took_in(self, item: Input | None, *, now: float) -> None:
+    def on_input(self, item: Input | None, *, now: float) -> None:
         """Look for texts in what came."""
         if now >= self._due:
             self._handle_deadline(now)
         match item:
             case AtOnce(packets=several) | Backlog(packets=several):
                 for each in several:
-                    self.took_in(each, now=now)
+                    self.on_input(each, now=now)
             case Packets() if item.link in self._links:
                 for packet in self._texts_in(item, now):
                     self._receive(packet, now)
@@ -92,7 +92,9 @@ class VehicleTexts:
             case PeerChanged():
                 self._intake.change_peer(item)
 
-    def gave_out(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> None:
+    def on_output(
+        self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
+    ) -> None:
         """Take no note: nobody says anything here."""
 
     def close(self) -> None:

@@ -29,5 +29,5 @@ class Address(NamedTuple):
 
 @cache  # there are 65,536, and each packet asks for some
 def address_of(system_id: int, component_id: int) -> Address:
-    """Give an address as it comes from the wire."""
+    """Return an address as it comes from the wire."""
     return Address(system_id, component_id)

@@ -38,7 +38,7 @@ class Decoder:
         return f"Decoder({self.counts})"
 
     def decode(self, packet: Packet) -> Message | None:
-        """Give the message, or None if its id is unknown or its bytes are corrupt.
+        """Return the message, or None if its id is unknown or its bytes are corrupt.
 
         Who sent it the packet says: the message has no header.
         """
@@ -61,7 +61,7 @@ class Packer:
     """Packs messages of any source; the sequence number is the caller's to keep."""
 
     def pack(self, message: Message, source: Address, *, seq: int) -> bytes:
-        """Give one MAVLink 2 packet."""
+        """Return one MAVLink 2 packet."""
         message_id = type(message).id  # in some messages "id" is a field as well
         layout = _LAYOUTS[message_id]
         whole = layout.struct.pack(*layout.values(message))
@@ -93,7 +93,7 @@ class Encoder:
         return f"Encoder({self.source}, next_seq={self._next_seq})"
 
     def encode(self, message: Message) -> bytes:
-        """Give one MAVLink 2 packet and advance the sequence number."""
+        """Return one MAVLink 2 packet and advance the sequence number."""
         packed = self._packer.pack(message, self.source, seq=self._next_seq)
         self._next_seq = (self._next_seq + 1) & 0xFF
         return packed
@@ -116,5 +116,5 @@ def crc_fits(packet: Packet) -> bool:
 
 
 def target_of(message: Message) -> Address:
-    """Give the address that a message is targeted at; 0/0 if it names none."""
+    """Return the address that a message is targeted at; 0/0 if it names none."""
     return Address(getattr(message, "target_system", 0), getattr(message, "target_component", 0))

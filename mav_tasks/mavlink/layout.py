@@ -30,7 +30,7 @@ class Layout:
         self.values = _getter(message, is_plain=is_plain)
 
     def message(self, payload: bytes) -> Message:
-        """Give the message; a payload too short is filled with zeros, what is too much cut off."""
+        """Return the message; a short payload is filled with zeros, a long one is cut off."""
         size = self.struct.size
         if len(payload) != size:
             payload = payload[:size].ljust(size, b"\0")
@@ -40,7 +40,7 @@ class Layout:
 def _orderly(
     message: type[Message], *, is_plain: bool, has_text: bool
 ) -> Callable[[_Values], _Values]:
-    """Give what turns values in wire order into values in the order of definition."""
+    """Return what turns values in wire order into values in the order of definition."""
     if is_plain and not has_text and len(message.orders) > 1:
         if message.orders == sorted(message.orders):
             return lambda values: values
@@ -65,7 +65,7 @@ def _orderly(
 
 
 def _getter(message: type[Message], *, is_plain: bool) -> Callable[[Message], Iterable[Any]]:
-    """Give what takes a message's values in wire order, arrays flattened."""
+    """Return what takes a message's values in wire order, arrays flattened."""
     types = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
     # under its own name a text is a str: its bytes, which need not be UTF-8, are kept beside it
     names = [f"_{n}_raw" if types[n] == "char" else n for n in message.ordered_fieldnames]

@@ -56,7 +56,7 @@ class Packet(NamedTuple):
 
 
 def split_datagram(data: bytes) -> list[Packet]:
-    """Give the whole packets of one datagram, in order.
+    """Return the whole packets of one datagram, in order.
 
     Each datagram is parsed afresh, so that a truncated one cannot swallow the next. Bytes between
     packets are skipped; the caller counts them as ``len(data) - sum(len(p.raw))``.
@@ -98,7 +98,7 @@ def split_datagram(data: bytes) -> list[Packet]:
 
 
 def with_seq(packet: Packet, seq: int) -> bytes:
-    """Give the packet's bytes under another sequence number, unsigned.
+    """Return the packet's bytes under another sequence number, unsigned.
 
     A signature covers the sequence number, so it is taken off; the link that sends puts its own on.
     The CRC is corrected by its linearity and never verified: no CRC_EXTRA is needed, unknown ids
@@ -111,7 +111,7 @@ def with_seq(packet: Packet, seq: int) -> bytes:
 
 
 def with_payload(packet: Packet, at: int, data: bytes) -> Packet:
-    """Give the packet with other bytes in its payload from ``at`` on, unsigned.
+    """Return the packet with other bytes in its payload from ``at`` on, unsigned.
 
     Corrected as in ``with_seq``. Bytes beyond a payload that was cut short are left out.
     """
@@ -124,7 +124,7 @@ def with_payload(packet: Packet, at: int, data: bytes) -> Packet:
 
 
 def with_flags(raw: bytes, flags: int) -> bytes:
-    """Give a MAVLink 2 packet's bytes with other incompat flags, corrected as in ``with_seq``."""
+    """Return a MAVLink 2 packet's bytes with other incompat flags, corrected as in ``with_seq``."""
     return _patched(raw, 2, flags)
 
 
@@ -151,7 +151,7 @@ def _patched(raw: bytes, index: int, value: int) -> bytes:
 
 @cache
 def crcs_of_one_byte() -> frozenset[int]:
-    """Give what one more byte, whatever it is, can put into the upper half of a CRC: see codec."""
+    """Return what one more byte can put into the upper half of a CRC (see codec)."""
     return frozenset(_tail_crcs(0))
 
 

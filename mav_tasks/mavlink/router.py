@@ -16,5 +16,5 @@ class Router:
         self._places[system_id] = place
 
     def place_of(self, system_id: int) -> Place | None:
-        """Give where a system was heard."""
+        """Return where a system was heard."""
         return self._places.get(system_id)

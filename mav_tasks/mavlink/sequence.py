@@ -18,7 +18,7 @@ class SequenceKeeper:
         self._next: dict[Address, int] = {}
 
     def forwarded(self, source: Address, seq: int) -> int:
-        """Give the number under which a packet numbered ``seq`` is passed on."""
+        """Return the number under which a packet numbered ``seq`` is passed on."""
         number = (seq + self._offset.get(source, 0)) & 0xFF
         if source in self._next or len(self._next) < MOST:
             self._next[source] = (number + 1) & 0xFF
@@ -35,7 +35,7 @@ class SequenceKeeper:
             self._offset[source] = (self._offset.get(source, 0) - 1) & 0xFF
 
     def injected(self, source: Address) -> int:
-        """Give the number of a packet of our own, put into the source's stream."""
+        """Return the number of a packet of our own, put into the source's stream."""
         number, offset = self._next.get(source), self._offset.get(source)
         if number is None or offset is None:
             self._make_room(source)

@@ -50,22 +50,22 @@ class Stream(NamedTuple):
 
 
 def fingerprint_of(secret: bytes) -> str:
-    """Give 16 hexadecimal digits by which a key is recognised."""
+    """Return 16 hexadecimal digits by which a key is recognised."""
     return sha256(b"mav-tasks fingerprint" + secret).hexdigest()[:16]
 
 
 def timestamp_at(utc: float) -> int:
-    """Give the time of a signature at UTC seconds since 1970; none before 2015."""
+    """Return the time of a signature at UTC seconds since 1970; none before 2015."""
     return min(max(0, int((utc - EPOCH) * UNITS)), HIGHEST_TIMESTAMP)
 
 
 def stream_of(packet: Packet) -> Stream:
-    """Give the stream that a signed packet belongs to."""
+    """Return the stream that a signed packet belongs to."""
     return Stream(packet.raw[-SIGNATURE_LENGTH], packet.source)
 
 
 def timestamp_of(packet: Packet) -> int:
-    """Give the time of a signed packet, in 10 µs since 2015."""
+    """Return the time of a signed packet, in 10 µs since 2015."""
     return int.from_bytes(packet.raw[1 - SIGNATURE_LENGTH : -DIGEST_LENGTH], "little")
 
 
@@ -77,7 +77,7 @@ def is_signed_with(packet: Packet, secret: bytes) -> bool:
 
 
 def signed(raw: bytes, secret: bytes, *, link_id: int, timestamp: int) -> bytes:
-    """Give an unsigned packet with a signature; MAVLink 1 has none, and is given as it is."""
+    """Return an unsigned packet with a signature; MAVLink 1 has none, and is given as it is."""
     if raw[0] != MAGIC_V2:
         return raw
     told = with_flags(raw, raw[2] | SIGNED) + bytes((link_id,)) + timestamp.to_bytes(6, "little")
@@ -186,6 +186,6 @@ class Signer:
         self.last = max(self.last, timestamp)
 
     def sign(self, raw: bytes, *, clock: int) -> bytes:
-        """Give a packet with a signature of this time, or a later one, as long as there is one."""
+        """Return a packet signed with this time, or with a later one if that was used."""
         self.last = min(max(clock, self.last + 1), HIGHEST_TIMESTAMP)
         return signed(raw, self.key.secret, link_id=self.link_id, timestamp=self.last)

@@ -35,7 +35,7 @@ class StreamSplitter:
         return f"StreamSplitter({len(self._rest)} bytes kept, {self.noise} of noise)"
 
     def feed(self, data: bytes, *, now: float) -> list[Packet]:
-        """Give the packets that are whole with these bytes, in order."""
+        """Return the packets that are whole with these bytes, in order."""
         kept = len(self._rest)
         is_late = kept > 0 and now - self._since > PATIENCE
         data = self._rest + data
@@ -59,7 +59,7 @@ class StreamSplitter:
 
 
 def _stop_of(data: bytes, start: int) -> int | None:
-    """Give where the packet that may begin here ends, as far as can be told; None: none does."""
+    """Return where the packet that may begin here ends, as far as can be told; None: none does."""
     magic, there = data[start], len(data) - start
     if magic == MAGIC_V1:
         return start + HEADER_V1 + CRC + (data[start + 1] if there > 1 else 0)

@@ -52,7 +52,7 @@ class Entry(NamedTuple):
 def item(
     where: str, frame: float, command: float, *, params: Sequence[object], autocontinue: bool
 ) -> PlanItem:
-    """Give an item of checked fields; ``params`` are seven, in degrees and m as files have them."""
+    """Return an item of checked fields; ``params`` are seven, in degrees and m as in files."""
     p1, p2, p3, p4, x, y, z = (number(where, f"param {n}", p) for n, p in enumerate(params, 1))
     command_id = whole(where, "command", command, 65535)
     axes = AXES.get(whole(where, "frame", frame, 255))
@@ -65,7 +65,7 @@ def item(
 
 
 def point(where: str, value: object, size: int) -> GeoPoint:
-    """Give a place from [latitude, longitude] (``size`` 2) or [latitude, longitude, altitude]."""
+    """Return a place from [latitude, longitude] (``size`` 2) or [latitude, longitude, altitude]."""
     numbers = typed(where, "a point", value, list)
     if len(numbers) != size:
         raise PlanFileError(f"{where}: a point of {len(numbers)} numbers, {size} are needed")
@@ -78,7 +78,7 @@ def point(where: str, value: object, size: int) -> GeoPoint:
 
 
 def scaled(where: str, value: float, axis: Axis) -> int:
-    """Give ``value`` as the nearest int of its axis, ties to even; 0 for NaN, not given."""
+    """Return ``value`` as the nearest int of its axis, ties to even; 0 for NaN, not given."""
     if math.isnan(value):
         return 0
     if abs(value) > axis.limit:
@@ -89,7 +89,7 @@ def scaled(where: str, value: float, axis: Axis) -> int:
 
 
 def with_targets(entries: Sequence[Entry]) -> tuple[PlanItem, ...]:
-    """Give the items, with each DO_JUMP led to an index instead of the file's own number."""
+    """Return the items, with each DO_JUMP led to an index instead of the file's own number."""
     indices: dict[float, list[int]] = {}
     for index, entry in enumerate(entries):
         if entry.known_as is not None:

@@ -15,7 +15,7 @@ CIRCLES = {MavCmd.NAV_FENCE_CIRCLE_INCLUSION: True, MavCmd.NAV_FENCE_CIRCLE_EXCL
 
 
 def mission_of(items: Sequence[PlanItem], *, has_home_item: bool) -> PlanFile:
-    """Give a mission; ``has_home_item``: the first item is home, and jumps count it."""
+    """Return a mission; ``has_home_item``: the first item is home, and jumps count it."""
     if not has_home_item or not items:
         return PlanFile(tuple(items), None, (), ())
     first, *others = items
@@ -25,7 +25,7 @@ def mission_of(items: Sequence[PlanItem], *, has_home_item: bool) -> PlanFile:
 
 
 def fence_of(items: Sequence[PlanItem]) -> PlanFile:
-    """Give a fence; PlanFileError if a file cannot hold it. A return point is left out."""
+    """Return a fence; PlanFileError if a file cannot hold it. A return point is left out."""
     parts: list[FencePolygon | FenceCircle] = []
     rest = [item for item in items if item.command != MavCmd.NAV_FENCE_RETURN_POINT]
     while rest:

@@ -12,14 +12,14 @@ T = TypeVar("T")
 
 
 def get(where: str, holder: dict[str, Any], key: str, kind: type[T]) -> T:
-    """Give what ``holder`` has under ``key``, of one of the kinds in NEEDED."""
+    """Return what ``holder`` has under ``key``, of one of the kinds in NEEDED."""
     if key not in holder:
         raise PlanFileError(f"{where}: {key} is missing")
     return typed(where, key, holder[key], kind)
 
 
 def typed(where: str, name: str, value: object, kind: type[T]) -> T:
-    """Give ``value`` if it is of ``kind``, one of NEEDED."""
+    """Return ``value`` if it is of ``kind``, one of NEEDED."""
     if not isinstance(value, kind):
         raise PlanFileError(f"{where}: {name} is {shown(value)}, {NEEDED[kind]} is needed")
     return value
@@ -32,7 +32,7 @@ def check_version(where: str, holder: dict[str, Any], needed: int) -> None:
 
 
 def number(where: str, name: str, value: object) -> float:
-    """Give a number that a float on the wire can hold, or NaN for None: not given."""
+    """Return a number that a float on the wire can hold, or NaN for None: not given."""
     found = math.nan if value is None else typed(where, name, value, float)
     if math.isnan(found):
         return math.nan  # always this one, so that items that hold it can be compared
@@ -42,7 +42,7 @@ def number(where: str, name: str, value: object) -> float:
 
 
 def whole(where: str, name: str, value: object, most: int) -> int:
-    """Give a whole number from 0 to ``most``."""
+    """Return a whole number from 0 to ``most``."""
     found = typed(where, name, value, float)
     if not (0 <= found <= most and found.is_integer()):
         raise PlanFileError(

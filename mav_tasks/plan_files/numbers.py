@@ -11,7 +11,7 @@ FLOAT_DIGITS = range(6, 10)  # a float32 needs nine at the most
 
 
 def shortest(value: float) -> float:
-    """Give the float with the fewest digits that is the same float32, if it came from one."""
+    """Return the float with the fewest digits that is the same float32, if it came from one."""
     if not isfinite(value) or unpack("<f", pack("<f", value))[0] != value:
         return value
     for digits in FLOAT_DIGITS:
@@ -22,13 +22,13 @@ def shortest(value: float) -> float:
 
 
 def place(frame: int, x: int, y: int) -> tuple[float, float]:
-    """Give x and y in degrees or m, as the frame has them: the inverse of ``entries.scaled``."""
+    """Return x and y in degrees or m, as the frame has them: the inverse of ``entries.scaled``."""
     axes = AXES.get(frame, PLAIN)
     return unscaled(x, axes[0]), unscaled(y, axes[1])
 
 
 def unscaled(value: int, axis: Axis) -> float:
-    """Give one of them, NaN for "not given"."""
+    """Return one of them, NaN for "not given"."""
     if value == NOT_GIVEN:
         return nan
     return float(Decimal(value).scaleb(-axis.digits))

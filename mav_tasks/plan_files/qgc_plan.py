@@ -18,7 +18,7 @@ MAX_JUMP_ID = 2**31 - 1
 
 
 def from_json(text: str) -> PlanFile:
-    """Give what a JSON object says; PlanFileError names the part, or the place in the text."""
+    """Return what a JSON object says; PlanFileError names the part, or the place in the text."""
     try:
         root = json.loads(text, parse_int=float, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:

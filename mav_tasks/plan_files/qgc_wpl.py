@@ -13,7 +13,7 @@ from mav_tasks.plan_files.values import GeoPoint, PlanFile
 
 
 def from_wpl(text: str) -> PlanFile:
-    """Give what a text says; PlanFileError names the line, from 1."""
+    """Return what a text says; PlanFileError names the line, from 1."""
     numbered = ((number, line.split()) for number, line in enumerate(text.splitlines(), 1))
     lines = [(number, words) for number, words in numbered if words and words[0][0] != "#"]
     _check_header(lines[0][1] if lines else [])

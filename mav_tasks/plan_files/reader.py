@@ -13,7 +13,7 @@ MAX_ITEMS = 65_534  # of a kind: MISSION_COUNT.count is a uint16, and home may c
 
 
 def read_plan(path: Path) -> PlanFile:
-    """Give what a file says; PlanFileError also where it cannot be opened or is no UTF-8."""
+    """Return what a file says; PlanFileError also where it cannot be opened or is no UTF-8."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_SIZE + 1)
@@ -26,7 +26,7 @@ def read_plan(path: Path) -> PlanFile:
 
 
 def parse_plan_bytes(data: bytes) -> PlanFile:
-    """Give what the bytes of a file say; PlanFileError, and nothing else, if they are no plan."""
+    """Return what the bytes of a file say; PlanFileError, and nothing else, if they are no plan."""
     refuse_more("bytes", len(data), MAX_SIZE)
     try:
         text = data.decode("utf-8")
@@ -36,7 +36,7 @@ def parse_plan_bytes(data: bytes) -> PlanFile:
 
 
 def parse_plan(text: str) -> PlanFile:
-    """Give what the text of a file says; PlanFileError, and nothing else, if it is no such text.
+    """Return what the text of a file says; PlanFileError, and nothing else, if it is no such text.
 
     A byte order mark may come first; lines may end in any way.
     """

@@ -66,12 +66,12 @@ class PlanFile:
 
 
 def fence_items(plan: PlanFile) -> tuple[PlanItem, ...]:
-    """Give the fence as it is sent: an item for each vertex or circle, in the file's order."""
+    """Return the fence as it is sent: an item for each vertex or circle, in the file's order."""
     return tuple(item for part in plan.fence for item in _items_of(part))
 
 
 def rally_items(plan: PlanFile) -> tuple[PlanItem, ...]:
-    """Give the rally points as they are sent."""
+    """Return the rally points as they are sent."""
     command, frame = MavCmd.NAV_RALLY_POINT, MavFrame.GLOBAL_RELATIVE_ALT
     return tuple(PlanItem(command, frame, NO_PARAMS, *point, False) for point in plan.rally)
 

@@ -37,14 +37,14 @@ def write_plan(plan: PlanFile, path: Path) -> None:
 
 
 def format_for(plan: PlanFile, path: Path) -> str:
-    """Give the text that belongs into a file of this name."""
+    """Return the text that belongs into a file of this name."""
     if path.suffix.lower() in WPL_SUFFIXES:
         return format_wpl(plan)
     return format_plan(plan)
 
 
 def format_plan(plan: PlanFile) -> str:
-    """Give the text of a .plan file, with fence and rally points."""
+    """Return the text of a .plan file, with fence and rally points."""
     home = home_of(plan)
     root = {
         "fileType": "Plan",
@@ -74,7 +74,7 @@ def format_plan(plan: PlanFile) -> str:
 
 
 def format_wpl(plan: PlanFile) -> str:
-    """Give the text of a QGC WPL 110 file; PlanFileError if there is a fence, which it cannot hold.
+    """Return the text of a QGC WPL 110 file; PlanFileError if there is a fence: it holds none.
 
     Home is line 0, so that each item, and where a jump leads, counts from 1.
     """
@@ -95,7 +95,7 @@ def format_wpl(plan: PlanFile) -> str:
 
 
 def home_of(plan: PlanFile) -> GeoPoint:
-    """Give the home to write: the plan's own, else its first place on earth, else 0, 0."""
+    """Return the home to write: the plan's own, else its first place on earth, else 0, 0."""
     if plan.home is not None:
         return plan.home
     for item in plan.items:
@@ -125,7 +125,7 @@ def _line(number: int, item: PlanItem) -> str:
 
 
 def _params(item: PlanItem) -> tuple[float, ...]:
-    """Give the parameters; a jump leads to a number that counts from 1."""
+    """Return the parameters; a jump leads to a number that counts from 1."""
     first, *others = item.params
     if item.command == MavCmd.DO_JUMP:
         first += 1

@@ -8,7 +8,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.probe.others import SETPOINTS, Others
+from mav_tasks.probe.other_traffic import SETPOINTS, OtherTraffic
 from mav_tasks.probe.steps import Steps, Wait
 from mav_tasks.services.command_sender import Answered, CommandSender
 from mav_tasks.services.heartbeat import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
@@ -50,7 +50,7 @@ class Conversation:
         self.now = now
         self.source = source
         self.watch = watch
-        self.others = Others(source)
+        self.others = OtherTraffic(source)
         self.sender = CommandSender(source)
         self.motion = MotionMonitor(watch)
         self.control: OffboardControl | None = None
@@ -121,13 +121,13 @@ class Conversation:
         self._take_answers()
 
     def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         due = [self._heartbeat.next_deadline(), self._text_receiver.next_deadline()]
         at = self.sender.next_deadline()
         return min(due if at is None else [*due, at])
 
     def take_packets(self) -> list[bytes]:
-        """Give what is to be sent since the last call, in order."""
+        """Return what is to be sent since the last call, in order."""
         self._take_answers()
         requests, self._requests = self._requests, []
         setpoints = [] if self.control is None else self.control.take_messages()
@@ -137,8 +137,8 @@ class Conversation:
         self._outgoing = []
         return [self._encoder.encode(message) for message in messages]
 
-    def last_words(self) -> list[bytes]:
-        """Give zero, HOLD and disarming, for an end on which nothing can be waited for.
+    def emergency_stop_packets(self) -> list[bytes]:
+        """Return zero, HOLD and disarming, for an end on which nothing can be waited for.
 
         None where nothing is in our hands.
         """
@@ -174,7 +174,7 @@ class Conversation:
         self.send(m.CommandLong(*self.target, command, 0, m.Heartbeat.id, 0, 0, 0, 0, 0, 0))
 
     def begin_control(self, persona: Persona) -> OffboardControl:
-        """Give the hold on the rover; it does nothing yet."""
+        """Return the hold on the rover; it does nothing yet."""
         self.control = OffboardControl(self.target, persona, self.sender, self.watch)
         self.control.heard(armed=self.armed, mode=self.mode, now=self.now)
         return self.control
@@ -239,14 +239,14 @@ class Conversation:
 
 
 def name_of(message: m.ParamValue) -> str:
-    """Give a parameter's name."""
+    """Return a parameter's name."""
     name = message.param_id
     text = name.decode("ascii", "replace") if isinstance(name, bytes) else name
     return str(text).rstrip("\0")
 
 
 def result_name(result: int) -> str:
-    """Give a MAV_RESULT in words."""
+    """Return a MAV_RESULT in words."""
     known = {each.value: each.name for each in MavResult}
     return known.get(result, f"result {result}")
 

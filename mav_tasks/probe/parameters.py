@@ -63,7 +63,7 @@ def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
 
 
 def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:
-    """Give the value that a PARAM_VALUE means."""
+    """Return the value that a PARAM_VALUE means."""
     form = FORMATS.get(message.param_type)
     if not is_bytewise or form is None:
         return float(message.param_value)
@@ -72,7 +72,7 @@ def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:
 
 
 def loss_failsafe_of(talk: Conversation) -> LossFailsafe:
-    """Give what is known of the failsafe on which the server looks, too."""
+    """Return what is known of the failsafe on which the server looks, too."""
     persona = talk.persona
     is_by_parameters = persona is not None and persona.has_loss_failsafe
     failsafe = LossFailsafe(talk.target, is_by_parameters=is_by_parameters)
@@ -92,6 +92,6 @@ def _loss_of(talk: Conversation) -> str:
 
 
 def loss_time_of(findings: Findings) -> float:
-    """Give the seconds after which it is to stop without setpoints, as far as it says."""
+    """Return the seconds after which it is to stop without setpoints, as far as it says."""
     after = findings.parameters.get(AFTER, 3.0)
     return 3.0 if isnan(after) else after

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.probe.box import Box
 from mav_tasks.probe.conversation import Conversation
+from mav_tasks.probe.drive_controller import DriveController, DriveEnded, is_fresh
+from mav_tasks.probe.driving_area import DrivingArea
 from mav_tasks.probe.failsafe import NotSet, set_failsafe
 from mav_tasks.probe.findings import Drive, Findings
 from mav_tasks.probe.parameters import loss_failsafe_of, loss_time_of
@@ -19,7 +20,6 @@ from mav_tasks.probe.questions import (
 )
 from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
-from mav_tasks.probe.wheel import DriveEnded, Wheel, is_fresh
 from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Identity, Turning, Watch
 
@@ -99,12 +99,12 @@ class Probe:
         self._walk.go_on(now=now)
 
     def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         at = self._walk.next_deadline()
         return self.talk.next_deadline() if at is None else min(at, self.talk.next_deadline())
 
     def take_packets(self) -> list[bytes]:
-        """Give what is to be sent since the last call, in order."""
+        """Return what is to be sent since the last call, in order."""
         return self.talk.take_packets()
 
     def interrupt(self, words: str, *, now: float) -> None:
@@ -113,9 +113,9 @@ class Probe:
         if not self._is_clearing_up:
             self._walk.interrupt(Interrupted(words), now=now)
 
-    def last_words(self) -> list[bytes]:
-        """Give what makes a rover in our hands stand, for an end that cannot wait."""
-        return self.talk.last_words()
+    def emergency_stop_packets(self) -> list[bytes]:
+        """Return what makes a rover in our hands stand, for an end that cannot wait."""
+        return self.talk.emergency_stop_packets()
 
     def _run(self) -> Steps[None]:
         try:
@@ -174,14 +174,14 @@ class Probe:
             drive.ended = f"not driven: {why}"
             return
         found = self.findings
-        box = Box.about(motion.pose, turning=found.turning, radius=found.turning_radius)
-        wheel = Wheel(talk, persona, drive, box)
+        area = DrivingArea.about(motion.pose, turning=found.turning, radius=found.turning_radius)
+        controller = DriveController(talk, persona, drive, area)
         with_loss = self._may_try_loss(drive)
-        self.stage = f"driving in a box of {2 * box.half:g} m: keep clear; Ctrl-C stops it"
+        self.stage = f"driving in a area of {2 * area.half:g} m: keep clear; Ctrl-C stops it"
         try:
-            yield from wheel.take()
+            yield from controller.take()
             trials = Trials(
-                wheel,
+                controller,
                 persona,
                 drive,
                 speed=self._options.speed,
@@ -194,7 +194,7 @@ class Probe:
         except Interrupted as error:
             drive.ended, self.error = str(error), error
         self._is_clearing_up = True
-        yield from wheel.give_back()
+        yield from controller.give_back()
 
     def _may_try_loss(self, drive: Drive) -> bool:
         """Whether it is seen what it does without setpoints; not if it would drive far for it."""

@@ -5,7 +5,7 @@ from mav_tasks.settings import VehicleProfile
 
 
 def why_none(findings: Findings) -> str:
-    """Give in words why there is no profile to keep; "": there is one."""
+    """Return in words why there is no profile to keep; "": there is one."""
     drive = findings.drive
     if drive is None:
         return "without --drive nothing is measured"
@@ -17,7 +17,7 @@ def why_none(findings: Findings) -> str:
 
 
 def profile_of(findings: Findings, *, probed: str) -> VehicleProfile:
-    """Give it; ``probed`` is when, UTC. There must be one, see ``why_none``."""
+    """Return it; ``probed`` is when, UTC. There must be one, see ``why_none``."""
     drive = findings.drive
     assert drive is not None
     return VehicleProfile(

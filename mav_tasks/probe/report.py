@@ -37,12 +37,12 @@ class Line(NamedTuple):
 
 
 def lines_of(findings: Findings) -> list[Line]:
-    """Give the report, in the order of reading."""
+    """Return the report, in the order of reading."""
     return list(_lines(findings))
 
 
 def as_json(findings: Findings) -> dict[str, Any]:
-    """Give all of it; what is not a number is null, and what is not known is null or empty."""
+    """Return all of it; what is not a number is null, and what is not known is null or empty."""
     values = asdict(findings)
     values["parameters"] = {
         name: value if isfinite(value) else None for name, value in findings.parameters.items()

@@ -62,7 +62,7 @@ class Walk:
             self.go_on(now=now)
 
     def next_deadline(self) -> float | None:
-        """Give when there is a step to take, whatever comes; None: they are over."""
+        """Return when there is a step to take, whatever comes; None: they are over."""
         return self._until if self._wait is not None else None
 
     def _take(self, came: bool | None, *, now: float) -> None:

@@ -1,13 +1,13 @@
-"""What a rover is made to do to see how it does it: short, slow, and inside the box."""
+"""What a rover is made to do to see how it does it: short, slow, and inside the area."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, degrees, hypot, pi, sin
 
 from mav_tasks.mavlink.enums import MavFrame
+from mav_tasks.probe.drive_controller import DriveController, DriveEnded
 from mav_tasks.probe.findings import Drive
 from mav_tasks.probe.steps import Steps
-from mav_tasks.probe.wheel import DriveEnded, Wheel
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import ARDUPILOT, PX4, Persona
 from mav_tasks.tasks.driving.guidance import wrap
@@ -51,12 +51,12 @@ class Kind:
         return f"Kind({self.name})"
 
     def speeds(self, speed: float, course: float) -> Speeds:
-        """Give what asks for this speed, in the direction in which it points anyway."""
+        """Return what asks for this speed, in the direction in which it points anyway."""
         return Speeds(speed, 0.0, course if self.by_course else None)
 
 
 def kinds_of(persona: Persona) -> list[Kind]:
-    """Give all that the server could use, the persona's own first."""
+    """Return all that the server could use, the persona's own first."""
     kinds = [
         Kind(persona, PX4.setpoint_mask, MavFrame.LOCAL_NED, by_course=True),
         Kind(persona, PX4.setpoint_mask, MavFrame.BODY_NED, by_course=False),
@@ -76,7 +76,7 @@ class Trials:
 
     def __init__(
         self,
-        wheel: Wheel,
+        controller: DriveController,
         persona: Persona,
         drive: Drive,
         *,
@@ -89,7 +89,7 @@ class Trials:
         ``is_car``: it turns only while it rolls, and is not asked to do so on the spot.
         """
         self._is_car = is_car
-        self._wheel = wheel
+        self._controller = controller
         self._persona = persona
         self._drive = drive
         self._speed = speed
@@ -106,34 +106,34 @@ class Trials:
         yield from self._look_at_standing()
         yield from self._try_turning()
         yield from self._try_reverse()
-        self._wheel.speak(self._own.persona)
+        self._controller.speak(self._own.persona)
         yield from self._measure_stop()
         if with_loss:
             yield from self._measure_loss()
 
     def _try_kind(self, kind: Kind) -> Steps[None]:
-        wheel = self._wheel
-        before = wheel.motion.pose
+        controller = self._controller
+        before = controller.motion.pose
         wanted = kind.speeds(TRIAL_SPEED, before.yaw)
-        yield from self._with(kind, wanted, lambda: _way(before, wheel))
+        yield from self._with(kind, wanted, lambda: _way(before, controller))
         yield from self._rest()
-        followed = _way(before, wheel) >= FOLLOWED
+        followed = _way(before, controller) >= FOLLOWED
         (self._drive.accepted if followed else self._drive.refused).append(kind.name)
         if not followed and kind.name == self._own.name:
             raise DriveEnded(f"it does not follow {kind.name}")
 
     def _with(self, kind: Kind, wanted: Speeds, way: Callable[[], float]) -> Steps[None]:
-        wheel, limit = self._wheel, TRIAL_TIME
+        controller, limit = self._controller, TRIAL_TIME
         if self._persona.has_loss_failsafe and kind.name != self._own.name:
             limit = min(limit, OF_THE_FAILSAFE * self._loss_time)
-        wheel.speak(kind.persona)
-        end = wheel.now + limit
-        while wheel.now < end and abs(way()) < TRIAL_WAY:
-            yield from wheel.drive(wanted)
+        controller.speak(kind.persona)
+        end = controller.now + limit
+        while controller.now < end and abs(way()) < TRIAL_WAY:
+            yield from controller.drive(wanted)
 
     def _rest(self) -> Steps[None]:
-        self._wheel.speak(self._own.persona)
-        if not (yield from self._wheel.stand()):
+        self._controller.speak(self._own.persona)
+        if not (yield from self._controller.stand()):
             raise DriveEnded("it does not stand on zeros")
 
     @property
@@ -143,15 +143,17 @@ class Trials:
 
     def _look_at_standing(self) -> Steps[None]:
         """A PX4 takes a velocity of zero for a course: does it turn where it is to stand?"""
-        wheel = self._wheel
-        wheel.speak(self._own.persona)
-        before, end = wheel.motion.pose.yaw, wheel.now + STAND_TIME
-        while wheel.now < end:
-            yield from wheel.drive(STANDING)
-        self._drive.turned_standing_deg = round(degrees(wrap(wheel.motion.pose.yaw - before)), 1)
+        controller = self._controller
+        controller.speak(self._own.persona)
+        before, end = controller.motion.pose.yaw, controller.now + STAND_TIME
+        while controller.now < end:
+            yield from controller.drive(STANDING)
+        self._drive.turned_standing_deg = round(
+            degrees(wrap(controller.motion.pose.yaw - before)), 1
+        )
 
     def _try_turning(self) -> Steps[None]:
-        kind, wheel, drive = self._rate_kind, self._wheel, self._drive
+        kind, controller, drive = self._rate_kind, self._controller, self._drive
         if kind is None:
             drive.yaw_rate = "ignored"
             return
@@ -160,76 +162,76 @@ class Trials:
             return
         shares: list[float] = []
         for rate in (TURN_RATE, -TURN_RATE):
-            wheel.speak(kind.persona)
-            before, end, turned = wheel.motion.pose.yaw, wheel.now + TURN_TIME, 0.0
-            while wheel.now < end:
-                yield from wheel.drive(Speeds(0.0, rate))
-                turned = wrap(wheel.motion.pose.yaw - before)
+            controller.speak(kind.persona)
+            before, end, turned = controller.motion.pose.yaw, controller.now + TURN_TIME, 0.0
+            while controller.now < end:
+                yield from controller.drive(Speeds(0.0, rate))
+                turned = wrap(controller.motion.pose.yaw - before)
             shares.append(turned / (rate * TURN_TIME))
             yield from self._rest()
         drive.turned_of_wanted = round(min(shares), 2)
         drive.yaw_rate = "honoured" if min(shares) >= TURNED else "ignored"
 
     def _try_reverse(self) -> Steps[None]:
-        kind, wheel, drive = self._rate_kind, self._wheel, self._drive
+        kind, controller, drive = self._rate_kind, self._controller, self._drive
         if kind is None:
             drive.reverse = "no"
             return
-        before = wheel.motion.pose
-        yield from self._with(kind, Speeds(-TRIAL_SPEED), lambda: _along(before, wheel))
-        backed = _along(before, wheel) <= -FOLLOWED
-        straight = abs(wrap(wheel.motion.pose.yaw - before.yaw)) < STRAIGHT
+        before = controller.motion.pose
+        yield from self._with(kind, Speeds(-TRIAL_SPEED), lambda: _along(before, controller))
+        backed = _along(before, controller) <= -FOLLOWED
+        straight = abs(wrap(controller.motion.pose.yaw - before.yaw)) < STRAIGHT
         drive.reverse = "yes" if backed and straight else "no"
         if drive.reverse == "yes":  # and on, for room ahead
-            end = wheel.now + RUN_UP
-            while wheel.ahead > BACK_TO and wheel.now < end:
-                yield from wheel.drive(Speeds(-TRIAL_SPEED))
+            end = controller.now + RUN_UP
+            while controller.ahead > BACK_TO and controller.now < end:
+                yield from controller.drive(Speeds(-TRIAL_SPEED))
         yield from self._rest()
 
     def _measure_stop(self) -> Steps[None]:
-        wheel, drive = self._wheel, self._drive
+        controller, drive = self._controller, self._drive
         speed = yield from self._run_up(self._speed, stop_time=1.0)
-        before, began = wheel.motion.pose, wheel.now
+        before, began = controller.motion.pose, controller.now
         stood_at = began
         end = began + STOP_TIME
-        while not wheel.is_still and wheel.now < end:
-            yield from wheel.drive(STANDING)
-            if wheel.motion.speed > wheel.still_speed:
-                stood_at = wheel.now
-        if not wheel.is_still:
+        while not controller.is_still and controller.now < end:
+            yield from controller.drive(STANDING)
+            if controller.motion.speed > controller.still_speed:
+                stood_at = controller.now
+        if not controller.is_still:
             raise DriveEnded(f"it does not stand within {STOP_TIME:g} s of zeros")
         drive.speed = round(speed, 3)
-        drive.stopping_distance = round(_way(before, wheel), 3)
+        drive.stopping_distance = round(_way(before, controller), 3)
         drive.stopping_time = round(stood_at - began, 2)
 
     def _measure_loss(self) -> Steps[None]:
         """Drive, then say nothing: does it stop by itself, and where?"""
-        wheel, drive = self._wheel, self._drive
+        controller, drive = self._controller, self._drive
         course, room = self._roomiest()
         speed = min(TRIAL_SPEED, (room - 0.25) / (self._loss_time + 1.5))
         if speed < LEAST_SPEED:
             drive.loss_note = f"no room: {room:.1f} m ahead, and {self._loss_time:g} s to wait"
             return
         speed = yield from self._run_up(speed, stop_time=self._loss_time, course=course)
-        before, began = wheel.motion.pose, wheel.now
+        before, began = controller.motion.pose, controller.now
         end = began + self._loss_time + LOSS_SPARE
         slowed_at: float | None = None
         try:
-            while not wheel.is_still and wheel.now < end:
-                yield from wheel.let_go()
-                if slowed_at is None and wheel.motion.speed < SLOWING * speed:
-                    slowed_at = wheel.now
+            while not controller.is_still and controller.now < end:
+                yield from controller.let_go()
+                if slowed_at is None and controller.motion.speed < SLOWING * speed:
+                    slowed_at = controller.now
         except DriveEnded:
-            if wheel.now > began + self._loss_time + 1.0 and slowed_at is None:
+            if controller.now > began + self._loss_time + 1.0 and slowed_at is None:
                 drive.loss_stop = "no"
             raise
-        drive.loss_stop = "yes" if wheel.is_still else "no"
+        drive.loss_stop = "yes" if controller.is_still else "no"
         drive.loss_speed = round(speed, 3)
-        drive.loss_distance = round(_way(before, wheel), 3)
+        drive.loss_distance = round(_way(before, controller), 3)
         if slowed_at is not None:
             drive.setpoint_timeout = round(slowed_at - began, 2)
         if drive.loss_stop == "no":
-            raise DriveEnded(f"it drives on {wheel.now - began:.1f} s after the last setpoint")
+            raise DriveEnded(f"it drives on {controller.now - began:.1f} s after the last setpoint")
 
     def _run_up(
         self, speed: float, *, stop_time: float, course: float | None = None
@@ -238,37 +240,40 @@ class Trials:
 
         ``stop_time``: s that it may go on at that speed when the run-up is over.
         """
-        wheel, kind = self._wheel, self._own
+        controller, kind = self._controller, self._own
         if course is None:
             course, _ = self._roomiest()
-        end, steady_since = wheel.now + RUN_UP, wheel.now
-        while wheel.now < end:
-            yield from wheel.drive(kind.speeds(speed, course))
-            motion = wheel.motion
+        end, steady_since = controller.now + RUN_UP, controller.now
+        while controller.now < end:
+            yield from controller.drive(kind.speeds(speed, course))
+            motion = controller.motion
             is_off = abs(wrap(course - motion.pose.yaw)) > ON_COURSE
             if is_off or motion.forward < AT_SPEED * speed:
-                steady_since = wheel.now
-            if wheel.now - steady_since >= STEADY:
+                steady_since = controller.now
+            if controller.now - steady_since >= STEADY:
                 return motion.forward
-            if not is_off and wheel.box.room(motion.pose, course) < speed * (stop_time + 0.5):
+            if not is_off and controller.area.room(motion.pose, course) < speed * (stop_time + 0.5):
                 break
         raise DriveEnded(f"it does not come to {speed:.2f} m/s in the room that there is")
 
     def _roomiest(self) -> tuple[float, float]:
-        """Give the direction, ahead or where it can turn to by itself, with the most room; m."""
-        wheel = self._wheel
-        yaw = wheel.motion.pose.yaw
+        """Return the direction, ahead or where it can turn to by itself, with the most room; m."""
+        controller = self._controller
+        yaw = controller.motion.pose.yaw
         turns_round = self._own.by_course and not self._is_car
         courses = [yaw, yaw + pi] if turns_round else [yaw]
-        return max(((c, wheel.box.room(wheel.motion.pose, c)) for c in courses), key=lambda x: x[1])
+        return max(
+            ((c, controller.area.room(controller.motion.pose, c)) for c in courses),
+            key=lambda x: x[1],
+        )
 
 
-def _way(before: Pose, wheel: Wheel) -> float:
-    pose = wheel.motion.pose
+def _way(before: Pose, controller: DriveController) -> float:
+    pose = controller.motion.pose
     return hypot(pose.north - before.north, pose.east - before.east)
 
 
-def _along(before: Pose, wheel: Wheel) -> float:
-    pose = wheel.motion.pose
+def _along(before: Pose, controller: DriveController) -> float:
+    pose = controller.motion.pose
     north, east = pose.north - before.north, pose.east - before.east
     return north * cos(before.yaw) + east * sin(before.yaw)

@@ -1,26 +1,26 @@
 """Records of a run: telemetry logs for ground stations, and decisions that can be replayed.
 
-Witnesses (see ``witness.py``) only take notes while the server works; threads of their own write.
+Observers of the engine (``observer.py``) only take notes; threads of their own write.
 """
 
+from mav_tasks.observer import EngineObserver
 from mav_tasks.recording.decisions import Decisions
 from mav_tasks.recording.new_files import prepared
 from mav_tasks.recording.tlog import Tlog
 from mav_tasks.settings import Recording, Settings
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.witness import Witness
 
-__all__ = ["witnesses"]
+__all__ = ["observers"]
 
 
-def witnesses(
+def observers(
     recording: Recording, settings: Settings, restored: Restored | None, *, now: float
-) -> list[Witness]:
-    """Give who keeps the records that are asked for, of an engine that gets the same three values.
+) -> list[EngineObserver]:
+    """Return the recorders that the settings ask for; the engine gets the same three values.
 
     RecordError: they cannot be kept there.
     """
-    found: list[Witness] = []
+    found: list[EngineObserver] = []
     if recording.tlog:
         found.append(
             Tlog(

@@ -23,7 +23,7 @@ E = TypeVar("E")
 
 
 def room_of(item: Input | None) -> int:
-    """Give how many bytes, about, an input takes in memory."""
+    """Return how many bytes, about, an input takes in memory."""
     if isinstance(item, AtOnce | inputs.Backlog):
         return sum(map(room_of, item.packets), SMALL)
     if not isinstance(item, Packets):
@@ -55,7 +55,7 @@ class Backlog(Generic[E]):
         return True
 
     def taken(self) -> Iterator[E]:
-        """Give and forget what is there, until nothing is; makes way for the loop in between."""
+        """Yield and forget what is there, until nothing is; makes way for the loop in between."""
         count = 0
         while self._entries:
             entry, room = self._entries.popleft()

@@ -32,7 +32,7 @@ Entry = tuple[float, Input | None] | tuple[float, Sequence[Outgoing], Sequence[E
 
 
 class Decisions:
-    """A witness that writes one record of the run; it ends early rather than have gaps."""
+    """An observer that writes one record of the run; it ends early rather than have gaps."""
 
     def __init__(
         self,
@@ -67,12 +67,14 @@ class Decisions:
     def __str__(self) -> str:
         return f"record of decisions {self.path}"
 
-    def took_in(self, item: Input | None, *, now: float) -> None:
+    def on_input(self, item: Input | None, *, now: float) -> None:
         """Note what the engine is told."""
         if not self._why and not self._backlog.put((now, item), room_of(item)):
             self._why = TOO_MUCH
 
-    def gave_out(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> None:
+    def on_output(
+        self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
+    ) -> None:
         """Note what it made of it."""
         room = ROOM_OF_PACKET * (1 + len(packets) + len(events))
         if not self._why and not self._backlog.put((now, packets, events), room):
@@ -161,7 +163,7 @@ class Decisions:
 
 
 def project_version() -> str:
-    """Give the version of this package as it is installed."""
+    """Return the version of this package as it is installed."""
     try:
         return version("mav-tasks")
     except PackageNotFoundError:

@@ -29,12 +29,12 @@ def prepared(folder: str) -> Path:
 
 
 def stamp(utc: float) -> str:
-    """Give a time, seconds since 1970, as file names have it."""
+    """Return a time, seconds since 1970, as file names have it."""
     return f"{datetime.fromtimestamp(max(utc, 0.0), UTC):%Y-%m-%dT%H-%M-%SZ}"
 
 
 def name_of(start: str, number: int, suffix: str) -> str:
-    """Give the name of one file of a run."""
+    """Return the name of one file of a run."""
     return f"{start}.{number}{suffix}" if number else f"{start}{suffix}"
 
 

@@ -64,7 +64,7 @@ class Record:
     why_it_ends: str | None
 
     def entries(self) -> Iterator[Entry]:
-        """Give what the engine took and gave, in order."""
+        """Yield what the engine took and gave, in order."""
         begin = 1 + (0 if self.restored is None else len(self.restored.tasks))
         for number, raw in islice(_numbered(self.path), begin, self.lines):
             yield Entry(number, raw, _entry_values(self.path, number, raw))
@@ -102,7 +102,7 @@ def read(path: Path) -> Record:
 
 
 def _measure(path: Path) -> tuple[int, str | None]:
-    """Give the number of lines before the end mark, and what it says.
+    """Return the number of lines before the end mark, and what it says.
 
     RecordError: the mark does not fit to what stands before it.
     """
@@ -174,7 +174,7 @@ def _entry_values(path: Path, number: int, raw: bytes) -> Sequence[Any]:
 
 
 def _numbered(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Give the whole lines of a file; what follows the last of them is left out."""
+    """Yield the whole lines of a file; what follows the last of them is left out."""
     begun = bytearray()
     number = 0
     for data in _inflated(path):

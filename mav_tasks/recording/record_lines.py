@@ -76,15 +76,15 @@ class LineWriter:
         self._ways: dict[tuple[str, Hashable], bytes] = {}
 
     def task(self, task: Task) -> str:
-        """Give the line of a task of an earlier run."""
+        """Return the line of a task of an earlier run."""
         return dumps(["task", self._encoder.row(task, offset=0.0)])
 
     def taken(self, item: Input | None, *, now: float) -> str:
-        """Give the line of an input, or (None) of a deadline. Unwritable: a peer of no link."""
+        """Return the line of an input, or (None) of a deadline. Unwritable: a peer of no link."""
         return dumps(_input_to_json(item, now))
 
     def given(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> str:
-        """Give the line of what the engine gave in one turn."""
+        """Return the line of what the engine gave in one turn."""
         rows = [[type(event).__name__, *self._encoder.row(event, offset=0.0)] for event in events]
         return dumps(["out", now, len(packets), self._digest(packets), rows])
 
@@ -104,7 +104,7 @@ class LineWriter:
 
 
 def input_of(line: Sequence[Any]) -> Input | None:
-    """Give the input of a line, None for a deadline.
+    """Return the input of a line, None for a deadline.
 
     KeyError, TypeError, ValueError: it is none.
     """
@@ -140,7 +140,7 @@ def input_of(line: Sequence[Any]) -> Input | None:
 
 
 def described(row: Sequence[Any]) -> str:
-    """Give an event's row in words, with the names of its places."""
+    """Return an event's row in words, with the names of its places."""
     name, *values = row
     return f"{name}({', '.join(f'{p}={v!r}' for p, v in zip(ROWS[name], values, strict=True))})"
 
@@ -204,7 +204,7 @@ def _packets_of(link: str, datagrams: Sequence[Any], waited: Sequence[float] = (
 
 
 def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool) -> Key:
-    """Give a key without its secret, which is in no record; MISSING stands for one that it had."""
+    """Return a key without its secret, which no record holds; MISSING stands for it."""
     return Key(name, MISSING if is_in_use else b"", role, fingerprint)
 
 
@@ -220,7 +220,7 @@ def _peer_to_json(peer: Hashable) -> Hashable:
 
 
 def peer_of(value: Any) -> Hashable:
-    """Give the peer that a line names."""
+    """Return the peer that a line names."""
     if isinstance(value, list):
         return tuple(map(_plain, value))
     return _plain(value)

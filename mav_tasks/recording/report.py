@@ -88,7 +88,7 @@ def _time(happened: Happened) -> str:
 
 
 def _as_logged(happened: Happened) -> dict[str, Any]:
-    """Give an event as the log and the journal have it; the time None where it is not known."""
+    """Return an event as the log and the journal have it; the time None where it is not known."""
     if happened.utc is None:
         return event_values(happened.event, offset=0.0) | {"time": None}
     return event_values(happened.event, offset=happened.utc - happened.now)

@@ -16,7 +16,7 @@ from mav_tasks.tasks.task import Frame, Task
 
 
 def settings_to_json(settings: Any) -> Any:
-    """Give settings, or a part of them, by name."""
+    """Return settings, or a part of them, by name."""
     if is_dataclass(settings):
         return {
             field.name: settings_to_json(getattr(settings, field.name))
@@ -28,7 +28,7 @@ def settings_to_json(settings: Any) -> Any:
 
 
 def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
-    """Give settings back; one that is missing has its default. ValueError: one is unknown."""
+    """Return settings back; one that is missing has its default. ValueError: one is unknown."""
     hints = get_type_hints(kind)
     unknown = sorted(set(values) - set(hints))
     if unknown:
@@ -46,7 +46,7 @@ def _setting_of(value: Any, hint: Any) -> Any:
 
 
 def restored_to_json(restored: Restored) -> dict[str, Any]:
-    """Give all but the tasks, of which there is their number; mappings in their order."""
+    """Return all but the tasks, of which there is their number; mappings in their order."""
     return {
         "tasks": len(restored.tasks),
         "next_id": restored.next_id,
@@ -71,7 +71,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
 
 
 def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
-    """Give it back. KeyError, TypeError or ValueError: there is something else."""
+    """Return it back. KeyError, TypeError or ValueError: there is something else."""
     return Restored(
         tasks=tasks,
         next_id=values["next_id"],

@@ -32,7 +32,7 @@ Entry = tuple[float, Input | Sequence[Outgoing]]
 
 
 class Tlog:
-    """A witness that writes telemetry logs into a folder."""
+    """An observer that writes telemetry logs into a folder."""
 
     def __init__(
         self,
@@ -61,18 +61,18 @@ class Tlog:
     def __str__(self) -> str:
         return self._name
 
-    def took_in(self, item: Input | None, *, now: float) -> None:
+    def on_input(self, item: Input | None, *, now: float) -> None:
         """Note what came, and who is there."""
         if isinstance(item, Packets):
             if not self._backlog.put((now, item), room_of(item)):
                 self._too_many.lose(len(item.datagrams), "too much waits to be written")
         elif isinstance(item, AtOnce | inputs.Backlog):
             for each in item.packets:
-                self.took_in(each, now=now)
+                self.on_input(each, now=now)
         elif isinstance(item, WallClock | LinkChanged | PeerChanged):
             self._backlog.put((now, item), SMALL)
 
-    def gave_out(
+    def on_output(
         self,
         packets: Sequence[Outgoing],
         events: Sequence[Event],  # noqa: ARG002

@@ -18,7 +18,7 @@ from mav_tasks.engine.inputs import (
     PeerChanged,
     WallClock,
 )
-from mav_tasks.engine.intake import Intake
+from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import DecodeCounts, crc_fits
 from mav_tasks.mavlink.packet import HEADER_V1, HEADER_V2, MAGIC_V2
@@ -32,7 +32,7 @@ class TlogContent:
     def __init__(self, *, component_id: int) -> None:
         """``component_id`` is the server's."""
         self._component_id = component_id
-        self._intake = Intake()
+        self._intake = PacketReader()
         self._counts = DecodeCounts()  # kept for nobody: the engine has its own
         self._vehicle_links: set[str] = set()
         self._wall_offset = 0.0
@@ -40,11 +40,11 @@ class TlogContent:
         self._heard: set[bytes] = set()  # what vehicles said at ``_now``, without its number
 
     def utc(self, now: float) -> float:
-        """Give the wall clock's time, seconds since 1970."""
+        """Return the wall clock's time, seconds since 1970."""
         return now + self._wall_offset
 
     def of_input(self, item: Input, *, now: float) -> Iterator[bytes]:
-        """Give what an input adds to the log."""
+        """Yield what an input adds to the log."""
         match item:
             case Packets():
                 yield from self._received(item, now=now)
@@ -58,7 +58,7 @@ class TlogContent:
                 self._intake.change_peer(item)
 
     def of_output(self, packets: Sequence[Outgoing], *, now: float) -> Iterator[bytes]:
-        """Give what stands in the log of the packets of one turn."""
+        """Yield what stands in the log of the packets of one turn."""
         when = self._when(now)
         told: dict[bytes, tuple[str, Peer]] = {}
         for link, peer, data, *_ in packets:
@@ -98,14 +98,14 @@ class TlogContent:
 
 
 def _head(raw: bytes) -> tuple[int, int]:
-    """Give who of its system sent a packet, and the message's id."""
+    """Return who of its system sent a packet, and the message's id."""
     if raw[0] == MAGIC_V2:
         return raw[6], raw[7] | raw[8] << 8 | raw[9] << 16
     return raw[4], raw[5]
 
 
 def _words(raw: bytes) -> bytes:
-    """Give a packet's source, message id and payload: all that passing it on leaves as it is."""
+    """Return a packet's source, message id and payload: all that passing it on leaves as it is."""
     if raw[0] == MAGIC_V2:
         return raw[5 : HEADER_V2 + raw[1]]
     return raw[3 : HEADER_V1 + raw[1]]

@@ -1,7 +1,7 @@
 """Commands of one client: told apart from their own repeats, and answered exactly once each.
 
 MAVLink guide, "Command Protocol". The very same packet again is given the same answer; which
-submissions are the same task is the task domain's to say (``tasks/recollection.py``).
+submissions are the same task is the task domain's to say (``tasks/deduplicator.py``).
 """
 
 from collections import OrderedDict
@@ -38,7 +38,7 @@ NO_MESSAGE = CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 def command_of(message: CommandLong | CommandInt) -> Command:
-    """Give the command that a message carries."""
+    """Return the command that a message carries."""
     target = address_of(message.target_system, message.target_component)
     first = (message.param1, message.param2, message.param3, message.param4)
     if isinstance(message, CommandInt):
@@ -62,7 +62,7 @@ class Answer(NamedTuple):
     source: Address
 
     def ack(self, to: Address) -> CommandAck:
-        """Give the COMMAND_ACK for a client's address."""
+        """Return the COMMAND_ACK for a client's address."""
         return CommandAck(
             self.command,
             self.result,
@@ -92,7 +92,7 @@ class CommandReceiver:
         self._packets: OrderedDict[bytes, Pending] = OrderedDict()
 
     def same_packet(self, packet: bytes, *, now: float) -> Pending | None:
-        """Give the command that this very packet brought in before."""
+        """Return the command that this very packet brought in before."""
         pending = self._packets.get(packet)
         if pending is not None and now - pending.at <= SAME_PACKET:
             return pending
@@ -108,7 +108,7 @@ class CommandReceiver:
         return pending
 
     def answer_to_copy(self, command: Command, *, now: float) -> Answer | None:
-        """Give how an equal command was accepted, so lately that this may be a repeat of it."""
+        """Return how an equal command was accepted, so lately that this may be a repeat of it."""
         for pending in reversed(self._packets.values()):
             answer = pending.answer
             is_late = now - pending.at > REPEATED

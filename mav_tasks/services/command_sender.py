@@ -121,7 +121,7 @@ class CommandSender:
         *,
         now: float,
         give_up_after: float,
-        urgent: bool = False,
+        immediate: bool = False,
         repeats: bool = True,
     ) -> None:
         """Send a command of our own, repeated until it is answered or given up.
@@ -133,7 +133,7 @@ class CommandSender:
         self._enqueue(
             _Request(None, (message.target_component, message.command), message, None, retry),
             now=now,
-            urgent=urgent,
+            immediate=immediate,
         )
 
     def repeat(self, message: CommandLong | CommandInt, *, now: float) -> bool:
@@ -160,13 +160,13 @@ class CommandSender:
         standing: Standing,
         now: float,
         give_up_after: float,
-        urgent: bool = False,
+        immediate: bool = False,
     ) -> None:
         """Forward a client's command once; its answer, or its lack of one, comes from ``take``."""
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
         lane = (component, command)
-        request = _Request(origin, lane, message, packet, retry, standing, urgent)
-        self._enqueue(request, now=now, urgent=urgent)
+        request = _Request(origin, lane, message, packet, retry, standing, immediate)
+        self._enqueue(request, now=now, immediate=immediate)
 
     def withdraw(self, component: int, command: int) -> None:
         """Send no further copy of our own commands of this id, and none that wait."""
@@ -251,7 +251,7 @@ class CommandSender:
                 del self._lanes[key]
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         deadlines: list[float] = []
         for lane in self._lanes.values():
             if lane.in_flight is not None:
@@ -264,7 +264,7 @@ class CommandSender:
         return min(deadlines, default=None)
 
     def take(self) -> tuple[list[Message | Packet], list[Answered]]:
-        """Give what is to be sent, and what was answered, since the last call."""
+        """Return what is to be sent, and what was answered, since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         answers, self._answers = self._answers, []
         return outgoing, answers
@@ -274,11 +274,11 @@ class CommandSender:
         asker = self._source if request.packet is None else request.packet.source
         return Address(ack.target_system, ack.target_component).reaches(asker)
 
-    def _enqueue(self, request: _Request, *, now: float, urgent: bool) -> None:
+    def _enqueue(self, request: _Request, *, now: float, immediate: bool) -> None:
         if len(self._lanes) > KEPT_LANES:
             self._forget_idle_lanes(now)
         lane = self._lanes.setdefault(request.lane, _Lane())
-        if urgent:
+        if immediate:
             for waiting in lane.waiting:  # after it they would undo what was urgent
                 self._answer(waiting, None)
             lane.waiting.clear()

@@ -60,7 +60,7 @@ class Writers:
 
 
 def refusal(request: m.FileTransferProtocol, *, to: Address) -> m.FileTransferProtocol | None:
-    """Give the NAK that answers a request: its session, the next number; None for an answer."""
+    """Return the NAK that answers a request: its session, the next number; None for an answer."""
     payload = request.payload
     opcode = payload[OPCODE]
     if opcode in (ACK, NAK):

@@ -56,7 +56,7 @@ class HeartbeatSender:
         self._next_at = now
 
     def next_deadline(self) -> float:
-        """Give when the next one is due."""
+        """Return when the next one is due."""
         return self._next_at
 
     def is_due(self, *, now: float) -> bool:
@@ -69,13 +69,13 @@ class HeartbeatSender:
 
 @cache
 def gcs_heartbeat() -> Heartbeat:
-    """Give what the server says of itself on vehicle links: a ground station."""
+    """Return what the server says of itself on vehicle links: a ground station."""
     return Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)
 
 
 @cache
 def component_heartbeat(state: MavState) -> Heartbeat:
-    """Give what the task server's component inside a vehicle's system says to clients.
+    """Return what the task server's component inside a vehicle's system says to clients.
 
     Autopilot INVALID and base_mode 0, because MAVSDK takes flight mode and autopilot type from any
     component that says more.

@@ -17,19 +17,19 @@ class VehicleIdentity:
 
 
 def identity_of(version: AutopilotVersion) -> VehicleIdentity:
-    """Give who this is."""
+    """Return who this is."""
     return VehicleIdentity(uid_of(version), firmware_of(version))
 
 
 def uid_of(version: AutopilotVersion) -> str:
-    """Give what tells this vehicle from all others, "" if it does not say."""
+    """Return what tells this vehicle from all others, "" if it does not say."""
     if any(version.uid2):
         return bytes(version.uid2).hex()
     return f"{version.uid:x}" if version.uid else ""
 
 
 def firmware_of(version: AutopilotVersion) -> str:
-    """Give version and hash: ``4.6.3 3fc7011a``; "" if it does not say."""
+    """Return version and hash: ``4.6.3 3fc7011a``; "" if it does not say."""
     number = version.flight_sw_version
     if not number:
         return ""

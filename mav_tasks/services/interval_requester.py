@@ -93,7 +93,7 @@ class IntervalRequester:
         self._changed.update((number, None) for number in self._wanted if number not in WANTED)
 
     def next_request(self, *, now: float) -> m.CommandLong | None:
-        """Give the next request to send (its target still 0/0), or None if none is due now."""
+        """Return the next request to send (its target still 0/0), or None if none is due now."""
         if now >= self._check_at:
             self._check(now)
         if self._asked is not None:
@@ -135,7 +135,7 @@ class IntervalRequester:
             self._needed[asked] = None
 
     def next_deadline(self) -> float:
-        """Give when the rates are looked at again."""
+        """Return when the rates are looked at again."""
         return self._check_at
 
     def _check(self, now: float) -> None:

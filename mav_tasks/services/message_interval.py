@@ -6,8 +6,8 @@ out of what is forwarded to it.
 """
 
 from mav_tasks.mavlink import messages as m
+from mav_tasks.services.congestion_backoff import CongestionBackoff
 from mav_tasks.services.interval_requester import WANTED
-from mav_tasks.services.stretch import Stretch
 
 #: Messages that vehicles send as streams, by id: only these are thinned. Everything else is an
 #: answer or an event, of which none may be lost.
@@ -66,7 +66,7 @@ GOLDEN = 0.618  # multiples of it are spread evenly between whole numbers
 SLACK = 0.7  # of an interval: the jitter of a stream must not halve its rate
 
 
-class Thinner:
+class StreamRateLimiter:
     """Which of a vehicle's streamed messages one client gets."""
 
     def __init__(self, *, default_interval: float) -> None:
@@ -77,7 +77,7 @@ class Thinner:
         #: itself is asked for
         self.asked: dict[int, dict[int, bool]] = {}
         self._last: dict[tuple[int, int, int], float] = {}
-        self.stretch = Stretch()
+        self.backoff = CongestionBackoff()
 
     def set_interval(
         self, system_id: int, message_id: int, interval_us: float, *, commands: bool = True
@@ -120,7 +120,7 @@ class Thinner:
                 self._ask(system_id, message_id, commands=commands)
 
     def interval_us(self, system_id: int, message_id: int) -> int:
-        """Give the interval in force, in microseconds; STOPPED if none."""
+        """Return the interval in force, in microseconds; STOPPED if none."""
         interval = self._interval(system_id, message_id)
         return STOPPED if interval is None else round(interval * 1e6)
 
@@ -143,8 +143,8 @@ class Thinner:
         interval = self._interval(system_id, message_id)
         if interval is None:
             return False
-        if not self.stretch.is_idle:
-            if self.stretch.is_congested:
+        if not self.backoff.is_idle:
+            if self.backoff.is_congested:
                 return False
             interval = self._stretched(interval, message_id, now=now)
         key = (system_id, component_id, message_id)
@@ -161,12 +161,12 @@ class Thinner:
         return default if wishes is None else wishes.get(message_id, default)
 
     def _stretched(self, interval: float, message_id: int, *, now: float) -> float:
-        """Give the interval that the way out to the client allows.
+        """Return the interval that the way out to the client allows.
 
         Slightly different ones, so that streams which waited for the end of the same congestion do
         not cause the next one by always coming together.
         """
-        factor = self.stretch.factor(now=now)
+        factor = self.backoff.factor(now=now)
         if factor == 1.0:
             return interval
         return max(interval, UNCROWDED) * factor * (0.8 + 0.4 * (message_id * GOLDEN % 1.0))

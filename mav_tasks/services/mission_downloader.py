@@ -83,7 +83,7 @@ class MissionDownloader:
             self._ask(download, now=now)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         download = self._download
         return None if download is None else min(download.ask_at, download.give_up_at)
 
@@ -98,7 +98,7 @@ class MissionDownloader:
             self._ask(download, now=now)
 
     def take(self) -> list[m.Message]:
-        """Give what is to be sent since the last call."""
+        """Return what is to be sent since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 

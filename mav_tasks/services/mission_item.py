@@ -39,7 +39,7 @@ class Item(NamedTuple):
 
 
 def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
-    """Give the item that a message carries; None if its place is beyond all numbers."""
+    """Return the item that a message carries; None if its place is beyond all numbers."""
     x: int | None = None
     y: int | None = None
     if isinstance(message, m.MissionItem):
@@ -65,7 +65,7 @@ def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
 
 
 def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItemInt:
-    """Give the message that carries an item."""
+    """Return the message that carries an item."""
     return m.MissionItemInt(
         to.system_id,
         to.component_id,
@@ -108,17 +108,17 @@ def float_message_of(item: Item, seq: int, mission_type: int, *, to: Address) ->
 
 
 def packed(items: Iterable[Item]) -> str:
-    """Give items as a text to be kept; ``unpacked`` gives them back bit by bit."""
+    """Return items as a text to be kept; ``unpacked`` gives them back bit by bit."""
     return b"".join(_WIRE.pack(*item) for item in items).hex()
 
 
 def unpacked(text: str) -> tuple[Item, ...]:
-    """Give the items that ``packed`` made a text of."""
+    """Return the items that ``packed`` made a text of."""
     return tuple(Item(*fields) for fields in _WIRE.iter_unpack(bytes.fromhex(text)))
 
 
 def item_at(text: str, number: int) -> Item:
-    """Give one of these items, without looking at the others."""
+    """Return one of these items, without looking at the others."""
     start = 2 * _WIRE.size * number
     return Item(*_WIRE.unpack(bytes.fromhex(text[start : start + 2 * _WIRE.size])))
 

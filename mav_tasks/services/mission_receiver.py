@@ -131,7 +131,7 @@ class MissionReceiver:
         return self._session.items if self._session is not None else ()
 
     def take(self) -> tuple[list[ToClient], list[Upload]]:
-        """Give what is to be sent, and the plans that are whole, since the last call."""
+        """Return what is to be sent, and the plans that are whole, since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         uploads, self._uploads = self._uploads, []
         return outgoing, uploads
@@ -226,7 +226,7 @@ class MissionReceiver:
         self._end(result, last, opaque_id=opaque_id, now=now)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         session = self._session
         if session is None or session.is_whole:
             return None
@@ -298,7 +298,7 @@ class MissionReceiver:
         self._in_vain[session.sender, session.mission_type] = session.begun_at, now
 
     def _quiet_until(self, sender: Sender, kind: int, *, now: float) -> float:
-        """Give until when items may come that were sent before the count that came now."""
+        """Return until when items may come that were sent before the count that came now."""
         ended_at = self._ended.get((sender, kind))
         return now if ended_at is None else max(now, min(now + QUIET, ended_at + LATE))
 

@@ -102,7 +102,7 @@ class MissionUploader:
         return (upload.is_sent or not upload.items) and self._fits(ack.opaque_id)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         if not self._waiting:
             return None
         upload = self._waiting[0]
@@ -122,7 +122,7 @@ class MissionUploader:
             self._offer(upload, now=now)
 
     def take(self) -> list[m.Message]:
-        """Give what is to be sent since the last call."""
+        """Return what is to be sent since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 

@@ -184,7 +184,7 @@ class OffboardControl:
         return wants
 
     def take_messages(self) -> list[Message]:
-        """Give the setpoints to send since the last call."""
+        """Return the setpoints to send since the last call."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 
@@ -233,7 +233,7 @@ class OffboardControl:
         """
         self._news.hold_asked_at = now
         until = now + self._watch.ask_vehicle
-        self._request(self._orders.hold(), until=until, now=now, urgent=True)
+        self._request(self._orders.hold(), until=until, now=now, immediate=True)
 
     def keep_armed(self) -> None:
         """A client arms the vehicle, too: handed back, it stays armed as that client asked."""
@@ -507,11 +507,11 @@ class OffboardControl:
         self._send_setpoint(STANDING)
 
     def zero_setpoint(self) -> SetPositionTargetLocalNed:
-        """Give the setpoint that asks the vehicle to stand."""
+        """Return the setpoint that asks the vehicle to stand."""
         return self._orders.velocity(self._standing)
 
     def hold_request(self) -> CommandLong:
-        """Give the command that asks for HOLD."""
+        """Return the command that asks for HOLD."""
         return self._orders.hold()
 
     def _note_requests(self, now: float) -> None:
@@ -600,15 +600,15 @@ class OffboardControl:
         self._news.hold_asked_at = now
         self._next_hold_at = now + again_after
         until = now + self._watch.ask_vehicle
-        self._request(self.hold_request(), until=until, now=now, urgent=True)
+        self._request(self.hold_request(), until=until, now=now, immediate=True)
         if self._persona.drives_in_hold and self._news.mode == self._persona.hold_mode:
             staying = self._orders.staying(changes_mode=True)
-            self._request(staying, until=until, now=now, urgent=True)
+            self._request(staying, until=until, now=now, immediate=True)
 
     def _request_disarming(self, *, now: float) -> None:
         self._news.disarming_asked_at = now
         until = now + self._watch.ask_vehicle
-        self._request(self._orders.arming(arm=False), until=until, now=now, urgent=True)
+        self._request(self._orders.arming(arm=False), until=until, now=now, immediate=True)
 
     def _is_hold_in_vain(self, now: float) -> bool:
         """Whether a vehicle whose HOLD is not to be trusted has not shown it in time."""
@@ -628,9 +628,9 @@ class OffboardControl:
         *,
         until: float,
         now: float,
-        urgent: bool = False,
+        immediate: bool = False,
     ) -> None:
-        self._sender.request(command, now=now, give_up_after=until - now, urgent=urgent)
+        self._sender.request(command, now=now, give_up_after=until - now, immediate=immediate)
 
     def _withdraw_requests(self) -> None:
         self._withdraw(MavCmd.DO_SET_MODE)

@@ -80,7 +80,7 @@ class Orders:
         return f"Orders({self._target}, {self._persona.name})"
 
     def velocity(self, wanted: Speeds) -> SetPositionTargetLocalNed:
-        """Give a setpoint; zeros for what such a vehicle cannot do."""
+        """Return a setpoint; zeros for what such a vehicle cannot do."""
         vx, vy, yaw_rate = wanted.forward, 0.0, wanted.yaw_rate
         if not self._persona.honours_yaw_rate:
             speed = 0.0 if wanted.course is None else max(wanted.forward, STANDING_SPEED)
@@ -106,19 +106,19 @@ class Orders:
         )
 
     def mode(self, mode: int) -> CommandLong:
-        """Give the command that asks for a custom_mode."""
+        """Return the command that asks for a custom_mode."""
         return self._command(MavCmd.DO_SET_MODE, *self._persona.mode_params(mode))
 
     def hold(self) -> CommandLong:
-        """Give the command that asks for HOLD."""
+        """Return the command that asks for HOLD."""
         return self.mode(self._persona.hold_mode)
 
     def our_mode(self) -> CommandLong:
-        """Give the command that asks for the mode in which setpoints are followed."""
+        """Return the command that asks for the mode in which setpoints are followed."""
         return self.mode(self._persona.control_mode)
 
     def arming(self, *, arm: bool) -> CommandLong:
-        """Give the command to arm or disarm."""
+        """Return the command to arm or disarm."""
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
 
     def staying(self, *, changes_mode: bool) -> CommandInt:

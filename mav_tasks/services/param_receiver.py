@@ -15,14 +15,14 @@ HASH_CHECK = "_HASH_CHECK"  # by which a client with a cache begins: whatever it
 
 
 def name_in(message: m.ParamRequestRead | m.ParamSet) -> str:
-    """Give the name that a message carries, without the zeros behind it."""
+    """Return the name that a message carries, without the zeros behind it."""
     param_id = message.param_id
     text = param_id.decode("ascii", "replace") if isinstance(param_id, bytes) else param_id
     return str(text).split("\0", 1)[0]
 
 
 def value_of(values: Mapping[str, float], name: str) -> m.ParamValue:
-    """Give the message that tells one of the values, in the order of the mapping."""
+    """Return the message that tells one of the values, in the order of the mapping."""
     names = list(values)
     return m.ParamValue(
         name.encode(), values[name], MavParamType.REAL32, len(names), names.index(name)
@@ -30,14 +30,14 @@ def value_of(values: Mapping[str, float], name: str) -> m.ParamValue:
 
 
 def all_values(values: Mapping[str, float]) -> list[m.ParamValue]:
-    """Give the messages that tell all of them."""
+    """Return the messages that tell all of them."""
     return [value_of(values, name) for name in values]
 
 
 def read(
     values: Mapping[str, float], message: m.ParamRequestRead, *, to: Address
 ) -> m.ParamValue | m.ParamError:
-    """Give the answer to a question for one of them."""
+    """Return the answer to a question for one of them."""
     index, name = message.param_index, name_in(message)
     if index != BY_NAME:
         name = list(values)[index] if 0 <= index < len(values) else ""
@@ -47,6 +47,6 @@ def read(
 
 
 def error(message: m.ParamRequestRead | m.ParamSet, why: int, *, to: Address) -> m.ParamError:
-    """Give the PARAM_ERROR that answers a message; ``why`` is a MAV_PARAM_ERROR."""
+    """Return the PARAM_ERROR that answers a message; ``why`` is a MAV_PARAM_ERROR."""
     index = message.param_index if isinstance(message, m.ParamRequestRead) else BY_NAME
     return m.ParamError(*to, name_in(message).encode()[:16], index, why)

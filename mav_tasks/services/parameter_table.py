@@ -38,12 +38,12 @@ class Parameter:
         return self.key.path.removeprefix(ENGINE)
 
     def value(self, settings: Settings) -> float:
-        """Give the value that settings have."""
+        """Return the value that settings have."""
         plain = self.key.shape.plain(value_at(settings, self.path))
         return as_sent(float(self.choices.index(str(plain)) if self.choices else str(plain)))
 
     def with_value(self, settings: Settings, value: float) -> Settings:
-        """Give settings with another value; SettingError names its range."""
+        """Return settings with another value; SettingError names its range."""
         if not self.low <= value <= self.high:  # NaN is neither
             raise SettingError(f"{self.name} {value:g}: not in {self.low:g}..{self.high:g}")
         if self.is_whole and value != int(value):
@@ -95,7 +95,7 @@ BOUNDED = tuple(
 
 
 def changed(settings: Settings, name: str, value: float) -> Settings:
-    """Give settings with one parameter changed; SettingError says in words why not.
+    """Return settings with one parameter changed; SettingError says in words why not.
 
     ``name`` is one of PARAMETERS.
     """
@@ -108,7 +108,7 @@ def changed(settings: Settings, name: str, value: float) -> Settings:
 
 
 def with_all(settings: Settings, values: Mapping[str, float]) -> tuple[Settings, dict[str, str]]:
-    """Give settings with parameters that were kept, and by name why some could not be taken.
+    """Return settings with parameters that were kept, and by name why some could not be taken.
 
     Of two that bound each other the bound comes first, if either order does.
     """
@@ -130,7 +130,7 @@ def with_all(settings: Settings, values: Mapping[str, float]) -> tuple[Settings,
 
 
 def as_sent(value: float) -> float:
-    """Give the number that a person meant, after its way through a float32: 0.1, not 0.100000001.
+    """Return the number that a person meant, after its way through a float32: 0.1, not 0.100000001.
 
     What no float32 can hold is left as it is.
     """

@@ -98,18 +98,18 @@ class Persona:
         return not self.honours_yaw_rate
 
     def mode_name(self, mode: int) -> str:
-        """Give a custom_mode in words, as ground stations show it."""
+        """Return a custom_mode in words, as ground stations show it."""
         return self.mode_names.get(mode, f"mode {mode}")
 
     def mode_params(self, mode: int) -> tuple[float, float, float]:
-        """Give param1 to param3 of the DO_SET_MODE that asks for a custom_mode."""
+        """Return param1 to param3 of the DO_SET_MODE that asks for a custom_mode."""
         enabled = float(MavModeFlag.CUSTOM_MODE_ENABLED)
         if self.has_main_modes:
             return enabled, float(mode >> MAIN_BITS & 0xFF), float(mode >> SUB_BITS & 0xFF)
         return enabled, float(mode), 0.0
 
     def mode_in(self, param2: float, param3: float) -> int | None:
-        """Give the custom_mode that a DO_SET_MODE names; None: these are no mode numbers."""
+        """Return the custom_mode that a DO_SET_MODE names; None: these are no mode numbers."""
         if not self.has_main_modes:
             return _whole(param2, high=0xFFFFFFFF)
         main, sub = _whole(param2, high=0xFF), _whole(0.0 if isnan(param3) else param3, high=0xFF)
@@ -219,7 +219,7 @@ PERSONAS: Mapping[int, Persona] = {
 
 
 def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Persona | None:
-    """Give the persona that a vehicle's heartbeat shows, or None if it is none that we drive.
+    """Return the persona that a vehicle's heartbeat shows, or None if it is none that we drive.
 
     ``honours_yaw_rate``: one that need not, turns at a yaw rate all the same.
     """
@@ -230,7 +230,7 @@ def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Perso
 
 
 def with_yaw_rate(persona: Persona, *, is_honoured: bool) -> Persona:
-    """Give the persona of one that turns at a yaw rate and reverses; else is steered by course."""
+    """Return the persona as one that follows yaw rates and reverses, or is steered by course."""
     like = ARDUPILOT if is_honoured else PX4
     return replace(
         persona,

@@ -16,7 +16,7 @@ class Retry:
 
     @classmethod
     def starting(cls, *, now: float, interval: float, give_up_after: float) -> "Retry":
-        """Give a retry whose first sending is due at once."""
+        """Return a retry whose first sending is due at once."""
         return cls(interval=interval, give_up_at=now + give_up_after, next_at=now)
 
     def is_due(self, now: float) -> bool:
@@ -38,5 +38,5 @@ class Retry:
         self.give_up_at += now - self.sent_at
 
     def next_deadline(self) -> float:
-        """Give the next moment at which something changes."""
+        """Return the next moment at which something changes."""
         return min(self.next_at, self.give_up_at)

@@ -8,7 +8,7 @@ BURST = 10  # texts, before the rate counts
 
 
 def chunks(severity: MavSeverity, text: str, *, text_id: int) -> list[Statustext]:
-    """Give the messages that carry a text of any length.
+    """Return the messages that carry a text of any length.
 
     ``text_id`` 1–65535 ties the chunks of a long text together; a short one is sent with id 0. A
     tab at the end is cut: QGroundControl drops such texts of a PX4 vehicle.

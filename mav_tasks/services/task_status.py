@@ -56,19 +56,19 @@ class TaskStatusSender:
         self._wake(now)
 
     def interval(self, vehicle: int) -> float | None:
-        """Give the interval of a vehicle's stream, seconds; None: there is none."""
+        """Return the interval of a vehicle's stream, seconds; None: there is none."""
         stream = self._streams.get(vehicle)
         return None if stream is None else stream.interval
 
     def next_deadline(self) -> float:
-        """Give when ``due`` has something to give; inf: never, as things are."""
+        """Return when ``due`` has something to give; inf: never, as things are."""
         first = self._retry_at if self._changed else inf
         if not self._streams:  # as with nearly all clients
             return first
         return min([first, *(stream.next_at for stream in self._streams.values())])
 
     def due(self, active: Mapping[int, int], *, now: float) -> list[int]:
-        """Give the tasks to report now; ``active`` are those that streams report, by vehicle."""
+        """Return the tasks to report now; ``active`` are those that streams report, by vehicle."""
         due: dict[int, None] = {}
         while self._changed and now >= self._retry_at:
             if not self._limit.take(now=now):

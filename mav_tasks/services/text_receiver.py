@@ -79,11 +79,11 @@ class TextReceiver:
             yield self._end(key)
 
     def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` gives a text up; inf: none is open."""
+        """Return when ``handle_deadline`` gives a text up; inf: none is open."""
         return next((text.until for text in self._open.values()), inf)
 
     def handle_deadline(self, *, now: float) -> Iterator[Text]:
-        """Give the texts that are not waited for any longer."""
+        """Yield the texts that are not waited for any longer."""
         while self._open and now >= self.next_deadline():
             yield self._end(next(iter(self._open)))
 

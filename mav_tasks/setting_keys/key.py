@@ -25,27 +25,27 @@ class Key:
     at_most: str = ""
 
     def of(self, settings: ServerSettings) -> Any:
-        """Give what settings keep."""
+        """Return what settings keep."""
         return value_at(settings, self.path)
 
     def plain_of(self, settings: ServerSettings) -> object:
-        """Give the same as people write it."""
+        """Return the same as people write it."""
         return self.shape.plain(self.of(settings))
 
     def put(self, settings: ServerSettings, kept: object) -> ServerSettings:
-        """Give settings that keep another value."""
+        """Return settings that keep another value."""
         return with_value_at(settings, self.path, kept)
 
 
 def value_at(settings: object, path: str) -> Any:
-    """Give a value by the names of its fields, with dots between them."""
+    """Return a value by the names of its fields, with dots between them."""
     for name in path.split("."):
         settings = getattr(settings, name)
     return settings
 
 
 def with_value_at(settings: T, path: str, kept: object) -> T:
-    """Give settings with another value there."""
+    """Return settings with another value there."""
     name, _, rest = path.partition(".")
     if rest:
         kept = with_value_at(getattr(settings, name), rest, kept)

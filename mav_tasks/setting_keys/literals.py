@@ -4,12 +4,12 @@ from math import isfinite
 
 
 def in_digits(value: float) -> str:
-    """Give a number without an exponent or a needless ``.0``: 100000, 0.05."""
+    """Return a number without an exponent or a needless ``.0``: 100000, 0.05."""
     return str(int(value)) if isfinite(value) and value == int(value) else repr(value)
 
 
 def literal(plain: object) -> str:
-    """Give a plain value as TOML has it."""
+    """Return a plain value as TOML has it."""
     match plain:
         case bool():
             return "true" if plain else "false"

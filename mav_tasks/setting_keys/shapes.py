@@ -31,13 +31,13 @@ class Shape(Protocol):
         """Which plain values there are, in words."""
 
     def kept(self, plain: object) -> Any:
-        """Give what the settings keep of a plain value; SettingError."""
+        """Return what the settings keep of a plain value; SettingError."""
 
     def plain(self, kept: Any) -> object:
-        """Give the plain value of what the settings keep."""
+        """Return the plain value of what the settings keep."""
 
     def read(self, text: str) -> object:
-        """Give the plain value that a text means; SettingError."""
+        """Return the plain value that a text means; SettingError."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Number:
         return words + (f', or "{self.none}"' if self.none else "")
 
     def kept(self, plain: object) -> float | None:
-        """Give it in the unit of the settings."""
+        """Return it in the unit of the settings."""
         if self.none and plain == self.none:
             return None
         if isinstance(plain, bool) or not isinstance(plain, int | float):
@@ -77,7 +77,7 @@ class Number:
         return int(plain)
 
     def plain(self, kept: float | None) -> object:
-        """Give the number that was written: 40 degrees, not 39.99999999."""
+        """Return the number that was written: 40 degrees, not 39.99999999."""
         if kept is None:
             return self.none
         return kept if self.is_whole else float(f"{kept / self.scale:.12g}")
@@ -109,13 +109,13 @@ class Choice:
         return " | ".join(f'"{word}"' for word in self.words)
 
     def kept(self, plain: object) -> str:
-        """Give the word."""
+        """Return the word."""
         if plain not in self.words:
             raise SettingError(f"expected one of {', '.join(self.words)}")
         return str(plain)
 
     def plain(self, kept: str) -> object:
-        """Give the word."""
+        """Return the word."""
         return kept
 
     def read(self, text: str) -> object:
@@ -131,13 +131,13 @@ class Flag:
     valid: str = "true | false"
 
     def kept(self, plain: object) -> bool:
-        """Give it, if it is one."""
+        """Return it, if it is one."""
         if not isinstance(plain, bool):
             raise SettingError("expected true or false")
         return plain
 
     def plain(self, kept: bool) -> object:
-        """Give it as it is."""
+        """Return it as it is."""
         return kept
 
     def read(self, text: str) -> object:
@@ -153,13 +153,13 @@ class Text:
     unit: str = ""
 
     def kept(self, plain: object) -> str:
-        """Give the text."""
+        """Return the text."""
         if not isinstance(plain, str) or "\0" in plain:
             raise SettingError(f"not a text: {self.valid}")
         return plain
 
     def plain(self, kept: str) -> object:
-        """Give the text."""
+        """Return the text."""
         return kept
 
     def read(self, text: str) -> object:
@@ -177,7 +177,7 @@ class Texts:
     unit: str = ""
 
     def kept(self, plain: object) -> tuple[str, ...]:
-        """Give them as a tuple."""
+        """Return them as a tuple."""
         if not isinstance(plain, list) or not all(isinstance(each, str) for each in plain):
             raise SettingError(f"not a list of texts: {self.valid}")
         if len(plain) < self.least:
@@ -188,7 +188,7 @@ class Texts:
         return tuple(plain)
 
     def plain(self, kept: tuple[str, ...]) -> object:
-        """Give them as a list."""
+        """Return them as a list."""
         return list(kept)
 
     def read(self, text: str) -> object:
@@ -212,7 +212,7 @@ class ByClient:
         return f"{clients}, each {self.each.valid}"
 
     def kept(self, plain: object) -> Mapping[str, Any]:
-        """Give them by client."""
+        """Return them by client."""
         if not isinstance(plain, dict):
             raise SettingError(f"not a table: {self.valid}")
         kept = {}
@@ -227,7 +227,7 @@ class ByClient:
         return kept
 
     def plain(self, kept: Mapping[str, Any]) -> object:
-        """Give them as a table."""
+        """Return them as a table."""
         return {client: self.each.plain(value) for client, value in kept.items()}
 
     def read(self, text: str) -> object:

@@ -43,11 +43,11 @@ class Store(Protocol):
         ...
 
     def take_outcomes(self) -> list[Outcome]:
-        """Give what became of them since the last call; returns at once."""
+        """Return what became of them since the last call; returns at once."""
         ...
 
     def fileno(self) -> int | None:
-        """Give a descriptor that is readable while there are outcomes; None: there is none."""
+        """Return a descriptor that is readable while there are outcomes; None: there is none."""
         ...
 
     def close(self) -> None:

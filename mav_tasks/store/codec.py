@@ -44,12 +44,12 @@ class Unreadable(ValueError):
 
 
 def dumps(value: object) -> str:
-    """Give compact JSON; ValueError for NaN and infinity."""
+    """Return compact JSON; ValueError for NaN and infinity."""
     return _encoder.encode(value)
 
 
 def format_of(*kinds: type) -> dict[str, tuple[str, ...]]:
-    """Give the format of dataclasses and of all that is in them. TypeError: no way to store it."""
+    """Return the format of dataclasses and their fields; TypeError if one cannot be stored."""
     found: dict[str, tuple[str, ...]] = {}
     waiting = list(kinds)
     while waiting:
@@ -72,7 +72,7 @@ class Encoder:
         self._encoders: dict[type, Callable[[Any, float], list[Any]]] = {}
 
     def row(self, value: Any, *, offset: float) -> list[Any]:
-        """Give the row of a dataclass."""
+        """Return the row of a dataclass."""
         kind = type(value)
         encode = self._encoders.get(kind)
         if encode is None:
@@ -128,7 +128,7 @@ class Decoder:
         self._decoders: dict[type, _Decode] = {}
 
     def values(self, kind: type, rows: Sequence[list[Any]], *, offset: float) -> list[Any]:
-        """Give the values of rows. Unreadable if one cannot be understood."""
+        """Return the values of rows. Unreadable if one cannot be understood."""
         if not rows:
             return []
         if not fields(kind):
@@ -164,7 +164,7 @@ class Decoder:
         return decode
 
     def _converter(self, path: str, hint: Any) -> "_Decode | None":
-        """Give what converts a column; None: it is as it is in JSON."""
+        """Return what converts a column; None: it is as it is in JSON."""
         if path.rpartition(".")[2] in self._moved:
             return lambda column, offset: [None if v is None else v - offset for v in column]
         inner = {kind.__name__: kind for kind in _records(hint)}
@@ -208,7 +208,7 @@ _Decode = Callable[[Any, float], list[Any]]
 def _builder(
     kind: type, places: Mapping[str, int], prefix: str = "", *, shares: bool
 ) -> Callable[[list[Sequence[Any]]], list[Any]]:
-    """Give what makes dataclasses of columns; a field not in ``places`` has its default."""
+    """Return what makes dataclasses of columns; a field not in ``places`` has its default."""
     hints = get_type_hints(kind)
     sources: dict[str, Callable[[list[Sequence[Any]]], Sequence[Any]]] = {}
     for field in fields(kind):
@@ -244,7 +244,7 @@ def _maker(kind: type, names: tuple[str, ...]) -> Callable[..., Any]:
 
 
 def _leaves(kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Give path and annotation of each place of a kind's row."""
+    """Yield path and annotation of each place of a kind's row."""
     hints = get_type_hints(kind)
     for field in fields(kind):
         hint = _real(hints[field.name])
@@ -256,7 +256,7 @@ def _leaves(kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _records(hint: Any) -> list[type]:
-    """Give the dataclasses that may stand in a place. TypeError: there may be what has no way."""
+    """Return the dataclasses that may stand in a place. TypeError: there may be what has no way."""
     hint = _real(hint)
     if get_origin(hint) in (Union, UnionType):
         return [kind for part in get_args(hint) for kind in _records(part)]

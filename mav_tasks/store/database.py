@@ -214,7 +214,7 @@ def _create(path: Path) -> None:
 
 
 def _identities(path: Path) -> tuple[tuple[int, int], ...]:
-    """Give which files the store and its log are; OSError where one is not there."""
+    """Return which files the store and its log are; OSError where one is not there."""
     return _identity(path), _identity(path.with_name(f"{path.name}-wal"))
 
 

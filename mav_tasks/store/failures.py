@@ -25,7 +25,7 @@ def is_failure(error: Exception) -> bool:
 
 
 def words_for(error: Exception) -> str:
-    """Give what is wrong with the file."""
+    """Return what is wrong with the file."""
     if isinstance(error, OSError):
         return error.strerror or str(error)
     words = _WORDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF)

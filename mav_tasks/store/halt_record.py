@@ -190,7 +190,7 @@ def _place(slot: int, key: int) -> int:
 
 
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
-    """Give the newest word of each register with its slot. ValueError: it is no record of ours."""
+    """Yield the newest word of each register with its slot. ValueError: it is no record of ours."""
     if len(content) != SIZE or not content.startswith(HEADER):
         raise ValueError("it is damaged: look whether the rovers stand, then remove it")
     for key in range(REGISTERS):

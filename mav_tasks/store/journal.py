@@ -49,7 +49,7 @@ class Journal:
         return f"Journal({self._path.name}, event {self._number})"
 
     def take(self, *, offset: float) -> Iterator[tuple[int, Event]]:
-        """Give the events after those given before, numbered over the life of the file.
+        """Yield the events after those given before, numbered over the life of the file.
 
         Their times are moved by ``offset``, UTC minus monotonic seconds; 0 leaves them in UTC.
         """
@@ -61,7 +61,7 @@ class Journal:
                 return
 
     def version(self) -> int:
-        """Give a number that is another one when somebody has written to the file."""
+        """Return a number that is another one when somebody has written to the file."""
         with in_one_line(self._path):
             return int(self._connection.execute("PRAGMA data_version").fetchone()[0])
 
@@ -87,7 +87,7 @@ class Journal:
         return page, through is not None
 
     def _rows(self, columns: str, table: str, key: str, after: int) -> list[tuple[Any, ...]]:
-        """Give the next rows. A submission is in its task's own row; ids grow as numbers do."""
+        """Return the next rows. A submission is in its task's own row; ids grow as numbers do."""
         is_tasks = table == "tasks"
         wanted = {
             f"{key} > ?": after,

@@ -20,7 +20,7 @@ class Mailbox:
         return f"Mailbox({self._outcomes})"
 
     def fileno(self) -> int | None:
-        """Give the descriptor; None once it is closed."""
+        """Return the descriptor; None once it is closed."""
         return self._read_fd if self._is_open else None
 
     def put(self, outcome: Outcome) -> None:

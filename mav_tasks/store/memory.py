@@ -28,7 +28,7 @@ class MemoryStore:
             del self.events[: -self._capacity]
 
     def take_outcomes(self) -> list[Outcome]:
-        """Give the number of the last event, if there is a new one."""
+        """Return the number of the last event, if there is a new one."""
         if self._reported == self._count:
             return []
         self._reported = self._count

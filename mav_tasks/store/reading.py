@@ -39,7 +39,7 @@ _OF_TASK = {
 
 
 def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
-    """Give the state that a store file holds, its times moved by ``offset``. StoreError."""
+    """Return the state that a store file holds, its times moved by ``offset``. StoreError."""
     with _opened(path) as (connection, rows):
         next_id, signed_until = connection.execute(
             "SELECT next_id, signed_until FROM meta"
@@ -89,7 +89,7 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
 
 
 def read_parameters(path: Path) -> dict[str, float]:
-    """Give what clients have set, by the parameter's name; of a store in use, too. StoreError.
+    """Return what clients have set, by the parameter's name; of a store in use, too. StoreError.
 
     Nothing is written, and an older file, which may have none, is left as it is.
     """

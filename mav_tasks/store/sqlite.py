@@ -79,13 +79,13 @@ class SqliteStore:
         return f"SqliteStore({str(self._path)!r})"
 
     def load(self) -> Restored:
-        """Give what the file holds, all times in this process's monotonic seconds. StoreError."""
+        """Return what the file holds, all times in this process's monotonic seconds. StoreError."""
         return read_restored(
             self._path, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
         )
 
     def journal(self) -> Iterator[tuple[int, Event]]:
-        """Give every event that is kept, numbered over the life of the file. StoreError."""
+        """Yield every event that is kept, numbered over the life of the file. StoreError."""
         with closing(Journal(self._path)) as journal:
             yield from journal.take(offset=self._wall_offset())
 
@@ -104,11 +104,11 @@ class SqliteStore:
         self._writer.append(tuple(events))
 
     def take_outcomes(self) -> list[Outcome]:
-        """Give what became of them since the last call. It raises what was our own mistake."""
+        """Return what became of them since the last call. It raises what was our own mistake."""
         return self._mail.take()
 
     def fileno(self) -> int | None:
-        """Give a descriptor that is readable while there are outcomes; None once closed."""
+        """Return a descriptor that is readable while there are outcomes; None once closed."""
         return self._mail.fileno()
 
     def close(self) -> None:
@@ -141,7 +141,7 @@ class SqliteStore:
 
 
 def _real_path(path: Path) -> Path:
-    """Give the one name of a file, in a folder that is there."""
+    """Return the one name of a file, in a folder that is there."""
     try:
         path = path.expanduser()
         _refuse_planted(path)

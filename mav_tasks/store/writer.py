@@ -84,7 +84,7 @@ class Writer:
         return not self._thread.is_alive()
 
     def utc(self) -> float:
-        """Give the time of the wall, seconds since 1970."""
+        """Return the time of the wall, seconds since 1970."""
         return boot_time() + self._wall_offset()
 
     def _run(self) -> None:

@@ -1,8 +1,8 @@
 """Which tasks wait for which: who runs after whom, and whether that can ever be."""
 
 from mav_tasks.errors import Rejection
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Task, TaskId
 
 R, S = TaskReason, TaskState
@@ -11,8 +11,8 @@ R, S = TaskReason, TaskState
 class Dependencies:
     """The tasks that run after others, by those."""
 
-    def __init__(self, book: TaskBook) -> None:
-        self._book = book
+    def __init__(self, registry: TaskRegistry) -> None:
+        self._registry = registry
         self._dependents: dict[TaskId, dict[TaskId, None]] = {}
 
     def __repr__(self) -> str:
@@ -22,7 +22,7 @@ class Dependencies:
         return task_id in self._dependents
 
     def of(self, task_id: TaskId) -> tuple[TaskId, ...]:
-        """Give the tasks that run after this one, in the order in which they came."""
+        """Return the tasks that run after this one, in the order in which they came."""
         return tuple(self._dependents.get(task_id, ()))
 
     def add(self, task_id: TaskId, after: int) -> None:
@@ -30,7 +30,7 @@ class Dependencies:
         self._dependents.setdefault(TaskId(after), {})[task_id] = None
 
     def take(self, task_id: TaskId) -> tuple[TaskId, ...]:
-        """Give the tasks that run after this one, which is over, and forget that they do."""
+        """Return the tasks that run after this one, which is over, and forget that they do."""
         return tuple(self._dependents.pop(task_id, ()))
 
     def forget(self, task_id: TaskId, after: int) -> bool:
@@ -45,7 +45,7 @@ class Dependencies:
 
     def check(self, after: int) -> None:
         """Raise Rejection if a task could never run after this one."""
-        task = self._book.get(after)
+        task = self._registry.get(after)
         if task is None:
             raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
         if task.state in TERMINAL and task.state is not S.COMPLETED:
@@ -58,15 +58,15 @@ class Dependencies:
         while seen:
             if seen == task.id:
                 raise Rejection(R.CYCLE, f"run after {after}: they would wait for each other")
-            ahead = self._book.get(seen)
+            ahead = self._registry.get(seen)
             seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
 
     def is_waited_for(self, after: int) -> bool:
         """Whether a task that others run after is still to complete."""
-        task = self._book.get(after)
+        task = self._registry.get(after)
         return task is not None and task.state not in TERMINAL
 
     def have_failed(self, task: Task) -> bool:
         """Whether what a task runs after is over, and was not completed."""
-        ahead = self._book.get(task.terms.after) if task.terms.after else None
+        ahead = self._registry.get(task.terms.after) if task.terms.after else None
         return ahead is not None and ahead.state in TERMINAL and ahead.state is not S.COMPLETED

@@ -1,4 +1,4 @@
-"""Drives the begun task of a vehicle while it is EXECUTING: course, arrival, fence, mishaps.
+"""Drives the active task of a vehicle while it is EXECUTING: course, arrival, fence, mishaps.
 
 It changes no state: what is to become of the task is the outcome, for the executor to record.
 """
@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.arrival import Arrival
-from mav_tasks.tasks.driving.astray import AstrayWatch
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
-from mav_tasks.tasks.driving.itinerary import following, is_over, present_goal, skipped_to
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.limits import limited, within_fence
+from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, skipped_to
 from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.path_divergence import AstrayWatch
+from mav_tasks.tasks.driving.path_follower import PathFollower
+from mav_tasks.tasks.driving.recovery_path import recovery_path
 from mav_tasks.tasks.driving.stage import (
     course_of,
     look_on_the_way,
@@ -27,10 +27,10 @@ from mav_tasks.tasks.driving.stage import (
     steering_of,
 )
 from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
-from mav_tasks.tasks.driving.way_back import way_back
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 
@@ -49,16 +49,16 @@ class Becomes(NamedTuple):
 
 
 class Drive:
-    """The drive of one vehicle's begun task; it begins anew with each EXECUTING."""
+    """The drive of one vehicle's active task; it begins anew with each EXECUTING."""
 
-    def __init__(self, book: TaskBook, settings: Settings, bounds: Bounds) -> None:
-        self._book = book
+    def __init__(self, registry: TaskRegistry, settings: Settings, bounds: Bounds) -> None:
+        self._registry = registry
         self._bounds = bounds
         self._settings = settings
         #: m/s, of tasks that are driven as the vehicle itself would; None: as the settings say
         self.cruise: float | None = None
-        self._course: Course | None = None
-        self._way_back: Course | None = None  # driven before it
+        self._course: PathFollower | None = None
+        self._way_back: PathFollower | None = None  # driven before it
         self._last_velocity = ZERO
         self._moved_at = 0.0  # when a velocity other than zero was last asked for
         self._stuck = StuckWatch()
@@ -90,7 +90,7 @@ class Drive:
             self._course.progress = replace(self._course.progress, speed=speed)
 
     def limit(self, demand: Demand, *, elapsed: float, now: float) -> Demand:
-        """Give a demand as the vehicle may be asked for it, by what it was asked for before."""
+        """Return a demand as the vehicle may be asked for it, by what it was asked for before."""
         if demand.kind is not DemandKind.DRIVE:
             self._last_velocity = ZERO
             return demand
@@ -112,7 +112,7 @@ class Drive:
             return here
         self._way_back, self._astray = None, AstrayWatch()
         if task.progress.anchor is not None:
-            self._way_back = way_back(
+            self._way_back = recovery_path(
                 present_goal(task.goal, here),
                 here,
                 motion,
@@ -168,7 +168,7 @@ class Drive:
                 return stopped
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"
-        is_held_back = not self._book.is_durable(task.id)
+        is_held_back = not self._registry.is_durable(task.id)
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
@@ -177,7 +177,7 @@ class Drive:
                 after = self._leave_step(task, task.goal, now=now)
                 if isinstance(after, Becomes):
                     return after
-                self._book.note_progress(task.id, after)
+                self._registry.note_progress(task.id, after)
                 self._course = None
                 return Demand(DemandKind.DRIVE, self._last_velocity)
         self._note_progress(task, executed, now=now)
@@ -201,11 +201,11 @@ class Drive:
         period = self._settings.watch.setpoint_period
         news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
         if news:
-            self._book.record(VehicleNoted(task.vehicle, news, now))
+            self._registry.record(VehicleNoted(task.vehicle, news, now))
         if self._astray.is_astray(course, motion):
             words = "does not go where it is told to: is its heading right?"
-            self._book.record(VehicleNoted(task.vehicle, words, now))
-            return Becomes(S.HELD, R.OFF_LINE)
+            self._registry.record(VehicleNoted(task.vehicle, words, now))
+            return Becomes(S.HELD, R.OFF_TRACK)
         speed = None if course is self._way_back else course.progress.speed
         driving, slowest = self._driving_of(task), self._arrival.slowest(course)
         wish = course.steer(motion, driving=driving, speed=speed, slowest=slowest)
@@ -231,7 +231,7 @@ class Drive:
         self._arrival.begin_leg()
 
     def _within_fence(
-        self, course: Course, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
+        self, course: PathFollower, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
     ) -> Velocity | None:
         """Slow down before the fence; None: stop. A vehicle that began outside may come back in."""
         if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
@@ -242,7 +242,7 @@ class Drive:
         return within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
 
     def _arrive(
-        self, task: Task, course: Course, seen: VehicleView, motion: Motion, now: float
+        self, task: Task, course: PathFollower, seen: VehicleView, motion: Motion, now: float
     ) -> Becomes | None:
         """The end of a leg: the next one, the next step, back to the task itself, or all done."""
         self._begin_leg(now=now)
@@ -250,7 +250,7 @@ class Drive:
             if (course.by_course or course.steering) and course.misses > MISSES:
                 return Becomes(S.FAILED, R.STUCK)
             if course is self._course:
-                self._book.advance(task.id, course.progress, now=now)
+                self._registry.advance(task.id, course.progress, now=now)
         elif course is self._way_back:
             self._way_back = None
         elif not isinstance(task.goal, Plan):
@@ -267,13 +267,13 @@ class Drive:
         assert isinstance(task.goal, Plan), "only plans have steps"
         progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
         self._course = self._way_back = None
-        self._book.advance(task.id, progress, now=now)
+        self._registry.advance(task.id, progress, now=now)
 
     def _look_on_the_way(
         self,
         task: Task,
         plan: Plan,
-        course: Course,
+        course: PathFollower,
         motion: Motion,
         *,
         elapsed: float,
@@ -286,16 +286,16 @@ class Drive:
         looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
         course.progress = looked.progress
         for step in looked.done:
-            self._book.reached(task.id, step, performs=step in looked.performed, now=now)
+            self._registry.reached(task.id, step, performs=step in looked.performed, now=now)
         if looked.done:
-            self._book.advance(task.id, course.progress, now=now)
+            self._registry.advance(task.id, course.progress, now=now)
 
     def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
         """A step is done; gives the progress of the next one, unless the plan is over."""
         assert self._course is not None, "a step is driven on its course"
         progress = self._course.progress
         if not is_over(plan, progress):
-            self._book.reached(task.id, progress.step, performs=False, now=now)
+            self._registry.reached(task.id, progress.step, performs=False, now=now)
         left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
         after = following(plan, replace(progress, pending=left))  # nearer than here it will not be
         return Becomes(S.COMPLETED) if after is None else after
@@ -304,11 +304,13 @@ class Drive:
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> Becomes | None:
         """Begin the next step where the vehicle is, moving or not; gives why it does not."""
-        self._book.note_progress(task.id, progress)  # whatever becomes of it: the last one is done
+        self._registry.note_progress(
+            task.id, progress
+        )  # whatever becomes of it: the last one is done
         here = self._set_out(task, progress, seen, motion, now=now)
         if isinstance(here, Becomes):
             return here
-        self._book.advance(task.id, here, now=now)
+        self._registry.advance(task.id, here, now=now)
         return None
 
     def _has_asked_to_stand(self, now: float) -> bool:
@@ -318,11 +320,13 @@ class Drive:
     def _note_progress(self, task: Task, executed: float, *, now: float) -> None:
         assert self._course is not None
         self._course.progress = replace(self._course.progress, execution_time=executed)
-        self._book.note_progress(task.id, self._course.progress)
-        is_written = self._book.durable >= self._kept_as  # a store that is away is not piled up on
+        self._registry.note_progress(task.id, self._course.progress)
+        is_written = (
+            self._registry.durable >= self._kept_as
+        )  # a store that is away is not piled up on
         if now - self._kept_at >= KEEP_EACH and is_written:
-            self._book.keep_progress(task.id, now=now)
-            self._kept_at, self._kept_as = now, self._book.recorded
+            self._registry.keep_progress(task.id, now=now)
+            self._kept_at, self._kept_as = now, self._registry.recorded
 
     def rest(self, task: Task, motion: Motion, *, now: float) -> None:
         """Count what the vehicle has rolled since the task was paused: it stands here."""
@@ -330,7 +334,7 @@ class Drive:
         if course is None or self._way_back:
             return
         course.look(motion, elapsed=0.0)
-        self._book.advance(task.id, course.progress, now=now)
+        self._registry.advance(task.id, course.progress, now=now)
 
 
 def _refused(task: Task) -> Becomes:

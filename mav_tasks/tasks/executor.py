@@ -1,6 +1,6 @@
-"""Runs the one begun task of a vehicle: from STARTING to its end, through every interruption.
+"""Runs the one active task of a vehicle: from STARTING to its end, through every interruption.
 
-It asks for nothing but demands (``view``) and changes states through the book only. Its first
+It asks for nothing but demands (``view``) and changes states through the registry only. Its first
 non-zero velocity waits until EXECUTING is durable; zeros never wait.
 """
 
@@ -8,13 +8,13 @@ from dataclasses import replace
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.drive import Becomes, Drive
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.itinerary import goal_of
-from mav_tasks.tasks.driving.way_back import is_off_line, was_handled
+from mav_tasks.tasks.driving.mission_sequencer import goal_of
+from mav_tasks.tasks.driving.recovery_path import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
 from mav_tasks.tasks.timing import Timing, TimingMeter
@@ -34,14 +34,14 @@ def has_moved(task: Task) -> bool:
 
 
 class Executor:
-    """The begun task of one vehicle, if there is one."""
+    """The active task of one vehicle, if there is one."""
 
-    def __init__(self, book: TaskBook, settings: Settings, bounds: Bounds) -> None:
-        self._book = book
+    def __init__(self, registry: TaskRegistry, settings: Settings, bounds: Bounds) -> None:
+        self._registry = registry
         self._settings = settings
         #: what drives it
-        self.drive = Drive(book, settings, bounds)
-        self.task_id: TaskId | None = None  #: of the begun task
+        self.drive = Drive(registry, settings, bounds)
+        self.task_id: TaskId | None = None  #: of the active task
         self._since = 0.0  # when the present state was entered
         self._executed_before = 0.0  # s of EXECUTING in earlier stretches
         self._last_tick = 0.0
@@ -61,12 +61,12 @@ class Executor:
 
     @property
     def task(self) -> Task | None:
-        """The begun task."""
-        return None if self.task_id is None else self._book[self.task_id]
+        """The active task."""
+        return None if self.task_id is None else self._registry[self.task_id]
 
     @property
     def timing(self) -> Timing | None:
-        """How evenly the begun task's setpoints have left up to now."""
+        """How evenly the active task's setpoints have left up to now."""
         measured = None if self._meter is None else self._meter.timing()
         return measured or (None if self.task is None else self.task.timing)
 
@@ -103,32 +103,32 @@ class Executor:
 
         A vehicle that was moved off the task's line meanwhile is not driven back blindly: HELD.
         """
-        task = self._begun(S.PAUSED)
+        task = self._active(S.PAUSED)
         if seen.motion is not None and is_off_line(task, seen.motion.pose):
-            self._change(S.HELD, R.OFF_LINE, actor=actor, now=now)
+            self._change(S.HELD, R.OFF_TRACK, actor=actor, now=now)
         else:
             self._change(S.STARTING, R.NONE, actor=actor, now=now)
 
     def release(self, *, again: bool, actor: str, now: float) -> None:
         """Let a HELD task start again: all of it from here, or the remainder."""
-        task = self._begun(S.HELD)
+        task = self._active(S.HELD)
         progress = task.progress
         if again:
             progress = Progress(execution_time=progress.execution_time)
-        elif task.reason in (R.FRAME_RESET, R.OFF_LINE):
+        elif task.reason in (R.FRAME_RESET, R.OFF_TRACK):
             # its line is lost, or left for good: what was driven counts, where it began does not
             progress = replace(progress, anchor=None, frame=None, target=None, path=())
         self._change(S.STARTING, R.NONE, actor=actor, now=now, progress=progress)
 
     def set_speed(self, speed: float | None) -> None:
-        """Let the begun task drive at this speed from now on, m/s; None: as it says itself.
+        """Let the active task drive at this speed from now on, m/s; None: as it says itself.
 
         Of what a plan says and what somebody asks for, the last word counts.
         """
         task = self.task
         if task is None:
             return
-        self._book.note_progress(task.id, replace(task.progress, speed=speed))
+        self._registry.note_progress(task.id, replace(task.progress, speed=speed))
         self.drive.set_speed(speed)
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> None:
@@ -142,7 +142,7 @@ class Executor:
             self._resumes_by_itself = False
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Set a begun task aside until somebody decides.
+        """Set a active task aside until somebody decides.
 
         One of which nothing was driven has no line that could be lost with its frame: a rover that
         boots may find its place while it is being taken.
@@ -155,7 +155,7 @@ class Executor:
             self._change(S.HELD, reason, actor=SERVER, now=now)
 
     def cancel(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Call the begun task off: zeros at once, over when the vehicle stands."""
+        """Call the active task off: zeros at once, over when the vehicle stands."""
         task = self.task
         if task is None or task.state is S.CANCELLING:
             return
@@ -168,11 +168,11 @@ class Executor:
 
     def let_go(self, *, actor: str, now: float) -> None:
         """End a task that is being cancelled: somebody else has the vehicle, and it is theirs."""
-        task = self._begun(S.CANCELLING)
+        task = self._active(S.CANCELLING)
         self._finish(S.CANCELLED, task.reason, actor=actor, now=now)
 
     def kill(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
-        """End the begun task at once; gives its id."""
+        """End the active task at once; gives its id."""
         killed = self.task_id
         if killed is not None:
             self._finish(S.KILLED, reason, actor=actor, now=now)
@@ -192,7 +192,7 @@ class Executor:
     # what it wants of the vehicle
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
-        """Give what the begun task demands of the vehicle; may change its state."""
+        """Return what the active task demands of the vehicle; may change its state."""
         task = self.task
         if task is None:
             return view.HOLD
@@ -305,7 +305,7 @@ class Executor:
         if self._ask_again_at is None:  # a try has just ended: what it was refused with is told
             self._ask_again_at = now + ASK_AGAIN
             if self.waits_for != (R.NOT_READY, words):
-                self._book.record(TaskWaits(task.id, task.vehicle, R.NOT_READY, now, words))
+                self._registry.record(TaskWaits(task.id, task.vehicle, R.NOT_READY, now, words))
         self.waits_for = (R.NOT_READY, words)
         if now < self._ask_again_at:
             return view.STAND
@@ -338,19 +338,19 @@ class Executor:
             ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD)
         else:  # as it was when it was lost, before it could be taken
             ours = seen.mode is self._untaken_in
-        task = self._begun(S.PAUSED)
+        task = self._active(S.PAUSED)
         if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):
             self._lost_until = now
         elif now - self._lost_until >= watch.fresh_before_resume:
             there, here = self._lost_at if self._was_silent else None, seen.motion
             if there is not None and here is not None and was_handled(task, there, here.pose):
-                self._change(S.HELD, R.OFF_LINE, actor=SERVER, now=now)
+                self._change(S.HELD, R.OFF_TRACK, actor=SERVER, now=now)
             else:
                 self.resume(seen, actor=SERVER, now=now)
 
     # states
 
-    def _begun(self, state: TaskState) -> Task:
+    def _active(self, state: TaskState) -> Task:
         task = self.task
         assert task is not None, "nothing has begun here"
         assert task.state is state, f"task {task.id} is not {state.name}"
@@ -366,7 +366,7 @@ class Executor:
         progress: Progress | None = None,
     ) -> None:
         assert self.task_id is not None
-        old, timing = self._book[self.task_id], None
+        old, timing = self._registry[self.task_id], None
         if old.state is S.EXECUTING:
             self._executed_before += now - self._since
             progress = replace(old.progress, execution_time=self._executed_before)
@@ -374,7 +374,7 @@ class Executor:
         self._since = self._taking_since = now
         self.drive.entered(now=now)
         self._ask_again_at, self.waits_for = None, (R.NONE, "")
-        self._book.change(
+        self._registry.change(
             self.task_id,
             new,
             reason=reason,

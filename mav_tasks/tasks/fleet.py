@@ -5,14 +5,14 @@ them.
 from collections.abc import Iterator
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, QueuePaused
 from mav_tasks.tasks.halts import WORDS, LastHalt
 from mav_tasks.tasks.lifecycle import ACTIVE, RUNNING, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.pending_tasks import PendingTasks
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
-from mav_tasks.tasks.waiting_room import WaitingRoom
 
 R, S = TaskReason, TaskState
 
@@ -25,11 +25,11 @@ LONG_IDLE = 600.0  # s without a write before the start: nobody remembers what w
 class Fleet:
     """``VehicleTasks`` by system id, and the room in which all their tasks wait."""
 
-    def __init__(self, book: TaskBook, settings: Settings) -> None:
-        self._book = book
+    def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
+        self._registry = registry
         self._settings = settings
         self._of: dict[int, VehicleTasks] = {}
-        self.room = WaitingRoom(book, settings)
+        self.room = PendingTasks(registry, settings)
         self._was_driven: set[int] = set()
         self._halted: dict[int, LastHalt] = {}  # by somebody, before this run
         self._comes_up_paused = False
@@ -39,14 +39,14 @@ class Fleet:
         return iter(self._of.values())
 
     def of(self, vehicle: int) -> VehicleTasks:
-        """Give the tasks of a vehicle; there need not be any yet, nor the vehicle."""
+        """Return the tasks of a vehicle; there need not be any yet, nor the vehicle."""
         tasks = self._of.get(vehicle)
         if tasks is None:
-            tasks = VehicleTasks(vehicle, self._book, self.room, self._settings)
+            tasks = VehicleTasks(vehicle, self._registry, self.room, self._settings)
             self._of[vehicle] = tasks
             if self._comes_up_paused:
                 tasks.restore((), paused=R.RESTARTED, speed=None, uid="", now=self.began_at)
-                self._book.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self.began_at))
+                self._registry.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self.began_at))
         return tasks
 
     def was_driven(self, vehicle: int) -> bool:
@@ -56,7 +56,7 @@ class Fleet:
         return was_driven
 
     def last_halt(self, vehicle: int, *, now: float) -> LastHalt | None:
-        """Give a vehicle's last halt if it came within UNSEEN before now; None when asked again."""
+        """Return a vehicle's last halt if it is younger than UNSEEN; each is returned once."""
         halt = self._halted.pop(vehicle, None)
         return halt if halt is not None and now - halt.at <= UNSEEN else None
 
@@ -70,17 +70,17 @@ class Fleet:
     def restore(self, restored: Restored, *, now: float) -> None:
         """Take over an earlier run: what ran is held, nothing that was under way runs by itself."""
         self.room.set_wall_offset(restored.wall_offset, now=now)
-        self._book.restore(restored.tasks, next_id=restored.next_id)
-        begun: dict[int, list[Task]] = {}
+        self._registry.restore(restored.tasks, next_id=restored.next_id)
+        active: dict[int, list[Task]] = {}
         waiting: set[int] = set()
         for task in restored.tasks:
             if task.state in RUNNING:
                 self._was_driven.add(task.vehicle)
-                task = self._book.change(
+                task = self._registry.change(
                     task.id, S.HELD, reason=R.OUTCOME_UNKNOWN, actor=SERVER, now=now
                 )
             if task.state in ACTIVE:
-                begun.setdefault(task.vehicle, []).append(task)
+                active.setdefault(task.vehicle, []).append(task)
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
@@ -91,16 +91,16 @@ class Fleet:
         self.began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
         of_note |= restored.halt_epochs.keys() | restored.disarmed
-        for vehicle in begun.keys() | waiting | of_note:
+        for vehicle in active.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
-            has_paused = any(task.state is S.PAUSED for task in begun.get(vehicle, ()))
-            is_late = restored.idle > LONG_IDLE and (vehicle in begun or vehicle in waiting)
+            has_paused = any(task.state is S.PAUSED for task in active.get(vehicle, ()))
+            is_late = restored.idle > LONG_IDLE and (vehicle in active or vehicle in waiting)
             is_unclean = pauses and not restored.ended_well
             if not paused and (has_paused or is_unclean or (is_late and pauses)):
                 paused = R.RESTARTED
-                self._book.record(QueuePaused(vehicle, paused, SERVER, now))
+                self._registry.record(QueuePaused(vehicle, paused, SERVER, now))
             self.of(vehicle).restore(
-                begun.get(vehicle, ()),
+                active.get(vehicle, ()),
                 paused=paused,
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),

@@ -8,10 +8,10 @@ to a client; what nobody asks for is not reckoned.
 from heapq import heapify, heappop, heappush
 from math import isnan, nan
 
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.estimate import SETTLING, UNKNOWN, Estimate, Known, time_left
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.queue import Rank
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Pose, Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
@@ -26,16 +26,16 @@ Times = tuple[float, float]
 class Forecast:
     """The starts and ends of one vehicle's tasks as of ``now``."""
 
-    def __init__(self, tasks: VehicleTasks, book: TaskBook, *, now: float) -> None:
+    def __init__(self, tasks: VehicleTasks, registry: TaskRegistry, *, now: float) -> None:
         self._tasks = tasks
-        self._book = book
+        self._registry = registry
         self._now = now
         self._known = known_of(tasks)
         self._times: dict[TaskId, Times] | None = None  # None: not reckoned yet
         self._ready: list[tuple[Rank, TaskId]] = []
         self._due: list[tuple[float, TaskId]] = []  # seconds from now
         self._dependents: dict[int, list[Task]] = {}
-        self._done = {tasks.begun.id} if tasks.begun is not None else set()
+        self._done = {tasks.active.id} if tasks.active is not None else set()
 
     def __repr__(self) -> str:
         return f"Forecast({self._tasks.vehicle}, at {self._now})"
@@ -54,12 +54,12 @@ class Forecast:
             if not self._ready:
                 clock = max(clock, self._due[0][0])
             while self._due and self._due[0][0] <= clock:
-                task = self._book[heappop(self._due)[1]]
+                task = self._registry[heappop(self._due)[1]]
                 if not task.terms.is_staged and not self._is_blocked(task):
                     heappush(self._ready, (self._tasks.room.rank(task), task.id))
             if not self._ready:
                 continue
-            task = self._book[heappop(self._ready)[1]]
+            task = self._registry[heappop(self._ready)[1]]
             seconds, pose = time_left(task.goal, task.progress, self._known._replace(pose=pose))
             times[task.id] = (clock, clock + seconds)
             clock += seconds
@@ -71,14 +71,14 @@ class Forecast:
         """Sort what waits by what it waits for."""
         tasks = self._tasks
         self._ready = [(tasks.queue.rank(each), each) for each in tasks.queue.page(0, FORESEEN)]
-        for aside in tasks.aside:
-            if aside.state is S.PAUSED:
-                self._ready.append((tasks.room.rank(aside), aside.id))
+        for suspended in tasks.suspended:
+            if suspended.state is S.PAUSED:
+                self._ready.append((tasks.room.rank(suspended), suspended.id))
         heapify(self._ready)
         if tasks.room.count(tasks.vehicle) == len(tasks.queue):
             return
         for task_id in tasks.waiting[len(tasks.queue) :][:FORESEEN]:
-            task = self._book[task_id]
+            task = self._registry[task_id]
             if task.state is S.SCHEDULED:
                 due = tasks.start_time(task) - self._now
                 times[task_id] = (due, nan)  # at the earliest, whatever else is in its way
@@ -96,7 +96,7 @@ class Forecast:
 
     def _is_blocked(self, task: Task) -> bool:
         """Return whether a task whose time has come waits for another one, and note that."""
-        ahead = self._book.get(task.terms.after) if task.terms.after else None
+        ahead = self._registry.get(task.terms.after) if task.terms.after else None
         if ahead is None or ahead.state in TERMINAL or ahead.id in self._done:
             return False
         self._dependents.setdefault(ahead.id, []).append(task)
@@ -106,18 +106,18 @@ class Forecast:
         """Return when the vehicle is free for the next task, and where; UNKNOWN if nothing runs."""
         tasks = self._tasks
         is_up = tasks.seen is not None and tasks.seen.heard
-        if tasks.paused or tasks.is_held_ahead or tasks.is_halting or not is_up:
+        if tasks.paused or tasks.is_held_ahead or tasks.stopping_after_kill or not is_up:
             return UNKNOWN
-        begun = tasks.begun
-        if begun is None:
+        active = tasks.active
+        if active is None:
             first = tasks.queue.first()
             blocked = first is not None and tasks.turns.blocker_of(first)
             return UNKNOWN if blocked else Estimate(0.0, self._known.pose)
-        if begun.state is S.CANCELLING:
+        if active.state is S.CANCELLING:
             return Estimate(SETTLING, self._known.pose)
-        if begun.state not in (S.STARTING, S.EXECUTING) or tasks.turns.blocker_of(begun.id):
+        if active.state not in (S.STARTING, S.EXECUTING) or tasks.turns.blocker_of(active.id):
             return UNKNOWN
-        return time_left(begun.goal, begun.progress, self._known)
+        return time_left(active.goal, active.progress, self._known)
 
 
 def known_of(tasks: VehicleTasks) -> Known:

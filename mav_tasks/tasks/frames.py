@@ -15,7 +15,7 @@ HALF_TURN = 1_800_000_000  # degE7
 
 
 def to_local(place: GlobalPlace, origin: GlobalPlace) -> LocalPlace:
-    """Give a place in the local frame with this origin; exact to a millimetre within 10 km."""
+    """Return a place in the local frame with this origin; exact to a millimetre within 10 km."""
     east = _wrapped(place.longitude_degE7 - origin.longitude_degE7)
     scale = _east_scale(place.latitude_degE7, origin.latitude_degE7)
     return LocalPlace(
@@ -25,14 +25,14 @@ def to_local(place: GlobalPlace, origin: GlobalPlace) -> LocalPlace:
 
 
 def local_place(place: Place | None, origin: GlobalPlace | None) -> LocalPlace | None:
-    """Give a place of either kind in the local frame, or None while that is not known."""
+    """Return a place of either kind in the local frame, or None while that is not known."""
     if isinstance(place, GlobalPlace):
         return None if origin is None else to_local(place, origin)
     return place
 
 
 def to_global(place: LocalPlace, origin: GlobalPlace) -> GlobalPlace:
-    """Give the nearest global place; its integers resolve 11 mm."""
+    """Return the nearest global place; its integers resolve 11 mm."""
     latitude = origin.latitude_degE7 + place.north / METRES_PER_DEGE7
     scale = _east_scale(latitude, origin.latitude_degE7)
     longitude = origin.longitude_degE7 + place.east / (METRES_PER_DEGE7 * scale)
@@ -40,7 +40,7 @@ def to_global(place: LocalPlace, origin: GlobalPlace) -> GlobalPlace:
 
 
 def origin_of(place: GlobalPlace, local: LocalPlace) -> GlobalPlace:
-    """Give the origin of a frame in which ``local`` is the same place as ``place``."""
+    """Return the origin of a frame in which ``local`` is the same place as ``place``."""
     latitude = place.latitude_degE7 - local.north / METRES_PER_DEGE7
     scale = _east_scale(place.latitude_degE7, latitude)
     longitude = place.longitude_degE7 - local.east / (METRES_PER_DEGE7 * scale)

@@ -216,7 +216,7 @@ FEW_STEPS = 4  # of a plan that may be no more than one goal
 
 
 def describe(goal: Goal) -> str:
-    """Give a goal in words, and in the units of its command."""
+    """Return a goal in words, and in the units of its command."""
     if isinstance(goal, GoTo):
         return _describe_way(goal.place)
     if isinstance(goal, Plan):

@@ -72,7 +72,7 @@ class TaskReason(IntEnum):
     OUTCOME_UNKNOWN = 50
     FENCE = 51
     LATE = 52
-    OFF_LINE = 53
+    OFF_TRACK = 53
     FRAME_RESET = 54
     STOP_UNCONFIRMED = 55
     OVERSPEED = 56
@@ -116,7 +116,7 @@ _WORDS = {
     **{reason: reason.name.lower().replace("_", " ") for reason in TaskReason},
     # where the name of a reason is not what people say
     TaskReason.FRAME_RESET: "position reference changed",
-    TaskReason.OFF_LINE: "off track",
+    TaskReason.OFF_TRACK: "off track",
     TaskReason.FAILSAFE: "failsafe of the rover",
     TaskReason.OUTSIDE_OWN_FENCE: "outside the rover's own fence",
 }

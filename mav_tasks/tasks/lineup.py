@@ -8,21 +8,21 @@ from dataclasses import dataclass
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import SET_FAILSAFE, Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.led_away import LedAway
+from mav_tasks.tasks.driving.displacement import LedAway
 from mav_tasks.tasks.events import QueuePaused, VehicleHalted
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.queue import TaskQueue
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Task, TaskId, same_frame
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_terms import VehicleTerms
 from mav_tasks.tasks.view import VehicleView
-from mav_tasks.tasks.waiting_room import WaitingRoom
 
 R, S = TaskReason, TaskState
 
@@ -49,33 +49,35 @@ class Released:
 class Lineup:
     """What there is of tasks of the vehicle with this system id, and how it stands."""
 
-    def __init__(self, vehicle: int, book: TaskBook, room: WaitingRoom, settings: Settings) -> None:
+    def __init__(
+        self, vehicle: int, registry: TaskRegistry, room: PendingTasks, settings: Settings
+    ) -> None:
         self.vehicle = vehicle
-        self.book = book
+        self.registry = registry
         self.room = room
         self.settings = settings
         #: the tasks that are ready
         self.queue: TaskQueue = room.queue(vehicle)
         #: where it may drive, and where it returns to
         self.bounds = Bounds()
-        self.executor = Executor(book, settings, self.bounds)
+        self.executor = Executor(registry, settings, self.bounds)
         #: what its tasks go by beside their own terms
-        self.terms = VehicleTerms(vehicle, book, self.executor, self.bounds, settings)
+        self.terms = VehicleTerms(vehicle, registry, self.executor, self.bounds, settings)
         #: how many tasks of a submitter wait, on any vehicle
         self.count_of = room.count_of
         #: takes a task in; Rejection when too many wait
         self.submit = room.submit
-        self.aside_ids: dict[TaskId, None] = {}
+        self.suspended_ids: dict[TaskId, None] = {}
         self.of_earlier_run: set[TaskId] = set()
-        self.led_away = LedAway()
+        self.displaced = LedAway()
         #: why the queue stands, or NONE
         self.paused = R.NONE
         #: what made the vehicle stand, and when
         self.halts = Halts()
         #: the task that runs although the queue is paused
-        self.urgent: TaskId | None = None
+        self.immediate: TaskId | None = None
         #: killed: nothing begins before the vehicle stands
-        self.is_halting = False
+        self.stopping_after_kill = False
         self.begun_at = 0.0
         #: a held task that waits until the vehicle has restarted, or the queue goes on
         self.released: Released | None = None
@@ -84,20 +86,20 @@ class Lineup:
         return f"{type(self).__name__}({self.vehicle}, {self.queue!r}, {self.paused.name})"
 
     @property
-    def begun(self) -> Task | None:
+    def active(self) -> Task | None:
         """The task that has the vehicle: begun, not over and not set aside."""
         task_id = self.executor.task_id
-        return None if task_id is None else self.book.get(task_id)
+        return None if task_id is None else self.registry.get(task_id)
 
     @property
-    def aside(self) -> list[Task]:
-        """The tasks that have begun and were set aside."""
-        return [self.book[task_id] for task_id in self.aside_ids]
+    def suspended(self) -> list[Task]:
+        """The tasks that are suspended."""
+        return [self.registry[task_id] for task_id in self.suspended_ids]
 
     @property
     def is_driving(self) -> bool:
         """Whether any task has begun and is not over."""
-        return self.begun is not None or bool(self.aside_ids)
+        return self.active is not None or bool(self.suspended_ids)
 
     @property
     def is_stopped(self) -> bool:
@@ -121,7 +123,7 @@ class Lineup:
 
     @property
     def is_idle(self) -> bool:
-        """Whether there is neither a begun task nor one that could begin now."""
+        """Whether there is neither a active task nor one that could begin now."""
         return not self.is_driving and len(self.queue) == 0
 
     @property
@@ -132,11 +134,14 @@ class Lineup:
     @property
     def unfinished(self) -> list[Task]:
         """All tasks that are not over, in the order of their ids."""
-        begun = [] if self.begun is None else [self.begun.id]
-        return [self.book[task_id] for task_id in sorted([*begun, *self.aside_ids, *self.waiting])]
+        active = [] if self.active is None else [self.active.id]
+        return [
+            self.registry[task_id]
+            for task_id in sorted([*active, *self.suspended_ids, *self.waiting])
+        ]
 
     def page(self, first: int, count: int) -> list[TaskId]:
-        """Give up to ``count`` waiting tasks from a position on."""
+        """Return up to ``count`` waiting tasks from a position on."""
         if first + count <= len(self.queue):
             return self.queue.page(first, count)
         if first >= self.room.count(self.vehicle):
@@ -144,30 +149,30 @@ class Lineup:
         return self.waiting[first : first + count]
 
     def start_time(self, task: Task) -> float:
-        """Give the monotonic time before which a task does not begin; -inf without one."""
+        """Return the monotonic time before which a task does not begin; -inf without one."""
         return self.room.times.start(task.terms)
 
     def timing_of(self, task: Task) -> Timing | None:
-        """Give how evenly a task's setpoints have left, None if it was not driven."""
-        begun = self.begun
-        return self.executor.timing if begun is not None and begun.id == task.id else task.timing
+        """Return how evenly a task's setpoints have left, None if it was not driven."""
+        active = self.active
+        return self.executor.timing if active is not None and active.id == task.id else task.timing
 
     @property
     def held(self) -> Task | None:
         """The task that somebody must decide about; None: there is none, or it is decided."""
-        begun = self.begun
-        if begun is not None and begun.state is S.HELD:
-            return begun if self.released is None else None
-        return next((task for task in self.aside if task.state is S.HELD), None)
+        active = self.active
+        if active is not None and active.state is S.HELD:
+            return active if self.released is None else None
+        return next((task for task in self.suspended if task.state is S.HELD), None)
 
     @property
     def is_held_ahead(self) -> bool:
         """Whether a held task keeps all others from beginning."""
         task_id = self.executor.task_id
-        begun = None if task_id is None else self.book.get(task_id)
-        if begun is not None and begun.state is S.HELD:
+        active = None if task_id is None else self.registry.get(task_id)
+        if active is not None and active.state is S.HELD:
             return True
-        return bool(self.aside_ids) and any(task.state is S.HELD for task in self.aside)
+        return bool(self.suspended_ids) and any(task.state is S.HELD for task in self.suspended)
 
     @property
     def resumes_by_itself(self) -> bool:
@@ -192,11 +197,11 @@ class Lineup:
         begun is held as before.
         """
         self.released = None
-        if self.urgent is not None and (self.begun is None or self.begun.id != self.urgent):
-            self.urgent = None
+        if self.immediate is not None and (self.active is None or self.active.id != self.immediate):
+            self.immediate = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):
             epoch = self.halts.epoch
-            self.book.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
+            self.registry.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
 
     def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Let the queue stand; a STOP is not undone, nor that somebody else has the vehicle."""
@@ -205,12 +210,12 @@ class Lineup:
         if self.paused in TAKEN and reason is R.OPERATOR:
             return  # a pause does not say that all is well with the vehicle again
         self.paused = reason
-        self.book.record(QueuePaused(self.vehicle, reason, actor, now))
+        self.registry.record(QueuePaused(self.vehicle, reason, actor, now))
 
     def set_aside(self, task_id: TaskId) -> None:
         """Let another task have the vehicle: this one has begun, and is not over."""
         self.executor.give_up()
-        self.aside_ids[task_id] = None
+        self.suspended_ids[task_id] = None
 
     def check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         """Raise Rejection, with what may be done about it, while a goal could not be begun."""

@@ -12,11 +12,11 @@ R, S = TaskReason, TaskState
 
 
 def position(tasks: VehicleTasks, task: Task) -> int | None:
-    """Give how many tasks run before this one, or None if it is not ready to run."""
+    """Return how many tasks run before this one, or None if it is not ready to run."""
     ahead = tasks.queue.position(task.id)
     if ahead is None:
         return None
-    return ahead + (tasks.begun is not None) + len(tasks.aside)
+    return ahead + (tasks.active is not None) + len(tasks.suspended)
 
 
 def estimate(
@@ -39,7 +39,7 @@ def estimate(
 
 
 def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
-    """Give why a task is not being executed; its own reason once it has begun."""
+    """Return why a task is not being executed; its own reason once it has begun."""
     match task.state:
         case S.SCHEDULED:
             return R.START_TIME
@@ -56,9 +56,9 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
 def _why_queued(tasks: VehicleTasks, task: Task) -> TaskReason:
     if tasks.is_held_ahead:
         return R.HELD_AHEAD
-    if tasks.paused and task.id != tasks.urgent:
+    if tasks.paused and task.id != tasks.immediate:
         return R.RESTARTED if tasks.paused is R.RESTARTED else R.QUEUE_PAUSED
-    if tasks.is_halting:
+    if tasks.stopping_after_kill:
         return R.STOP_UNCONFIRMED
     if tasks.executor.task_id is not None or tasks.queue.position(task.id):
         return R.BEHIND_OTHERS

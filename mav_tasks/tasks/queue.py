@@ -25,7 +25,7 @@ class Rank(NamedTuple):
 
 
 def rank_of(priority: int, *, came_at: float, task_id: TaskId, aging: float) -> Rank:
-    """Give a task's own rank; ``came_at`` in monotonic seconds, ``aging`` 0 for none."""
+    """Return a task's own rank; ``came_at`` in monotonic seconds, ``aging`` 0 for none."""
     if priority == MAX_PRIORITY:
         return Rank(False, 0.0, came_at, task_id)
     urgency = came_at - priority * aging if aging > 0 else -float(priority)
@@ -102,11 +102,11 @@ class TaskQueue:
                 _remove(self._preemptive, by_priority)
 
     def first(self) -> TaskId | None:
-        """Give the task that runs next."""
+        """Return the task that runs next."""
         return self._order[0][1] if self._order else None
 
     def interrupters(self) -> list[TaskId]:
-        """Give the tasks that may interrupt if any here may: the first marked so, the first of all.
+        """Return the only tasks that may interrupt: the first pre-emptive one, and the first.
 
         By their own priority, and by their order within it: neither aging nor the urgency of
         others makes a task interrupt.
@@ -115,20 +115,20 @@ class TaskQueue:
         return [first[0][2] for first in firsts if first]
 
     def rank(self, task_id: TaskId) -> Rank:
-        """Give the rank by which a task waits here."""
+        """Return the rank by which a task waits here."""
         return self._entries[task_id].rank
 
     def position(self, task_id: TaskId) -> int | None:
-        """Give how many tasks here run before this one, or None if it is not here."""
+        """Return how many tasks here run before this one, or None if it is not here."""
         entry = self._entries.get(task_id)
         return None if entry is None else bisect_left(self._order, (entry.rank, task_id))
 
     def page(self, first: int, count: int) -> list[TaskId]:
-        """Give up to ``count`` tasks from the position ``first`` on."""
+        """Return up to ``count`` tasks from the position ``first`` on."""
         return [task_id for _, task_id in self._order[first : first + count]]
 
     def in_order(self) -> list[TaskId]:
-        """Give all tasks, next one first."""
+        """Return all tasks, next one first."""
         return self.page(0, len(self))
 
 
@@ -138,5 +138,5 @@ def _remove(ordered: list[Any], item: tuple[Any, ...]) -> None:
 
 
 def full(capacity: int) -> Rejection:
-    """Give the refusal of one task too many for a vehicle."""
+    """Return the refusal of one task too many for a vehicle."""
     return Rejection(TaskReason.QUEUE_FULL, f"queue full: {capacity} tasks wait")

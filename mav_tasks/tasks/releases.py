@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from mav_tasks.errors import Rejection
-from mav_tasks.tasks.driving.itinerary import goal_of, has_local_place
 from mav_tasks.tasks.driving.legs import leg_of
-from mav_tasks.tasks.driving.way_back import is_off_line
+from mav_tasks.tasks.driving.mission_sequencer import goal_of, has_local_place
+from mav_tasks.tasks.driving.recovery_path import is_off_line
 from mav_tasks.tasks.events import TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import MoveTurned, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
@@ -48,31 +48,31 @@ class Releases:
         """
         if self._lineup.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
-        begun = self._lineup.begun
-        if begun is not None and begun.id != task.id and begun.state not in (S.HELD, S.PAUSED):
-            words = f"task {begun.id} is {begun.state.name.lower()}"
+        active = self._lineup.active
+        if active is not None and active.id != task.id and active.state not in (S.HELD, S.PAUSED):
+            words = f"task {active.id} is {active.state.name.lower()}"
             raise Rejection(R.WRONG_STATE, words)
         waits_for = self._waits_for(task, seen, may_continue=may_continue, now=now)
         if not waits_for:
             self._lineup.check_start(seen, goal_of(task), now=now)
         if not again:
             self._check_remainder(task, seen)
-        if begun is not None and begun.id != task.id:
-            self._lineup.set_aside(begun.id)
-        if self._lineup.begun is None:
-            self._lineup.aside_ids.pop(task.id, None)
+        if active is not None and active.id != task.id:
+            self._lineup.set_aside(active.id)
+        if self._lineup.active is None:
+            self._lineup.suspended_ids.pop(task.id, None)
             self._lineup.executor.adopt(task)
         self._lineup.of_earlier_run.discard(task.id)
         if waits_for:
             until = now + self._lineup.settings.watch.ready_timeout
             self._lineup.released = Released(task.id, again, may_continue, actor, until, waits_for)
-            self._lineup.book.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
+            self._lineup.registry.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
             return
         self._begin_released(again=again, actor=actor, now=now)
 
     def look(self, seen: VehicleView, *, now: float) -> None:
         """Let a released task begin when the vehicle is up, or hold it as before."""
-        release, task = self._lineup.released, self._lineup.begun
+        release, task = self._lineup.released, self._lineup.active
         if release is None:
             return
         if task is None or task.id != release.task_id or task.state is not S.HELD:
@@ -90,7 +90,7 @@ class Releases:
             self._note_held(task, f"waited too long: {words_of(waits_for)}", now=now)
         elif waits_for is not release.waits_for:
             self._lineup.released = replace(release, waits_for=waits_for)
-            self._lineup.book.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
+            self._lineup.registry.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
 
     def _begin_released(self, *, again: bool, actor: str, now: float) -> None:
         self._lineup.released = None
@@ -118,7 +118,7 @@ class Releases:
     def _note_held(self, task: Task, why: str, *, now: float) -> None:
         self._lineup.released = None
         words = f"task {task.id} is on hold, release it again: {why}"
-        self._lineup.book.record(VehicleNoted(self._lineup.vehicle, words, now))
+        self._lineup.registry.record(VehicleNoted(self._lineup.vehicle, words, now))
 
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:
         """What is left must be known: measured along its line, or counted until it was held."""
@@ -128,10 +128,10 @@ class Releases:
                 f"places of task {task.id} were in a frame that is lost: run it again, or skip it"
             )
             raise Rejection(R.WRONG_STATE, words)
-        counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_LINE)
+        counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_TRACK)
         if not counts_from_here and seen.motion and is_off_line(task, seen.motion.pose):
             words = f"off the line of task {task.id}: run it again from here, or skip it"
-            raise Rejection(R.OFF_LINE, words)
+            raise Rejection(R.OFF_TRACK, words)
         if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
             return
         goal = goal_of(task)

@@ -11,7 +11,7 @@ from mav_tasks.tasks.view import ModeKind, VehicleView
 def start_blocker(
     view: VehicleView, *, watch: Watch, now: float, goal: SingleGoal | None = None
 ) -> TaskReason:
-    """Give why no task, or not one of this goal, can take control of the vehicle now, or NONE.
+    """Return why no task, or not one of this goal, can take control of the vehicle now, or NONE.
 
     Modes are taken only from HOLD or from one that we set; from MANUAL only while disarmed.
     """
@@ -37,7 +37,7 @@ def start_blocker(
 
 
 def place_of(goal: GoTo, view: VehicleView) -> LocalPlace | None:
-    """Give the place that a goal means in the vehicle's frame, or None while that is not known."""
+    """Return a goal's place in the vehicle's frame, or None while that is unknown."""
     return local_place(view.home if goal.place is None else goal.place, view.origin)
 
 

@@ -21,7 +21,7 @@ class Times:
         return f"Times({len(self._starts)} starts, {len(self._deadlines)} deadlines)"
 
     def start(self, terms: Terms) -> float:
-        """Give the monotonic time before which a task does not begin; -inf without one."""
+        """Return the monotonic time before which a task does not begin; -inf without one."""
         if terms.start_utc is None and terms.start_at is None:  # as nearly always
             return -inf
         from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
@@ -42,11 +42,11 @@ class Times:
         self.next_at = min(first_start, self._deadlines[0][0] if self._deadlines else inf)
 
     def take_over(self, *, now: float) -> list[tuple[float, TaskId]]:
-        """Give the deadlines that have passed, and of what."""
+        """Return the deadlines that have passed, and of what."""
         return self._take(self._deadlines, now)
 
     def take_starts(self, *, now: float) -> list[tuple[float, TaskId]]:
-        """Give the start times that have come, and of what."""
+        """Return the start times that have come, and of what."""
         return self._take(self._starts, now)
 
     def _take(self, heap: list[tuple[float, TaskId]], now: float) -> list[tuple[float, TaskId]]:

@@ -83,7 +83,7 @@ class TimingMeter:
             self._late += 1
 
     def timing(self) -> Timing | None:
-        """Give the figures so far, None while there is no interval."""
+        """Return the figures so far, None while there is no interval."""
         spread = sorted(self._counts.items())
         count = sum(number for _, number in spread)
         if not count:
@@ -99,7 +99,7 @@ class TimingMeter:
         )
 
     def _percentile(self, spread: list[tuple[int, int]], rank: int) -> float:
-        """Give the length below or at which ``rank`` of the intervals are."""
+        """Return the length below or at which ``rank`` of the intervals are."""
         seen = 0
         for bucket, number in spread:
             seen += number

@@ -1,6 +1,6 @@
 """Whose turn it is: which task of a vehicle begins next, what keeps it, and which may interrupt."""
 
-from mav_tasks.tasks.driving.itinerary import goal_of
+from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.lineup import Lineup
@@ -28,14 +28,14 @@ class Turns:
     def awaits_commit(self) -> bool:
         """Whether the next task waits for nothing but its submission being durable."""
         first = None if self._lineup.executor.task_id is not None else self._next()
-        return first is not None and not self._lineup.book.is_durable(first)
+        return first is not None and not self._lineup.registry.is_durable(first)
 
     def blocker_of(self, task_id: TaskId) -> TaskReason:
-        """Give what keeps the next task, or a begun one, from being driven; NONE for others."""
+        """Return what keeps the next task, or an active one, from being driven; NONE for others."""
         if self._lineup.released is not None and self._lineup.released.task_id == task_id:
             return self._lineup.released.waits_for
-        begun = self._lineup.begun
-        if begun is not None and begun.id == task_id:
+        active = self._lineup.active
+        if active is not None and active.id == task_id:
             return self._lineup.executor.waits_for[0]
         return self._blocker if self._blocked == task_id else R.NONE
 
@@ -46,7 +46,7 @@ class Turns:
 
     def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Set the running task aside if a waiting one may interrupt it, and could begin."""
-        running = self._lineup.begun
+        running = self._lineup.active
         if (
             running is None
             or self._lineup.paused
@@ -57,9 +57,9 @@ class Turns:
         if now - self._lineup.begun_at < self._lineup.settings.queueing.preemption_rest:
             return False
         for task_id in self._lineup.queue.interrupters():
-            if not self._lineup.book.is_durable(task_id):
+            if not self._lineup.registry.is_durable(task_id):
                 continue
-            waiting = self._lineup.book[task_id]
+            waiting = self._lineup.registry[task_id]
             if is_too_late(waiting, now=now):
                 continue
             if outranks(
@@ -78,10 +78,10 @@ class Turns:
 
     def begin_next(self, seen: VehicleView, *, now: float) -> None:
         """Begin the task whose turn it is, if it can begin."""
-        first = None if self._lineup.begun is not None else self._next()
+        first = None if self._lineup.active is not None else self._next()
         if first is None:
             return
-        task = self._lineup.book[first]
+        task = self._lineup.registry[first]
         if task.state is S.QUEUED and is_too_late(task, now=now):
             self._lineup.room.handle_deadline(now=now)  # after a delay this may be looked at first
             self.begin_next(seen, now=now)
@@ -90,21 +90,21 @@ class Turns:
             seen, watch=self._lineup.settings.watch, now=now, goal=goal_of(task)
         )
         self._note_blocker(first, blocker, now=now)
-        if not blocker and self._lineup.book.is_durable(first):
+        if not blocker and self._lineup.registry.is_durable(first):
             self._begin(task, seen, now=now)
 
     def _next(self) -> TaskId | None:
         """The task that has the next turn: the urgent one, a pre-empted one, or a waiting one."""
         if self._lineup.is_held_ahead:
             return None
-        if self._lineup.urgent is not None and self._lineup.urgent in self._lineup.queue:
-            return self._lineup.urgent
+        if self._lineup.immediate is not None and self._lineup.immediate in self._lineup.queue:
+            return self._lineup.immediate
         if self._lineup.paused:
             return None
         first = self._lineup.queue.first()
-        if not self._lineup.aside_ids:
+        if not self._lineup.suspended_ids:
             return first
-        resumable = [task for task in self._lineup.aside if task.state is S.PAUSED]
+        resumable = [task for task in self._lineup.suspended if task.state is S.PAUSED]
         if not resumable:
             return first
         best = min(resumable, key=self._rank)
@@ -119,19 +119,19 @@ class Turns:
         if task.state is S.QUEUED:
             self._lineup.room.leave(task)
         else:
-            del self._lineup.aside_ids[task.id]
+            del self._lineup.suspended_ids[task.id]
         self._lineup.begun_at = now
         if self._lineup.is_of_another_frame(task, seen):
             self._lineup.executor.adopt(task)
             self._lineup.executor.hold(R.FRAME_RESET, now=now)
-        elif self._lineup.led_away.from_line_of(task, seen):
+        elif self._lineup.displaced.from_line_of(task, seen):
             self._lineup.executor.adopt(task)
-            self._lineup.executor.hold(R.OFF_LINE, now=now)
+            self._lineup.executor.hold(R.OFF_TRACK, now=now)
         else:
             self._lineup.executor.begin(task, actor=SERVER, now=now)
 
     def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
         """Keep why the next task does not begin, and tell of it once each time that it changes."""
         if blocker and (first, blocker) != (self._blocked, self._blocker):
-            self._lineup.book.record(TaskWaits(first, self._lineup.vehicle, blocker, now))
+            self._lineup.registry.record(TaskWaits(first, self._lineup.vehicle, blocker, now))
         self._blocked, self._blocker = first, blocker

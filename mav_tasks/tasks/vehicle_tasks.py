@@ -9,20 +9,20 @@ from dataclasses import replace
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.book import TaskBook
-from mav_tasks.tasks.driving.itinerary import goal_of, present_goal, skipped_to
 from mav_tasks.tasks.driving.jump import JumpWatch
+from mav_tasks.tasks.driving.mission_sequencer import goal_of, present_goal, skipped_to
 from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
 from mav_tasks.tasks.lineup import Lineup
+from mav_tasks.tasks.pending_tasks import PendingTasks
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.releases import Releases
 from mav_tasks.tasks.task import Draft, Progress, Task, TaskId, Terms
 from mav_tasks.tasks.turns import Turns
 from mav_tasks.tasks.view import Demand, VehicleView
-from mav_tasks.tasks.waiting_room import WaitingRoom
 
 R, S = TaskReason, TaskState
 
@@ -30,8 +30,10 @@ R, S = TaskReason, TaskState
 class VehicleTasks(Lineup):
     """All tasks of the vehicle with this system id."""
 
-    def __init__(self, vehicle: int, book: TaskBook, room: WaitingRoom, settings: Settings) -> None:
-        super().__init__(vehicle, book, room, settings)
+    def __init__(
+        self, vehicle: int, registry: TaskRegistry, room: PendingTasks, settings: Settings
+    ) -> None:
+        super().__init__(vehicle, registry, room, settings)
         #: whose turn it is
         self.turns = Turns(self)
         #: of tasks that are held
@@ -66,10 +68,10 @@ class VehicleTasks(Lineup):
         self.terms.restore(speed=speed, uid=uid, may_be_armed=may_be_armed)
         for task in tasks:
             self.of_earlier_run.add(task.id)
-            if self.begun is None and task.reason is not R.PREEMPTED:
+            if self.active is None and task.reason is not R.PREEMPTED:
                 self.executor.adopt(task)
             else:
-                self.aside_ids[task.id] = None
+                self.suspended_ids[task.id] = None
 
     def identified(self, uid: str, *, now: float) -> None:
         """The vehicle says which one it is; another one does not run these tasks unasked."""
@@ -108,20 +110,20 @@ class VehicleTasks(Lineup):
 
     def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
         """Let a waiting task run at once; what runs and what waits goes on when continued."""
-        begun = self.begun
-        if begun is not None and begun.id == self.urgent:
+        active = self.active
+        if active is not None and active.id == self.immediate:
             self.executor.cancel(R.REPLACED, actor=actor, now=now)
-        elif begun is not None and begun.state in (S.STARTING, S.EXECUTING, S.PAUSED):
+        elif active is not None and active.state in (S.STARTING, S.EXECUTING, S.PAUSED):
             self.executor.pause(R.OPERATOR, actor=actor, now=now)
-            self.set_aside(begun.id)
-        if self.urgent is not None:
-            self._replace_urgent(actor=actor, now=now)
-        self.urgent = task.id
+            self.set_aside(active.id)
+        if self.immediate is not None:
+            self._replace_immediate(actor=actor, now=now)
+        self.immediate = task.id
         self.pause_queue(R.OPERATOR, actor=actor, now=now)
 
-    def _replace_urgent(self, *, actor: str, now: float) -> None:
-        assert self.urgent is not None
-        before = self.book.get(self.urgent)
+    def _replace_immediate(self, *, actor: str, now: float) -> None:
+        assert self.immediate is not None
+        before = self.registry.get(self.immediate)
         if before is not None and before.state in WAITING:
             self.room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
 
@@ -133,25 +135,25 @@ class VehicleTasks(Lineup):
         state = S.KILLED if kill else S.CANCELLED
         if task.state in WAITING:
             self.room.end(task, state, reason, actor=actor, now=now)
-        elif task.id in self.aside_ids:
-            del self.aside_ids[task.id]
+        elif task.id in self.suspended_ids:
+            del self.suspended_ids[task.id]
             if task.state is S.PAUSED and not kill:
-                self.book.change(task.id, S.CANCELLING, reason=reason, actor=actor, now=now)
-            self.book.change(task.id, state, reason=reason, actor=actor, now=now)
+                self.registry.change(task.id, S.CANCELLING, reason=reason, actor=actor, now=now)
+            self.registry.change(task.id, state, reason=reason, actor=actor, now=now)
             self.room.ended(task.id, now=now)
         elif kill:
             self.halt(reason, actor=actor, now=now)
-            self.is_halting |= not self._is_of_another_driver(task)
+            self.stopping_after_kill |= not self._is_of_another_driver(task)
             self.executor.kill(reason, actor=actor, now=now)
             self._ended(task.id, now=now)
         else:
             self.halt(reason, actor=actor, now=now)
             self.executor.cancel(reason, actor=actor, now=now)
-            if self.begun is None:
+            if self.active is None:
                 self._ended(task.id, now=now)
 
     def _is_of_another_driver(self, task: Task) -> bool:
-        """Whether a begun task stands because somebody else has the vehicle, who keeps it."""
+        """Whether a active task stands because somebody else has the vehicle, who keeps it."""
         was_taken = self.paused in TAKEN and task.reason is R.FRAME_RESET
         return task.reason in TAKEN or was_taken
 
@@ -160,14 +162,14 @@ class VehicleTasks(Lineup):
         if task.state in WAITING:
             self.room.modify(task, terms, actor=actor, now=now)
         else:
-            self.book.modify(task.id, terms, actor=actor, now=now)
+            self.registry.modify(task.id, terms, actor=actor, now=now)
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
         """Cancel what waits; with ``begun_too`` also what has begun."""
         self.room.clear(self.vehicle, R.CLEARED, actor=actor, now=now)
         if not begun_too:
             return
-        for task in [*self.aside, *([] if self.begun is None else [self.begun])]:
+        for task in [*self.suspended, *([] if self.active is None else [self.active])]:
             self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
 
     def forget_release(self) -> None:
@@ -177,25 +179,25 @@ class VehicleTasks(Lineup):
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
         """Let a plan that is not over go on, or begin, with another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
-        if self.begun is not None and self.begun.id == task.id:
-            self.executor.drive.skip_to(self.begun, step, now=now)
+        if self.active is not None and self.active.id == task.id:
+            self.executor.drive.skip_to(self.active, step, now=now)
         else:
             progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
-            self.book.advance(task.id, progress, now=now)
+            self.registry.advance(task.id, progress, now=now)
 
     def rest(self, seen: VehicleView, *, now: float) -> None:
         """The server ends, and the vehicle was stopped for it: what it has rolled counts."""
-        begun = self.begun
-        if seen.motion is not None and begun is not None and begun.state is S.PAUSED:
-            self.executor.drive.rest(begun, seen.motion, now=now)
+        active = self.active
+        if seen.motion is not None and active is not None and active.state is S.PAUSED:
+            self.executor.drive.rest(active, seen.motion, now=now)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
         """Set the speed of the task that runs, and of those to come; gives the one that runs."""
         self.terms.set_speed(speed, actor=actor, now=now)
-        return None if self.begun is None else self.begun.id
+        return None if self.active is None else self.active.id
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
-        """Let the begun task and the queue stand; gives the task's id. Never undoes a STOP.
+        """Let the active task and the queue stand; gives the task's id. Never undoes a STOP.
 
         Where somebody else has the vehicle, nobody waits for it to stand before a cancelled task is
         over.
@@ -204,15 +206,15 @@ class VehicleTasks(Lineup):
         self.released = None
         self.executor.pause(reason, actor=actor, now=now)
         self.pause_queue(reason, actor=actor, now=now)
-        begun = self.begun
+        active = self.active
         if reason in TAKEN:
             last = self._jumps.last
-            self.led_away.taken_over(None if last is None else last.pose)
-            if begun is not None and begun.state is S.CANCELLING:
+            self.displaced.taken_over(None if last is None else last.pose)
+            if active is not None and active.state is S.CANCELLING:
                 self.executor.let_go(actor=actor, now=now)
-                self._ended(begun.id, now=now)
-                begun = None
-        return None if begun is None else begun.id
+                self._ended(active.id, now=now)
+                active = None
+        return None if active is None else active.id
 
     def proceed(
         self, seen: VehicleView, *, allows: bool = False, actor: str, now: float
@@ -224,9 +226,9 @@ class VehicleTasks(Lineup):
         that is all that makes it stand, and arming is not what is allowed again (``allows``),
         there is nothing to continue: Rejection.
         """
-        begun = self.begun
+        active = self.active
         held = self.held
-        resumes = begun is not None and begun.state is S.PAUSED and held is None
+        resumes = active is not None and active.state is S.PAUSED and held is None
         if held is not None and not self.paused and not allows:
             words = (
                 f"task {held.id} is held ({words_of(held.reason)}): release it first, again,"
@@ -234,18 +236,18 @@ class VehicleTasks(Lineup):
             )
             raise Rejection(R.WRONG_STATE, words)
         if resumes:
-            assert begun is not None
-            self.check_start(seen, goal_of(begun), now=now)
+            assert active is not None
+            self.check_start(seen, goal_of(active), now=now)
         if self.paused:
             self.paused = R.NONE
             self.halts.lets_go()
-            self.book.record(QueueContinued(self.vehicle, actor, now))
-            self.led_away.given_back(seen, self.aside_ids)
+            self.registry.record(QueueContinued(self.vehicle, actor, now))
+            self.displaced.given_back(seen, self.suspended_ids)
         if resumes:
-            assert begun is not None
-            self._resume(begun, seen, actor=actor, now=now)
-        begun = self.begun
-        return None if begun is None or held is not None else begun.id
+            assert active is not None
+            self._resume(active, seen, actor=actor, now=now)
+        active = self.active
+        return None if active is None or held is not None else active.id
 
     def _resume(self, task: Task, seen: VehicleView, *, actor: str, now: float) -> None:
         if self.is_of_another_frame(task, seen):
@@ -255,7 +257,7 @@ class VehicleTasks(Lineup):
             self.begun_at = now
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Set the begun task aside until somebody decides what becomes of it.
+        """Set the active task aside until somebody decides what becomes of it.
 
         With its frame every other line is lost, too.
         """
@@ -263,23 +265,23 @@ class VehicleTasks(Lineup):
             self.halt(reason, actor=SERVER, now=now)
         self.executor.hold(reason, now=now)
         if reason is R.FRAME_RESET:
-            for task in self.aside:
+            for task in self.suspended:
                 if task.state is S.PAUSED and task.progress.anchor is not None:
-                    self.book.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
+                    self.registry.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
 
     def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
         """The vehicle has restarted: hold what has begun, and let the queue stand until continued.
 
-        Return whether the begun task, of which nothing was driven, begins again by itself instead.
+        Return whether the active task, of which nothing was driven, begins again by itself instead.
         ``was_paused`` is why the queue stood before the vehicle was seen disarmed: that was the
         restart, and no takeover.
         """
         self.released = None
-        begun = self.begun
-        if begun is not None and begun.state is S.CANCELLING:
+        active = self.active
+        if active is not None and active.state is S.CANCELLING:
             self.executor.let_go(actor=SERVER, now=now)
-            self._ended(begun.id, now=now)
-        if not self.aside_ids and self.executor.begins_again(now=now):
+            self._ended(active.id, now=now)
+        if not self.suspended_ids and self.executor.begins_again(now=now):
             return True
         self.hold(R.FRAME_RESET, now=now)
         if self.is_driving and not was_paused:
@@ -287,10 +289,10 @@ class VehicleTasks(Lineup):
         return False
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
-        """Kill the begun task and latch; with ``clear`` all others are cancelled too."""
+        """Kill the active task and latch; with ``clear`` all others are cancelled too."""
         self.halt(R.STOPPED, actor=actor, now=now)
         killed = self.executor.kill(R.STOP, actor=actor, now=now)
-        self.urgent = None
+        self.immediate = None
         self.pause_queue(R.STOPPED, actor=actor, now=now)
         if clear:
             self.clear(begun_too=True, actor=actor, now=now)
@@ -300,7 +302,7 @@ class VehicleTasks(Lineup):
 
     def end_halting(self) -> None:
         """Somebody has the vehicle: what was killed need not be seen to stand."""
-        self.is_halting = False
+        self.stopping_after_kill = False
 
     # time
 
@@ -316,35 +318,35 @@ class VehicleTasks(Lineup):
             self.hold(R.FRAME_RESET, now=now)
         if self.is_stopped:
             return view.STOP
-        if self.is_halting:
+        if self.stopping_after_kill:
             if not seen.still:
                 return view.HALT
-            self.is_halting = False
+            self.stopping_after_kill = False
         self.releases.look(seen, now=now)
-        before = self.begun
+        before = self.active
         demand = self.executor.step(seen, now=now)
         if before is not None:
             self._note_step(before, now=now)
-        if self.begun is not None and not self.turns.is_interrupted(seen, now=now):
+        if self.active is not None and not self.turns.is_interrupted(seen, now=now):
             return demand
         self.turns.begin_next(seen, now=now)
-        if self.begun is not None:  # what was refused was refused to the one before
+        if self.active is not None:  # what was refused was refused to the one before
             return self.executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 
     def _note_step(self, before: Task, *, now: float) -> None:
-        """See what became of the begun task in this step: it ended, or something halted it."""
-        begun = self.begun
-        if begun is None:
+        """See what became of the active task in this step: it ended, or something halted it."""
+        active = self.active
+        if active is None:
             self._ended(before.id, now=now)
-        elif begun.state is not before.state and begun.state in (S.PAUSED, S.HELD):
-            self.halt(begun.reason, actor=SERVER, now=now)
+        elif active.state is not before.state and active.state in (S.PAUSED, S.HELD):
+            self.halt(active.reason, actor=SERVER, now=now)
 
     def _ended(self, task_id: TaskId, *, now: float) -> None:
         """A task is over. After a failure that had moved the vehicle, somebody should look."""
-        task = self.book[task_id]
-        if task_id == self.urgent:
-            self.urgent = None
+        task = self.registry[task_id]
+        if task_id == self.immediate:
+            self.immediate = None
         if task.state is S.FAILED and has_moved(task) and self.settings.on_failure == "pause":
             self.pause_queue(task.reason, actor=SERVER, now=now)
         self.room.ended(task_id, now=now)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 from mav_tasks.settings import Driving, Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.limits import safe_braking
 from mav_tasks.tasks.events import (
@@ -14,6 +13,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import GlobalPlace
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Frame
 
 
@@ -21,10 +21,15 @@ class VehicleTerms:
     """What is kept of one vehicle."""
 
     def __init__(
-        self, vehicle: int, book: TaskBook, executor: Executor, bounds: Bounds, settings: Settings
+        self,
+        vehicle: int,
+        registry: TaskRegistry,
+        executor: Executor,
+        bounds: Bounds,
+        settings: Settings,
     ) -> None:
         self._vehicle = vehicle
-        self._book = book
+        self._registry = registry
         self._executor = executor
         self._bounds = bounds
         self._settings = settings
@@ -81,7 +86,7 @@ class VehicleTerms:
         """Keep, over a restart too, whether somebody has disarmed it."""
         if may_be_armed != self.may_be_armed:
             self.may_be_armed = may_be_armed
-            self._book.record(VehicleArmingSet(self._vehicle, may_be_armed, now))
+            self._registry.record(VehicleArmingSet(self._vehicle, may_be_armed, now))
 
     def is_another(self, uid: str, *, now: float) -> bool:
         """Take in which vehicle it says it is; whether that is not the one whose tasks these are.
@@ -91,7 +96,7 @@ class VehicleTerms:
         if not uid or uid == self._uid:
             return False
         before, self._uid = self._uid, uid
-        self._book.record(VehicleIdentified(self._vehicle, uid, now))
+        self._registry.record(VehicleIdentified(self._vehicle, uid, now))
         return bool(before)
 
     def forget_which(self) -> None:
@@ -103,11 +108,11 @@ class VehicleTerms:
         latitude, longitude = place.latitude_degE7, place.longitude_degE7
         home = VehicleHomeSet(self._vehicle, latitude, longitude, frame, actor, now)
         self._bounds.home = home
-        self._book.record(home)
+        self._registry.record(home)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> None:
         """Set the speed of the task that runs, and of those to come that name none."""
         self._speed = speed
         self._apply_driving()
         self._executor.set_speed(speed)
-        self._book.record(VehicleSpeedSet(self._vehicle, speed, actor, now))
+        self._registry.record(VehicleSpeedSet(self._vehicle, speed, actor, now))

@@ -20,12 +20,12 @@ from mav_tasks.key_ring.ring_file import load, path_of_ring
 from mav_tasks.mavlink.signing import Key
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import NO_PYBULLET, BulletBody, has_pybullet
-from rover_sim.by_hand import BodyByHand
 from rover_sim.errors import MissingExtra, SimulatedCrash
 from rover_sim.fault_plan import HELP, PlanError, PlannedFault, check_rovers, read_fault
 from rover_sim.fault_player import FaultPlayer, HandledRover
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.manual_control import BodyByHand
 from rover_sim.personas import ARDUPILOT, PERSONAS, Persona
 from rover_sim.real_time import Clock, drive
 from rover_sim.realism import Realism
@@ -252,7 +252,7 @@ def _key(options: Options) -> Key | None:
 
 
 def _stop_signals(stack: ExitStack) -> socket.socket:
-    """Give a socket that turns readable on SIGINT and SIGTERM."""
+    """Return a socket that turns readable on SIGINT and SIGTERM."""
     stop, wake = socket.socketpair()
     stack.enter_context(stop)
     stack.enter_context(wake)

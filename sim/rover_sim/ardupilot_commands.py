@@ -20,7 +20,7 @@ REBOOT, REBOOT_TO_BOOTLOADER = 1.0, 3.0
 
 
 def ardupilot_commands(parts: CommandParts) -> CommandTable:
-    """Give the table of commands of ArduPilot Rover."""
+    """Return the table of commands of ArduPilot Rover."""
     commands = ArduPilotCommands(parts)
     asking = MessageCommands(
         parts,

@@ -14,12 +14,12 @@ class Cast:
     answers_untaken = True
 
     def to_wire(self, value: float, type_: int) -> float:
-        """Give the value."""
+        """Return the value."""
         del type_
         return value
 
     def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Give the value, whatever type the client says it has; no number is not taken."""
+        """Return the value, whatever type the client says it has; no number is not taken."""
         del type_, own_type
         return value if math.isfinite(value) else None
 

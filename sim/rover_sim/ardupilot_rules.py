@@ -61,11 +61,11 @@ class ArduPilotRules:
         return MavState.STANDBY if mode is Mode.HOLD else MavState.ACTIVE
 
     def arming_text(self, *, armed: bool) -> str:
-        """Give the text that tells of arming or disarming."""
+        """Return the text that tells of arming or disarming."""
         return "Throttle armed" if armed else "Throttle disarmed"
 
     def unknown_mode(self, custom_mode: int) -> str:
-        """Give the text for a number that is no mode."""
+        """Return the text for a number that is no mode."""
         return f"No such mode {custom_mode}"
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
@@ -81,7 +81,7 @@ class ArduPilotRules:
         return None
 
     def intended(self, mode: Mode) -> Mode:
-        """Give the present mode: a failsafe here changes what is wanted."""
+        """Return the present mode: a failsafe here changes what is wanted."""
         return mode
 
     def choose(self, mode: Mode) -> None:
@@ -153,5 +153,5 @@ class ArduPilotRules:
         return HOLD
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Give the stored mission, from its beginning, or the built-in track."""
+        """Return the stored mission, from its beginning, or the built-in track."""
         return self._parts.missions.route() or square_around(home)

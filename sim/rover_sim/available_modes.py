@@ -37,7 +37,7 @@ PX4_OFFERED = (
 def available_modes(
     offered: Iterable[OfferedMode], modes: ModeNumbers
 ) -> tuple[m.AvailableModes, ...]:
-    """Give the messages, the one of index 1 first; none if nothing is offered."""
+    """Return the messages, the one of index 1 first; none if nothing is offered."""
     listed = tuple(offered)
     return tuple(
         m.AvailableModes(
@@ -53,5 +53,5 @@ def available_modes(
 
 
 def standard_mode_of(mode: Mode, offered: Iterable[OfferedMode]) -> int:
-    """Give a mode's MAV_STANDARD_MODE; NON_STANDARD also for what is not offered."""
+    """Return a mode's MAV_STANDARD_MODE; NON_STANDARD also for what is not offered."""
     return next((each.standard for each in offered if each.mode is mode), NON_STANDARD)

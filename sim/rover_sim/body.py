@@ -66,5 +66,5 @@ class Body(Protocol):
 
 
 def wrap_angle(angle: float) -> float:
-    """Give the same angle within -pi..pi."""
+    """Return the same angle within -pi..pi."""
     return math.remainder(angle, math.tau)

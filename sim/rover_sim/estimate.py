@@ -34,7 +34,7 @@ class Estimate:
 
 
 def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Estimate:
-    """Give the estimate of this moment.
+    """Return the estimate of this moment.
 
     A frozen position still has live attitude, rates and wheel speed: gyros and encoders go on.
     """

@@ -7,9 +7,9 @@ from operator import or_
 
 from rover_sim.actuators import Actuator
 from rover_sim.body import Pose
-from rover_sim.by_hand import BodyByHand, turned
 from rover_sim.fault_plan import Disarm, Lasting, PlannedFault, Push, Reboot
 from rover_sim.faults import Faults
+from rover_sim.manual_control import BodyByHand, turned
 from rover_sim.vehicle import Vehicle
 
 NOTHING: frozenset[Actuator] = frozenset()

@@ -11,7 +11,7 @@ FILE_NOT_FOUND = 10
 
 
 def refusal_of(payload: Sequence[int]) -> list[int]:
-    """Give the NAK to a request: same session, next sequence number, its opcode named."""
+    """Return the NAK to a request: same session, next sequence number, its opcode named."""
     seq = (payload[0] | payload[1] << 8) + 1 & 0xFFFF
     session, opcode = payload[2], payload[3]
     header = [seq & 0xFF, seq >> 8, session, NAK, 1, opcode, 0, 0, 0, 0, 0, 0, FILE_NOT_FOUND]

@@ -66,27 +66,27 @@ class FlightRules(Protocol):
         ...
 
     def system_status(self, mode: Mode, *, armed: bool) -> MavState:
-        """Give MAV_STATE."""
+        """Return MAV_STATE."""
         ...
 
     def arming_text(self, *, armed: bool) -> str:
-        """Give the text that tells of arming or disarming."""
+        """Return the text that tells of arming or disarming."""
         ...
 
     def unknown_mode(self, custom_mode: int) -> str:
-        """Give the text for a number that is no mode."""
+        """Return the text for a number that is no mode."""
         ...
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
-        """Give the text with which a client's mode change is refused; None: it may be."""
+        """Return the text with which a client's mode change is refused; None: it may be."""
         ...
 
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
-        """Give the text with which arming is refused; None: it may be."""
+        """Return the text with which arming is refused; None: it may be."""
         ...
 
     def intended(self, mode: Mode) -> Mode:
-        """Give what somebody asked for last, which a failsafe does not change."""
+        """Return what somebody asked for last, which a failsafe does not change."""
         ...
 
     def choose(self, mode: Mode) -> None:
@@ -147,7 +147,7 @@ class FlightRules(Protocol):
         ...
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Give what AUTO drives; None: nothing."""
+        """Return what AUTO drives; None: nothing."""
         ...
 
     @property

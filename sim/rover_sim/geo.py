@@ -27,7 +27,7 @@ class Origin:
         return round(self.longitude * 1e7)
 
     def to_global(self, north: float, east: float) -> tuple[int, int]:
-        """Give latitude and longitude in degE7."""
+        """Return latitude and longitude in degE7."""
         latitude = self.latitude + north / METRES_PER_DEGREE
         longitude = self.longitude + east / self._metres_per_degree_east(latitude)
         return round(latitude * 1e7), round(longitude * 1e7)
@@ -44,7 +44,7 @@ class Origin:
         )
 
     def to_local(self, latitude_degE7: int, longitude_degE7: int) -> tuple[float, float]:
-        """Give north and east in metres."""
+        """Return north and east in metres."""
         latitude = latitude_degE7 * 1e-7
         return (
             (latitude - self.latitude) * METRES_PER_DEGREE,

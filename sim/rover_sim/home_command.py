@@ -23,7 +23,7 @@ class HomeCommand:
     refusal: MavResult
 
     def actions(self) -> Mapping[int, Action]:
-        """Give the part of a table that is this command."""
+        """Return the part of a table that is this command."""
         return {MavCmd.DO_SET_HOME: self._set_home}
 
     def _set_home(self, command: Command, now: float) -> MavResult:
@@ -40,7 +40,7 @@ class HomeCommand:
 
 
 def _as_degE7(degrees: tuple[float, float] | None) -> tuple[int, int]:
-    """Give the place of a COMMAND_LONG; 0/0, which is none, for what is no number."""
+    """Return the place of a COMMAND_LONG; 0/0, which is none, for what is no number."""
     if degrees is None or not all(math.isfinite(value) for value in degrees):
         return 0, 0
     return round(degrees[0] * 1e7), round(degrees[1] * 1e7)

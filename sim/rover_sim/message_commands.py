@@ -19,7 +19,7 @@ class MessageCommands:
     by_index: Mapping[int, Action]  # REQUEST_MESSAGE of what needs more than an id, by id
 
     def actions(self) -> Mapping[int, Action]:
-        """Give the part of a table that is these commands."""
+        """Return the part of a table that is these commands."""
         return {
             MavCmd.SET_MESSAGE_INTERVAL: self._set_message_interval,
             MavCmd.GET_MESSAGE_INTERVAL: self._get_message_interval,

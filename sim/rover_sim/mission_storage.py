@@ -63,7 +63,7 @@ class MissionStorage:
         return f"MissionStorage({[len(items) for items in self._lists.values()]})"
 
     def stored(self, mission_type: int) -> tuple[messages.MissionItemInt, ...]:
-        """Give the items of a plan, as they would be downloaded."""
+        """Return the items of a plan, as they would be downloaded."""
         return tuple(self._lists[mission_type])
 
     @property
@@ -72,7 +72,7 @@ class MissionStorage:
         return max(0, len(self._lists[MISSION]) - self._first_item)
 
     def route(self) -> Route | None:
-        """Give the stored mission's waypoints, or None if there are none."""
+        """Return the stored mission's waypoints, or None if there are none."""
         waypoints = tuple(
             Waypoint(seq, Destination(*self._origin.to_local(item.x, item.y)))
             for seq, item in enumerate(self._lists[MISSION])
@@ -93,7 +93,7 @@ class MissionStorage:
         return True
 
     def plan_id(self, mission_type: int) -> int:
-        """Give the opaque id of a list: 0 if it is empty or this make has none, else never 0."""
+        """Return the opaque id of a list: 0 if it is empty or this make has none, else never 0."""
         items = self._lists[mission_type]
         if not items or not self._conventions.has_ids:
             return 0
@@ -270,7 +270,7 @@ class MissionStorage:
 
 
 def _place_of(item: Item) -> tuple[float, float]:
-    """Give latitude and longitude in degE7, from either form."""
+    """Return latitude and longitude in degE7, from either form."""
     if isinstance(item, messages.MissionItem):
         return item.x * 1e7, item.y * 1e7
     return item.x, item.y

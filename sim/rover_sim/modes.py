@@ -26,5 +26,5 @@ class ModeNumbers:
     first: Mode  # right after switching on
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Give the mode of a number, or None if there is no such mode."""
+        """Return the mode of a number, or None if there is no such mode."""
         return next((mode for mode, n in self.numbers.items() if n == custom_mode), None)

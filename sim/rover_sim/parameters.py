@@ -35,11 +35,11 @@ class ParameterProtocol(Protocol):
     tells_index: bool  # also in an answer to a read by name, or to a set
 
     def to_wire(self, value: float, type_: int) -> float:
-        """Give the value as PARAM_VALUE carries it."""
+        """Return the value as PARAM_VALUE carries it."""
         ...
 
     def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Give what PARAM_SET carries under some type for a parameter of another, or the same.
+        """Return what PARAM_SET carries under some type for a parameter of another, or the same.
 
         None: nothing that could be taken.
         """
@@ -48,7 +48,7 @@ class ParameterProtocol(Protocol):
     answers_untaken: bool  # a PARAM_SET that is not taken is answered with the old value
 
     def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
-        """Give _HASH_CHECK's value; None: there is no such thing here."""
+        """Return _HASH_CHECK's value; None: there is no such thing here."""
         ...
 
 

@@ -27,7 +27,7 @@ NOTHING, REBOOT, REBOOT_TO_BOOTLOADER = 0.0, 1.0, 3.0  # param1 of PREFLIGHT_REB
 
 
 def px4_commands(parts: CommandParts) -> CommandTable:
-    """Give the table of commands of a PX4 rover."""
+    """Return the table of commands of a PX4 rover."""
     commands = Px4Commands(parts)
     asking = MessageCommands(
         parts,

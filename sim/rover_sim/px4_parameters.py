@@ -21,14 +21,14 @@ class Bytewise:
     answers_untaken = False
 
     def to_wire(self, value: float, type_: int) -> float:
-        """Give the float that has the value's bytes."""
+        """Return the float that has the value's bytes."""
         if type_ == REAL32:
             return value
         (as_float,) = unpack("<f", pack(WIRE_FORMATS[type_], int(value)))
         return float(as_float)
 
     def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Give the value whose bytes these are."""
+        """Return the value whose bytes these are."""
         if type_ != own_type:
             return None
         if own_type == REAL32:
@@ -37,7 +37,7 @@ class Bytewise:
         return float(integer)
 
     def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
-        """Give a CRC over names and values."""
+        """Return a CRC over names and values."""
         digest = 0
         for parameter, value in parameters:
             as_sent = "<f" if parameter.type == REAL32 else WIRE_FORMATS[parameter.type]

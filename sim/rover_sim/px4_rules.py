@@ -90,11 +90,11 @@ class Px4Rules:
         return MavState.ACTIVE if armed else MavState.STANDBY
 
     def arming_text(self, *, armed: bool) -> str:
-        """Give the text that tells of arming or disarming."""
+        """Return the text that tells of arming or disarming."""
         return "Armed by external command" if armed else "Disarmed by external command"
 
     def unknown_mode(self, custom_mode: int) -> str:
-        """Give the text for a number that is no mode."""
+        """Return the text for a number that is no mode."""
         return f"Unsupported mode {custom_mode:#010x}"
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
@@ -114,7 +114,7 @@ class Px4Rules:
         return None
 
     def intended(self, mode: Mode) -> Mode:
-        """Give what somebody asked for last."""
+        """Return what somebody asked for last."""
         del mode
         return self._intended
 
@@ -218,7 +218,7 @@ class Px4Rules:
         return demand
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Give the stored mission, from the item that it has come to."""
+        """Return the stored mission, from the item that it has come to."""
         del home
         route = self._parts.missions.route()
         if route is not None:

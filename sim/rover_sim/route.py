@@ -59,7 +59,7 @@ class Route:
 
 
 def square_around(home: Destination) -> Route:
-    """Give the built-in track: a square with one corner at home, for ever."""
+    """Return the built-in track: a square with one corner at home, for ever."""
     north, east = home
     side = TRACK_SIDE
     corners = ((side, 0.0), (side, side), (0.0, side), (0.0, 0.0))

@@ -82,7 +82,7 @@ def read_global(message: Global, origin: Origin, *, speed_limit: float) -> Targe
 
 
 def read_place(latitude_degE7: int, longitude_degE7: int, origin: Origin) -> Destination | None:
-    """Give the place in the local frame, or None if there is no such place on Earth.
+    """Return the place in the local frame, or None if there is no such place on Earth.
 
     0/0 means "not given", as in most of ArduPilot's commands.
     """

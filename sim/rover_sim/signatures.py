@@ -35,7 +35,7 @@ class RoverSignatures:
         return f"RoverSignatures({self._key.name}, {self.refused} refused)"
 
     def sealed(self, raw: bytes, *, now: float) -> bytes:
-        """Give a packet as it is to leave."""
+        """Return a packet as it is to leave."""
         return self._signer.sign(raw, clock=self._clock(now))
 
     def believes(self, packet: Packet, *, now: float) -> bool:

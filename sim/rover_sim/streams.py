@@ -114,7 +114,7 @@ class Streams:
         return f"Streams(next={self._next:.3f})"
 
     def interval_us(self, message_id: int) -> int:
-        """Give the interval as MESSAGE_INTERVAL has it: -1 off, 0 not available."""
+        """Return the interval as MESSAGE_INTERVAL has it: -1 off, 0 not available."""
         interval = self._intervals.get(message_id)
         if interval is None:
             return 0
@@ -144,7 +144,7 @@ class Streams:
             self._set(message_id, interval, now)
 
     def take_due(self, *, now: float) -> list[int]:
-        """Give the ids that are due, and plan each one's next time."""
+        """Return the ids that are due, and plan each one's next time."""
         horizon = now + JITTER
         if horizon < self._next:
             return []

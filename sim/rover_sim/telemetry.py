@@ -94,7 +94,7 @@ class Telemetry:
         return message_id in self._builders and message_id not in self._persona.lacks
 
     def build(self, message_id: int, estimate: Estimate, *, now: float) -> Message | None:
-        """Give the message of this moment; None if there is nothing to say."""
+        """Return the message of this moment; None if there is nothing to say."""
         message = self._builders[message_id](estimate, self.boot_ms(now))
         if message is not None and hasattr(message, "time_boot_ms"):
             message.time_boot_ms %= OVERFLOW

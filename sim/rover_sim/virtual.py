@@ -15,7 +15,7 @@ class Party(Protocol):
     """One who takes part: a server, a rover, a client."""
 
     def next_deadline(self) -> float | None:
-        """Give when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` has something to do, unless something arrives before."""
         ...
 
     def turn(self, *, now: float) -> None:
@@ -75,7 +75,7 @@ class VirtualWorld:
         return True
 
     def next_due(self) -> float | None:
-        """Give when the next thing is due; None: nothing ever is."""
+        """Return when the next thing is due; None: nothing ever is."""
         due = [party.next_deadline() for party in self._parties]
         due.append(self.net.next_arrival())
         return min((at for at in due if at is not None), default=None)
@@ -89,7 +89,7 @@ class RoverParty:
         self._link = link
 
     def next_deadline(self) -> float:
-        """Give when the next control step is due."""
+        """Return when the next control step is due."""
         return self.vehicle.next_deadline()
 
     def turn(self, *, now: float) -> None:

@@ -35,7 +35,7 @@ Event = tuple[str, list[Any]]
 
 
 def with_texts(kind: Any, text: str, target: tuple[int, int]) -> Any | None:
-    """Give a message whose texts are all this one; None: it has none."""
+    """Return a message whose texts are all this one; None: it has none."""
     values: dict[str, Any] = {}
     has_text = False
     lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))

@@ -126,7 +126,7 @@ class Signed:
         self.url = f"udpout:127.0.0.1:{it.client_port}"
 
     def key(self, name: str) -> Key:
-        """Give a key of the ring."""
+        """Return a key of the ring."""
         return load(self.ring).ring.usable_key(name)
 
     def cli(self, *arguments: str) -> Done:

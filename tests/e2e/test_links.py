@@ -106,7 +106,7 @@ def test_the_same_script_works_over_every_kind_of_link(
 
 
 def numbers_from(link: Any) -> dict[tuple[int, int], list[int]]:
-    """Give the sequence numbers of all that comes from now on, by source.
+    """Return the sequence numbers of all that comes from now on, by source.
 
     pymavlink counts losses itself, but takes messages of our dialect for somebody else's.
     """
@@ -137,7 +137,7 @@ def upload(link: Any, places: list[tuple[int, int]]) -> None:
 
 
 def download(link: Any) -> list[tuple[int, int]]:
-    """Give the places of the plan that the rover has."""
+    """Return the places of the plan that the rover has."""
     link.mav.mission_request_list_send(1, 1, 0)
     count = wait_for(link, "MISSION_COUNT").count
     places = []

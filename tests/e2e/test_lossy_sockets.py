@@ -73,7 +73,7 @@ class Endpoint:
         self._mav.seq = (self._mav.seq + 1) % 256
 
     def receive(self) -> Iterator[Received]:
-        """Give the packets that have come: each is a datagram of its own."""
+        """Yield the packets that have come: each is a datagram of its own."""
         while True:
             try:
                 yield Received(monotonic(), self.socket.recv(MAX_DATAGRAM))
@@ -194,7 +194,7 @@ class Repeater:
 
 
 def run(clients: Sequence[Client]) -> None:
-    """Give the clients their turns until all are done."""
+    """Return the clients their turns until all are done."""
     end = monotonic() + WITHIN
     with DefaultSelector() as selector:
         for client in clients:

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from tests.kit.processes import (
     Stand,
     after_a_restart,
@@ -231,13 +231,13 @@ def test_a_damaged_store_is_refused_in_one_line(path: Path, content: bytes) -> N
 def test_as_much_of_what_is_over_is_kept_as_the_operator_says(
     tmp_path: Path, path: Path, option: tuple[str, str], kept: int
 ) -> None:
-    book = TaskBook()
+    registry = TaskRegistry()
     for number in range(1, 7):
-        book.submit(draft(), now=1.0)
+        registry.submit(draft(), now=1.0)
         if number < 6:
-            finish(book, number, now=1.0)
+            finish(registry, number, now=1.0)
     with opened(path, offset=time() - monotonic()) as store:
-        store.append(book.take_events())
+        store.append(registry.take_events())
     with stand(tmp_path, "--store", str(path), *option) as it:
         wait_until(lambda: len(stored(path)) == kept + 1, within=10, what="the rest forgotten")
         it.connect()

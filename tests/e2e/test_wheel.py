@@ -21,7 +21,7 @@ LIMIT = 60.0  # s, for one command
 
 
 def built(dist: Path) -> Path:
-    """Give the wheel of this tree."""
+    """Return the wheel of this tree."""
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(dist)],
         cwd=ROOT,

@@ -92,7 +92,7 @@ class Signing:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """Give the packets believed, and those signed but not believed."""
+        """Return the packets believed, and those signed but not believed."""
         return self.link.mav.signing.goodsig_count, self.link.mav.signing.badsig_count
 
     def hello(self) -> None:
@@ -139,7 +139,7 @@ def running(folder: Path, secrets: dict[str, bytes]) -> Iterator[Stand]:
 
 @pytest.fixture
 def connect(running: Stand) -> Iterator[Callable[..., Signing]]:
-    """Give signing pymavlink connections."""
+    """Return signing pymavlink connections."""
     made: list[Signing] = []
 
     def connected(secret: bytes, **options: Any) -> Signing:
@@ -334,7 +334,7 @@ class PymavlinkRover:
                 )
 
     def setpoints(self) -> list[Any]:
-        """Give the setpoints that it believed."""
+        """Return the setpoints that it believed."""
         kinds = ("SET_POSITION_TARGET_LOCAL_NED",)
         return [each for each in self.heard if each.get_type() in kinds]
 

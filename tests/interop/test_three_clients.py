@@ -49,7 +49,7 @@ class Script:
         self._popen.stdin.flush()
 
     def hear(self) -> Any:
-        """Give its answer; MAVSDK's own lines are passed over."""
+        """Return its answer; MAVSDK's own lines are passed over."""
         assert self._popen.stdout is not None
         for line in self._popen.stdout:
             if line[0] in '"{':

@@ -26,7 +26,7 @@ class Far(Protocol):
     url: str
 
     def descriptor(self) -> int | None:
-        """Give what to read and write, None while nobody is there."""
+        """Return what to read and write, None while nobody is there."""
         ...
 
     def cut(self) -> None:
@@ -53,7 +53,7 @@ class TcpFar:
         return f"tcp:{LOOPBACK}:{self._port}"
 
     def descriptor(self) -> int | None:
-        """Give the connection, or a newer one."""
+        """Return the connection, or a newer one."""
         if self._listening is not None and select.select([self._listening], [], [], 0.0)[0]:
             if self._accepted is not None:
                 self._accepted.close()
@@ -87,7 +87,7 @@ class DiallingFar:
         return f"tcpin:{LOOPBACK}:{self._port}"
 
     def descriptor(self) -> int | None:
-        """Give the connection, if the server is there."""
+        """Return the connection, if the server is there."""
         if self._socket is None:
             with suppress(OSError):
                 self._socket = socket.create_connection((LOOPBACK, self._port), 1.0)
@@ -112,7 +112,7 @@ class SerialFar:
         self.url = f"serial:{path}:{baud}"
 
     def descriptor(self) -> int | None:
-        """Give the far end of the line."""
+        """Return the far end of the line."""
         return self._device.far if self._device.far >= 0 else None
 
     def cut(self) -> None:

@@ -32,7 +32,7 @@ class Capture(LossyUdp):
 
     @property
     def moving(self) -> list[float]:
-        """Give when setpoints came, from the first that moved the rover to the last."""
+        """Return when setpoints came, from the first that moved the rover to the last."""
         moved = [number for number, (_, moves) in enumerate(self.setpoints) if moves]
         return [at for at, _ in self.setpoints[moved[0] : moved[-1] + 1]]
 

@@ -191,7 +191,7 @@ class FakeClient:
         self.verified = 0
 
     def packed(self, message: Message) -> bytes:
-        """Give a packet as it would be sent."""
+        """Return a packet as it would be sent."""
         raw: bytes = message.pack(self._mav)
         return raw
 
@@ -298,17 +298,17 @@ class FakeClient:
     # what it heard
 
     def decoded(self, packet: Received) -> Message:
-        """Give the message of a packet; those of our dialect by hand."""
+        """Return the message of a packet; those of our dialect by hand."""
         if packet.message_id == TASK_STATUS:
             return TaskStatus.of(packet.payload)
         return self._decoder.decode(bytearray(packet.raw))
 
     def of_id(self, message_id: int) -> Iterator[Received]:
-        """Give the packets of one message."""
+        """Return the packets of one message."""
         return (packet for packet in self.received if packet.message_id == message_id)
 
     def of_type(self, name: str) -> list[Message]:
-        """Give the messages of one type received."""
+        """Return the messages of one type received."""
         return [self.decoded(packet) for packet in self.of_id(IDS[name])]
 
     def heard(self, name: str) -> bool:
@@ -316,7 +316,7 @@ class FakeClient:
         return any(True for _ in self.of_id(IDS[name]))
 
     def texts(self) -> list[str]:
-        """Give the STATUSTEXTs received; a long one as its chunks joined."""
+        """Return the STATUSTEXTs received; a long one as its chunks joined."""
         texts: list[str] = []
         open_id = 0
         for message in self.of_type("STATUSTEXT"):
@@ -328,12 +328,12 @@ class FakeClient:
         return texts
 
     def statuses(self, task_id: int | None = None) -> list[TaskStatus]:
-        """Give the TASK_STATUS messages received, of one task or of all."""
+        """Return the TASK_STATUS messages received, of one task or of all."""
         statuses = [TaskStatus.of(packet.payload) for packet in self.of_id(TASK_STATUS)]
         return [s for s in statuses if task_id in (None, s.task_id)]
 
     def acks_of(self, command: int) -> list[tuple[int, int]]:
-        """Give (result, result_param2) of every ack of a command."""
+        """Return (result, result_param2) of every ack of a command."""
         return [(a.result, a.result_param2) for a in self.acks if a.command == command]
 
     def gaps(self, source: tuple[int, int]) -> int:
@@ -409,34 +409,34 @@ class FakeClient:
 def command_long(
     command: int, *params: float, target: tuple[int, int] = (1, 191), confirmation: int = 0
 ) -> Message:
-    """Give a COMMAND_LONG; parameters not named are 0."""
+    """Return a COMMAND_LONG; parameters not named are 0."""
     filled = (*params, *(0.0,) * (7 - len(params)))
     return common.MAVLink_command_long_message(*target, command, confirmation, *filled)
 
 
 def heartbeat() -> Message:
-    """Give the heartbeat of a ground station."""
+    """Return the heartbeat of a ground station."""
     return common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 
 
 def setpoint(vx: float, yaw_rate: float = 0.0, *, mask: int = 0x05C7, system: int = 1) -> Message:
-    """Give a velocity setpoint in the body frame."""
+    """Return a velocity setpoint in the body frame."""
     return common.MAVLink_set_position_target_local_ned_message(
         0, system, 1, 8, mask, 0, 0, 0, vx, 0, 0, 0, 0, 0, 0, yaw_rate
     )
 
 
 def sticks(x: int = 0, y: int = 0, z: int = 0, r: int = 0, *, system: int = 1) -> Message:
-    """Give a MANUAL_CONTROL."""
+    """Return a MANUAL_CONTROL."""
     return common.MAVLink_manual_control_message(system, x, y, z, r, 0)
 
 
 def rc_override(*channels: int, system: int = 1) -> Message:
-    """Give an RC_CHANNELS_OVERRIDE; channels not named are left alone."""
+    """Return an RC_CHANNELS_OVERRIDE; channels not named are left alone."""
     filled = (*channels, *(0,) * (8 - len(channels)))
     return common.MAVLink_rc_channels_override_message(system, 1, *filled)
 
 
 def set_mode(mode: int, *, system: int = 1) -> Message:
-    """Give the old message SET_MODE."""
+    """Return the old message SET_MODE."""
     return common.MAVLink_set_mode_message(system, 1, mode)

@@ -25,12 +25,12 @@ class Done:
 
     @property
     def lines(self) -> list[str]:
-        """Give the lines of its output."""
+        """Return the lines of its output."""
         return self.output.splitlines()
 
     @property
     def objects(self) -> list[Any]:
-        """Give the JSON objects of its output, one a line."""
+        """Return the JSON objects of its output, one a line."""
         return [json.loads(line) for line in self.lines]
 
 
@@ -69,6 +69,6 @@ def mav_tasks(
 
 
 def surroundings(server: str, **environment: str) -> dict[str, str]:
-    """Give the environment of a command."""
+    """Return the environment of a command."""
     own = {"MAV_TASKS_SERVER": server} if server else {}
     return {**os.environ, "PYTHONIOENCODING": "utf-8", **own, **environment}

@@ -18,7 +18,7 @@ from mav_tasks.tasks.events import Event, TaskChanged
 
 
 def name_of(event: Event) -> str:
-    """Give what an event is called in a point."""
+    """Return what an event is called in a point."""
     name = type(event).__name__
     return f"{name}.{event.new.name}" if isinstance(event, TaskChanged) else name
 

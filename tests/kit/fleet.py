@@ -117,7 +117,7 @@ class FleetNet(ObservedNet):
         return list({id(o): o for at in self.observers_at.values() for o in at}.values())
 
     def _meant(self, endpoint: str, data: bytes) -> list[Observer]:
-        """Give the observers of the rovers that a packet to an endpoint is for."""
+        """Return the observers of the rovers that a packet to an endpoint is for."""
         there = self.observers_at.get(endpoint, ())
         if len(there) < 2:
             return list(there)
@@ -149,7 +149,7 @@ class Radio:
         self.vehicles = vehicles
 
     def next_deadline(self) -> float | None:
-        """Give when a rover's next control step is due."""
+        """Return when a rover's next control step is due."""
         return min((v.next_deadline() for v in self.vehicles), default=None)
 
     def turn(self, *, now: float) -> None:
@@ -238,12 +238,12 @@ class Fleet(World):
         self.rovers[number - 1].autopilot.set_faults(faults)
 
     def pose_of(self, number: int) -> tuple[float, float, float]:
-        """Give a rover's true north and east in metres, and heading in degrees."""
+        """Return a rover's true north and east in metres, and heading in degrees."""
         truth = self.rovers[number - 1].truth
         return truth.north, truth.east, degrees(truth.yaw)
 
     def queue_paused(self, number: int) -> R:
-        """Give why a rover's queue stands."""
+        """Return why a rover's queue stands."""
         return self.seen(number).paused
 
     def is_heard(self, number: int) -> bool:
@@ -251,30 +251,30 @@ class Fleet(World):
         return self.seen(number).heard
 
     def seen(self, number: int) -> VehicleSnapshot:
-        """Give what the server knows of a rover."""
+        """Return what the server knows of a rover."""
         found = self.server.engine.snapshot(now=self.now).vehicles
         return next(vehicle for vehicle in found if vehicle.system_id == number)
 
     def sent_to(self, number: int, since: float) -> list[str]:
-        """Give in words what the server has sent to a rover."""
+        """Return in words what the server has sent to a rover."""
         return self.observers[number - 1].sent_since(since)
 
     def journal_of(self, number: int) -> list[object]:
-        """Give all that the journal has of one rover."""
+        """Return all that the journal has of one rover."""
         return [event for event in self.events(object) if _vehicle_of(event) == number]
 
     def when(self, task_id: int, state: S) -> float:
-        """Give when a task came into a state first."""
+        """Return when a task came into a state first."""
         changes = self.events(TaskChanged)
         return next(e.at for e in changes if (e.task_id, e.new) == (task_id, state))
 
     def work_at(self, endpoint: str, since: float) -> list[float]:
-        """Give when setpoints and commands left the server for an endpoint."""
+        """Return when setpoints and commands left the server for an endpoint."""
         sent = self.watched.towards.get(endpoint, [])
         return [at for at, data in sent if at >= since and data[7] in WORK]
 
     def tasks_of(self, number: int) -> list[Task]:
-        """Give one rover's tasks, oldest first."""
+        """Return one rover's tasks, oldest first."""
         return [task for task in self.tasks() if task.vehicle == number]
 
 
@@ -286,11 +286,11 @@ def _vehicle_of(event: object) -> int | None:
 
 
 def packed(message: Any, system_id: int, component_id: int) -> bytes:
-    """Give a message as a packet of this address."""
+    """Return a message as a packet of this address."""
     raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))
     return raw
 
 
 def start_of(number: int) -> Pose:
-    """Give where a rover begins: three metres from the next one, facing north."""
+    """Return where a rover begins: three metres from the next one, facing north."""
     return Pose(east=3.0 * (number - 1))

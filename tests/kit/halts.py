@@ -179,7 +179,7 @@ class Halts:
         self._settle(key, is_granted=is_granted)
 
     def look(self, now: float) -> Iterator[Broken]:
-        """Give the rule's breach, once for each halt."""
+        """Yield the rule's breach, once for each halt."""
         self._look_at_mode(now)
         halt = self._halt
         if halt is None:

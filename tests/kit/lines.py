@@ -90,7 +90,7 @@ class SlowLine:
 
 @contextmanager
 def slow_line(folder: Path, *, baud: int) -> Iterator[tuple[Path, Path]]:
-    """Give the paths of two devices that are joined while the block runs."""
+    """Return the paths of two devices that are joined while the block runs."""
     with device(folder / "ttyOne") as one, device(folder / "ttyOther") as other:
         line = SlowLine(one, other, baud=baud)
         try:
@@ -100,7 +100,7 @@ def slow_line(folder: Path, *, baud: int) -> Iterator[tuple[Path, Path]]:
 
 
 def read_from(descriptor: int, count: int, *, within: float = END_LIMIT) -> bytes:
-    """Give so many bytes of a descriptor, or AssertionError."""
+    """Return so many bytes of a descriptor, or AssertionError."""
     data, end = b"", monotonic() + within
     with selectors.DefaultSelector() as selector:
         selector.register(descriptor, selectors.EVENT_READ)

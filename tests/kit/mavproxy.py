@@ -85,12 +85,12 @@ class MavProxy:
 
     @property
     def text(self) -> str:
-        """Give all that it has said, and the echo of what was typed."""
+        """Return all that it has said, and the echo of what was typed."""
         return self._text_from(0)
 
     @property
     def answer(self) -> str:
-        """Give what it has said since the last line typed, and that line."""
+        """Return what it has said since the last line typed, and that line."""
         return self._text_from(self._mark)
 
     def type(self, line: str) -> None:
@@ -122,7 +122,7 @@ class MavProxy:
         wait_until(is_shown, within=within, what=lambda: f"mode {name} in:\n{self.text}")
 
     def complaints(self, *, but: str = r"(?!)") -> list[str]:
-        """Give the lines that say that something is wrong, but for those that match."""
+        """Return the lines that say that something is wrong, but for those that match."""
         said = [line for line in self.text.splitlines() if not LINK.search(line)]
         return [line for line in said if COMPLAINT.search(line) and not re.search(but, line)]
 
@@ -131,7 +131,7 @@ class MavProxy:
         return self.ask("link", LINK.pattern).groupdict()
 
     def heard(self) -> list[Logged]:
-        """Give the packets that have come, as far as its log is written."""
+        """Return the packets that have come, as far as its log is written."""
         log = (self._folder / "mav.tlog").read_bytes()
         packets: list[Logged] = []
         at = STAMP_LENGTH

@@ -258,15 +258,15 @@ class Download:
 
 
 def currents(client: FakeClient) -> list[Current]:
-    """Give the MISSION_CURRENTs received."""
+    """Return the MISSION_CURRENTs received."""
     return [Current.of(packet.payload) for packet in client.of_id(CURRENT)]
 
 
 def reached(client: FakeClient) -> list[int]:
-    """Give the items of MISSION_ITEM_REACHED, in order."""
+    """Return the items of MISSION_ITEM_REACHED, in order."""
     return [struct.unpack("<H", p.payload.ljust(2, b"\0"))[0] for p in client.of_id(REACHED)]
 
 
 def acks(client: FakeClient) -> list[Ack]:
-    """Give the MISSION_ACKs received."""
+    """Return the MISSION_ACKs received."""
     return [Ack.of(packet.payload) for packet in client.of_id(MISSION_ACK)]

@@ -50,10 +50,10 @@ class Needs:
 
 
 def needs_of(engine: Engine) -> Iterator[tuple[Timer, float, object]]:
-    """Give when each part has something to do, by its state alone; with its timer."""
+    """Yield when each part has something to do, by its state alone; with its timer."""
     e: Any = engine
     for vehicle in e._vehicles.all:
-        yield e._vehicles.agenda._due[vehicle.system_id], vehicle.next_deadline(), vehicle
+        yield e._vehicles.deadline_heap._due[vehicle.system_id], vehicle.next_deadline(), vehicle
     gate = e._submissions.gate
     yield gate._timer, gate._held[0][1] if gate._held else inf, gate
     for desk in e._desks._desks.values():

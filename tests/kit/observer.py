@@ -82,7 +82,7 @@ class Ways(NamedTuple):
     given_back: frozenset[int]  # modes by which a client has the server drive: return, mission
 
     def mode_of(self, message: Any) -> int:
-        """Give the mode that a DO_SET_MODE asks for, -1 for nonsense."""
+        """Return the mode that a DO_SET_MODE asks for, -1 for nonsense."""
         if not (0 <= message.param2 < 2**32 and 0 <= message.param3 < 2**32):
             return -1
         if not self.sub_modes:
@@ -295,7 +295,7 @@ class Observer:
     # what a test may ask
 
     def sent_since(self, at: float) -> list[str]:
-        """Give what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ...
+        """Return what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ...
 
         That it asks for a heartbeat now and then is left out.
         """
@@ -503,7 +503,7 @@ class Observer:
             self._violation(now, f"passed in spite of STOP: {self._name(message)}")
 
     def _keeps_moving(self, message: Any) -> float:
-        """Give how long, in seconds, the rover may move for a packet that nothing follows."""
+        """Return how long, in seconds, the rover may move for a packet that nothing follows."""
         kind, never = message.get_type(), -1e9
         quiet = (self.ways.ours, self.ways.hold)  # modes in which it waits for more
         if kind in SETPOINTS:
@@ -551,7 +551,7 @@ class Observer:
             return None  # garbage that a test sends
 
     def _name(self, message: Any) -> str:
-        """Give a packet to the rover in one word."""
+        """Return a packet to the rover in one word."""
         kind = message.get_type()
         if kind in SETPOINTS:
             return "move" if _moves(message) else "zero"

@@ -26,7 +26,7 @@ def commit_of(revision: str) -> str:
 
 @contextmanager
 def checked_out(revision: str) -> Iterator[Path]:
-    """Give a folder with the files of a revision and its generated dialect; it is removed after.
+    """Return a folder with the files of a revision and its generated dialect; it is removed after.
 
     It is an export, not a work tree of git: nothing is left behind in the repository.
     """

@@ -34,7 +34,7 @@ class ProbeParty:
         self._decoder = Decoder()
 
     def next_deadline(self) -> float | None:
-        """Give when the probe is due."""
+        """Return when the probe is due."""
         return None if self.probe.is_over else self.probe.next_deadline()
 
     def turn(self, *, now: float) -> None:
@@ -124,7 +124,7 @@ class ProbeWorld(VirtualWorld):
         return self.stands() and autopilot.mode is Mode.HOLD and not autopilot.armed
 
     def commands(self) -> list[tuple[int, float]]:
-        """Give id and first parameter of every command that was sent."""
+        """Return id and first parameter of every command that was sent."""
         return [
             (message.command, message.param1)
             for _, message in self.party.sent
@@ -132,7 +132,7 @@ class ProbeWorld(VirtualWorld):
         ]
 
     def setpoints(self) -> list[tuple[float, m.SetPositionTargetLocalNed]]:
-        """Give every setpoint that was sent, and when."""
+        """Return every setpoint that was sent, and when."""
         return [
             (at, message)
             for at, message in self.party.sent

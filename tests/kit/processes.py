@@ -39,7 +39,7 @@ class Process:
 
     @property
     def text(self) -> str:
-        """Give all that it has written so far."""
+        """Return all that it has written so far."""
         return self.output.read_text(encoding="utf-8", errors="replace")
 
     def wait_for(self, pattern: str, *, within: float = START_LIMIT) -> re.Match[str]:
@@ -71,7 +71,7 @@ def wait_until(
 
 
 def environment_with(**variables: str) -> dict[str, str]:
-    """Give our environment without its user's configuration, and with these variables."""
+    """Return our environment without its user's configuration, and with these variables."""
     return {**os.environ, "MAV_TASKS_CONFIG": "", **variables}
 
 
@@ -122,17 +122,17 @@ class Stand:
     _links: list[Any] = field(default_factory=list)
 
     def truth(self) -> list[dict[str, float]]:
-        """Give the true poses so far, ten a second; a last half line is left out."""
+        """Return the true poses so far, ten a second; a last half line is left out."""
         text = self.truth_file.read_text(encoding="ascii")
         rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
         return [{key: float(value) for key, value in row.items()} for row in rows]
 
     def speed(self) -> float:
-        """Give the rover's true speed, m/s."""
+        """Return the rover's true speed, m/s."""
         return abs(self.truth()[-1]["forward_speed"])
 
     def connect(self, *, source_system: int = 255) -> Any:
-        """Give a stock pymavlink connection to the server that has heard the rover."""
+        """Return a stock pymavlink connection to the server that has heard the rover."""
         return self.heard(f"udpout:127.0.0.1:{self.client_port}", source_system)
 
     def connect_to_rover(self) -> Any:
@@ -145,7 +145,7 @@ class Stand:
             link.close()
 
     def heard(self, url: str, source_system: int = 255, **options: Any) -> Any:
-        """Give a stock pymavlink connection that has said hello and heard the rover."""
+        """Return a stock pymavlink connection that has said hello and heard the rover."""
         link = mavutil.mavlink_connection(url, source_system=source_system, **options)
         self._links.append(link)
         link.mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -171,7 +171,7 @@ class Stand:
 
 
 def udp_to(rover_port: int) -> AbstractContextManager[str]:
-    """Give the way to a rover past which there is nothing."""
+    """Return the way to a rover past which there is nothing."""
     return nullcontext(f"udpout:127.0.0.1:{rover_port}")
 
 
@@ -245,12 +245,12 @@ def after_a_restart() -> None:
 
 
 def free_tcp_ports(count: int) -> list[int]:
-    """Give TCP ports of the loopback that nobody uses at this moment."""
+    """Return TCP ports of the loopback that nobody uses at this moment."""
     return _free_ports(count, socket.SOCK_STREAM)
 
 
 def free_udp_ports(count: int) -> list[int]:
-    """Give UDP ports of the loopback that nobody uses at this moment."""
+    """Return UDP ports of the loopback that nobody uses at this moment."""
     return _free_ports(count, socket.SOCK_DGRAM)
 
 
@@ -268,7 +268,7 @@ def _is_free(port: int, kind: socket.SocketKind) -> bool:
 
 
 def _ports_of_this_process() -> Iterator[int]:
-    """Give ports that no other process of this run is given, none again before all have been.
+    """Return ports that no other process of this run is given, none again before all have been.
 
     They lie below those that the system gives by itself: a server goes on sending to who has just
     left, and pushes to where nobody may listen. What comes next to such a port would hear it, and

@@ -38,7 +38,7 @@ class QuietWorld(VirtualWorld):
         return client
 
     def tasks(self) -> tuple[Task, ...]:
-        """Give every task of the server."""
+        """Return every task of the server."""
         return self.server.engine.snapshot(now=self.now).tasks
 
     def until(self, condition: Callable[[], object], *, within: float) -> None:

@@ -79,7 +79,7 @@ class RunAgain:
         return (yield)
 
     def pytest_report_teststatus(self, report: Any) -> tuple[str, str, str] | None:
-        """Give the letter and the word that are shown."""
+        """Return the letter and the word that are shown."""
         return (OUTCOME, "R", "RERUN") if report.outcome == OUTCOME else None
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:

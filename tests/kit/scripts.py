@@ -47,7 +47,7 @@ each_net = pytest.mark.parametrize("loss", list(NETS), ids=list(NETS.values()))
 
 @contextmanager
 def clients_port(running: Stand, loss: float) -> Iterator[int]:
-    """Give the port at which clients reach the server, through a net that loses so much."""
+    """Return the port at which clients reach the server, through a net that loses so much."""
     if not loss:
         yield running.client_port
         return

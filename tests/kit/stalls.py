@@ -43,7 +43,7 @@ class StallWatch:
         return self._watcher.pid
 
     def since(self, begin: float) -> list[Stall]:
-        """Give the stalls that ended after that time."""
+        """Return the stalls that ended after that time."""
         sleep(3 * PERIOD)  # of one that has just ended the watcher has yet to tell
         self._read()
         return [stall for stall in self.stalls if stall.end > begin]

@@ -38,7 +38,7 @@ class Terminal:
 
     @property
     def lines(self) -> list[str]:
-        """Give what the screen shows, without blanks at the ends of lines, and lines below."""
+        """Return what the screen shows, without blanks at the ends of lines, and lines below."""
         lines = [str(line).rstrip() for line in self._screen.display]
         while lines and not lines[-1]:
             del lines[-1]
@@ -61,7 +61,7 @@ class Terminal:
         os.write(self._own_side, keys)
 
     def resize(self, rows: int, columns: int) -> None:
-        """Give the window another size; the program is told so by the system."""
+        """Return the window another size; the program is told so by the system."""
         self._screen.resize(rows, columns)
         termios.tcsetwinsize(self._own_side, (rows, columns))
 

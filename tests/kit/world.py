@@ -55,12 +55,12 @@ SETTINGS_SPEED = 0.5  # m/s, also of tasks that name none: Driving.speed
 
 
 def kinematic_body(start: Pose) -> Body:
-    """Give the body that scenarios drive: it slips a little, as a skid-steered one does."""
+    """Return the body that scenarios drive: it slips a little, as a skid-steered one does."""
     return KinematicBody(start=start, slip=0.1, seed=None)
 
 
 def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
-    """Give another vehicle that has the same system id; by its unique id it is another one."""
+    """Return another vehicle that has the same system id; by its unique id it is another one."""
     body = kinematic_body(start)
     autopilot = Autopilot(
         system_id=99,
@@ -238,7 +238,7 @@ class World(VirtualWorld):
             observer.server_restarted()
 
     def end_records(self) -> list[Path]:
-        """Give the records, complete, in the order of the servers."""
+        """Return the records, complete, in the order of the servers."""
         for recorder in self.recorders:
             recorder.close()
         return [recorder.path for recorder in self.recorders]
@@ -264,7 +264,7 @@ class World(VirtualWorld):
         self.rover.autopilot.set_faults(faults)
 
     def passed_on(self, source: tuple[int, int]) -> set[int]:
-        """Give the ids of a client's messages that go to rovers from here on, as they come."""
+        """Return the ids of a client's messages that go to rovers from here on, as they come."""
         ids: set[int] = set()
 
         def look(sender: str, _target: str, data: bytes) -> bool:
@@ -276,7 +276,7 @@ class World(VirtualWorld):
         return ids
 
     def commands_passed_on(self) -> set[int]:
-        """Give the numbers of the commands that go to rovers from here on, as they come."""
+        """Return the numbers of the commands that go to rovers from here on, as they come."""
         numbers: set[int] = set()
 
         def look(sender: str, _target: str, data: bytes) -> bool:
@@ -326,26 +326,26 @@ class World(VirtualWorld):
     # what a test looks at
 
     def task(self, task_id: int) -> Task:
-        """Give a task as the server has it now."""
+        """Return a task as the server has it now."""
         return {task.id: task for task in self.tasks()}[TaskId(task_id)]
 
     def state(self, task_id: int) -> tuple[TaskState, TaskReason]:
-        """Give a task's state and reason; UNKNOWN if there is none of that id."""
+        """Return a task's state and reason; UNKNOWN if there is none of that id."""
         for task in self.tasks():
             if task.id == task_id:
                 return task.state, task.reason
         return TaskState.UNKNOWN, TaskReason.NONE
 
     def tasks(self) -> tuple[Task, ...]:
-        """Give every task of the server."""
+        """Return every task of the server."""
         return self.server.engine.snapshot(now=self.now).tasks
 
     def control(self) -> str:
-        """Give how far the server's control of the first rover has come."""
+        """Return how far the server's control of the first rover has come."""
         return self.server.engine.snapshot(now=self.now).vehicles[0].control
 
     def paused(self) -> TaskReason:
-        """Give why the first rover's queue stands."""
+        """Return why the first rover's queue stands."""
         return self.server.engine.snapshot(now=self.now).vehicles[0].paused
 
     def is_idle(self, *, tasks: int) -> bool:
@@ -365,23 +365,23 @@ class World(VirtualWorld):
         )
 
     def pose(self) -> tuple[float, float, float]:
-        """Give the first rover's true north and east in metres, and heading in degrees."""
+        """Return the first rover's true north and east in metres, and heading in degrees."""
         truth = self.truth
         return truth.north, truth.east, degrees(truth.yaw)
 
     def events(self, kind: type[E]) -> list[E]:
-        """Give the journal's events of one kind, in order."""
+        """Return the journal's events of one kind, in order."""
         store = self.server.store
         kept = getattr(store, "events", None)
         assert kept is not None, f"{store} shows no events"
         return [event for event in kept if isinstance(event, kind)]
 
     def history(self, task_id: int) -> list[tuple[TaskState, TaskReason]]:
-        """Give the states that a task went through, with reasons."""
+        """Return the states that a task went through, with reasons."""
         return [(e.new, e.reason) for e in self.events(TaskChanged) if e.task_id == task_id]
 
     def describe(self) -> str:
-        """Give the state of affairs in a few words, for a failing test."""
+        """Return the state of affairs in a few words, for a failing test."""
         vehicles = self.server.engine.snapshot(now=self.now).vehicles
         tasks = [(t.id, t.state.name, t.reason.name) for t in self.tasks()]
         return f"t={self.now:.2f} {vehicles} {tasks} {self.rover!r}"
@@ -392,20 +392,20 @@ class World(VirtualWorld):
             observer.check()
 
     def _new_server(self, store: Store | None, restored: Restored | None) -> InMemoryServer:
-        witnesses: list[Decisions] = []
+        observers: list[Decisions] = []
         if self._records is not None:
             settings = self._settings or Settings()
-            witnesses = [
+            observers = [
                 Decisions(self._records, settings, restored, now=self.now, size=100_000_000)
             ]
-            self.recorders += witnesses
+            self.recorders += observers
         return InMemoryServer(
             self.net,
             vehicles=self._names,
             settings=self._settings,
             store=store,
             restored=restored,
-            witnesses=witnesses,
+            observers=observers,
             policies=self._policies,
             keys=self._keys,
             wall_offset=self._wall_offset,
@@ -489,7 +489,7 @@ def asks_for_heartbeat(data: bytes) -> bool:
 
 
 def at(north: float, east: float) -> dict[str, Any]:
-    """Give x and y of a COMMAND_INT for a place in metres from the origin."""
+    """Return x and y of a COMMAND_INT for a place in metres from the origin."""
     x, y = DEFAULT_ORIGIN.to_global(north, east)
     return {"x": x, "y": y}
 

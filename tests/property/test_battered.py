@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Outgoing
-from mav_tasks.engine.intake import Intake
+from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.signing import StreamTimes
 from tests.kit.client import setpoint
@@ -79,13 +79,13 @@ def test_a_decoder_that_looks_at_no_crc_is_found(monkeypatch: pytest.MonkeyPatch
 
 
 def test_an_exception_is_found_with_its_packet(monkeypatch: pytest.MonkeyPatch) -> None:
-    packets = Intake.packets
+    packets = PacketReader.packets
 
-    def brittle(self: Intake, item: Any, *args: Any, **kw: Any) -> Any:
+    def brittle(self: PacketReader, item: Any, *args: Any, **kw: Any) -> Any:
         assert len(item.datagrams[0][1]) != 42, "brittle"
         return packets(self, item, *args, **kw)
 
-    monkeypatch.setattr(Intake, "packets", brittle)
+    monkeypatch.setattr(PacketReader, "packets", brittle)
     with pytest.raises(Violation, match=r"AssertionError: [0-9a-f]{84}$"):
         Battered(SEED).run(SOME)
 

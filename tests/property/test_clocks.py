@@ -25,7 +25,7 @@ Said = tuple[float, int, int]  # when it is sent, ms, kind
 
 
 def says(*, since: float, until: float, up: float) -> list[Said]:
-    """Give what a vehicle sends that has been up for so long when it begins."""
+    """Return what a vehicle sends that has been up for so long when it begins."""
     count = round((until - since) * RATE)
     times = [since + number / RATE for number in range(count)]
     return [(at, round(1000 * (up + at - since)), kind) for at in times for kind in (0, 1)]
@@ -38,7 +38,7 @@ def message(ms: int, kind: int) -> Attitude | LocalPositionNed:
 def over_a_net(
     sent: list[Said], delays: list[float], copies: list[tuple[int, float]]
 ) -> list[tuple[float, float, int, int]]:
-    """Give what arrives: when, when it was sent, ms, kind; in the order in which it does."""
+    """Return what arrives: when, when it was sent, ms, kind; in the order in which it does."""
     came = [
         (at + delays[number % len(delays)], at, ms, kind)
         for number, (at, ms, kind) in enumerate(sent)

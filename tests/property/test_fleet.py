@@ -11,7 +11,6 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
@@ -25,6 +24,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Wait
 from mav_tasks.tasks.lifecycle import TERMINAL, TRANSITIONS, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Draft, Frame, Task, TaskId, Terms
 from mav_tasks.tasks.view import DemandKind, VehicleView
@@ -104,8 +104,8 @@ class Lives(RuleBasedStateMachine):
         self.begin()
 
     def begin(self, restored: Restored | None = None) -> None:
-        self.book = TaskBook()
-        self.fleet = Fleet(self.book, Settings(queueing=QUEUEING))
+        self.registry = TaskRegistry()
+        self.fleet = Fleet(self.registry, Settings(queueing=QUEUEING))
         self.fleet.restore(restored or Restored(wall_offset=self.offset), now=self.now)
         self.follow()
 
@@ -133,7 +133,7 @@ class Lives(RuleBasedStateMachine):
         waiting = [task for task in self.tasks.values() if task.state in WAITING]
         mine = [task for task in waiting if task.vehicle == wish.vehicle]
         is_full = len(mine) >= QUEUEING.capacity or len(waiting) >= QUEUEING.quota
-        before = self.book.all()
+        before = self.registry.all()
         refusal = refused(lambda: self.fleet.of(wish.vehicle).submit(wish, now=self.now))
         if refusal is None:
             assert not is_full
@@ -141,7 +141,7 @@ class Lives(RuleBasedStateMachine):
         else:
             assert refusal in REFUSALS
             assert is_full or wish.terms.after
-            assert self.book.all() == before
+            assert self.registry.all() == before
         self.follow()
 
     @precondition(lambda self: any(task.state not in TERMINAL for task in self.tasks.values()))
@@ -149,7 +149,7 @@ class Lives(RuleBasedStateMachine):
     def see_to_a_task(self, data: st.DataObject) -> None:
         """Cancel, kill, modify, withdraw or release one that is not over."""
         live = [task_id for task_id, task in self.tasks.items() if task.state not in TERMINAL]
-        task = self.book[TaskId(data.draw(st.sampled_from(live)))]
+        task = self.registry[TaskId(data.draw(st.sampled_from(live)))]
         if task.state is S.HELD:
             self.release(task, again=data.draw(st.booleans()))
             return
@@ -172,22 +172,22 @@ class Lives(RuleBasedStateMachine):
             name, value
         )
         terms = replace(task.terms, **{name: value})  # type: ignore[arg-type]
-        before = self.book.all()
+        before = self.registry.all()
         tasks = self.fleet.of(task.vehicle)
         refusal = refused(lambda: tasks.modify(task, terms, actor="client", now=self.now))
         if refusal is not None:
             assert refusal in REFUSALS
-            assert self.book.all() == before
+            assert self.registry.all() == before
 
     def release(self, task: Task, *, again: bool) -> None:
         tasks, seen = self.fleet.of(task.vehicle), self.view(task.vehicle)
-        before = self.book.all()
+        before = self.registry.all()
         if refused(
             lambda: tasks.releases.release(
                 task, again=again, may_continue=True, seen=seen, actor="client", now=self.now
             )
         ):
-            assert self.book.all() == before
+            assert self.registry.all() == before
         self.follow()
 
     @rule(
@@ -196,7 +196,7 @@ class Lives(RuleBasedStateMachine):
         too=st.booleans(),
     )
     def see_to_a_queue(self, vehicle: int, action: str, too: bool) -> None:
-        tasks, seen, before = self.fleet.of(vehicle), self.view(vehicle), self.book.all()
+        tasks, seen, before = self.fleet.of(vehicle), self.view(vehicle), self.registry.all()
         match action:
             case "pause":
                 tasks.pause(R.OPERATOR, actor="client", now=self.now)
@@ -204,10 +204,10 @@ class Lives(RuleBasedStateMachine):
                 tasks.clear(begun_too=too, actor="client", now=self.now)
             case "stop":
                 tasks.stop(clear=too, actor="client", now=self.now)
-                assert tasks.begun is None
+                assert tasks.active is None
             case _:
                 if refused(lambda: tasks.proceed(seen, actor="client", now=self.now)):
-                    assert self.book.all() == before
+                    assert self.registry.all() == before
         self.follow()
 
     # what time, clocks and vehicles do
@@ -244,7 +244,7 @@ class Lives(RuleBasedStateMachine):
         self.follow()
 
     def restart(self, *, ended_well: bool) -> None:
-        tasks = self.book.all()
+        tasks = self.registry.all()
         for task in tasks:
             due = self.due(task)
             came_late = task.state in WAITING and task.submitted_at < due <= self.now
@@ -262,8 +262,8 @@ class Lives(RuleBasedStateMachine):
             assert self.fleet.of(vehicle).paused is not R.NONE or ended_well
         self.follow()
         for task_id in running:
-            assert self.book[task_id].state is S.HELD
-            assert self.book[task_id].reason is R.OUTCOME_UNKNOWN
+            assert self.registry[task_id].state is S.HELD
+            assert self.registry[task_id].reason is R.OUTCOME_UNKNOWN
 
     def view(self, vehicle: int, *, stands: bool = True) -> VehicleView:
         made = idle_vehicle(at=self.now)
@@ -274,9 +274,9 @@ class Lives(RuleBasedStateMachine):
     # the model follows the journal, and nothing else
 
     def follow(self) -> None:
-        for event in self.book.take_events():
+        for event in self.registry.take_events():
             self.apply(event)
-        self.book.durable = self.book.recorded
+        self.registry.durable = self.registry.recorded
 
     def apply(self, event: Event) -> None:
         match event:
@@ -385,7 +385,7 @@ class Lives(RuleBasedStateMachine):
 
     @invariant()
     def the_tasks_are_what_the_journal_adds_up_to(self) -> None:
-        kept = {task.id: task for task in self.book.all()}
+        kept = {task.id: task for task in self.registry.all()}
         assert {i: replace(t, progress=self.tasks[i].progress) for i, t in kept.items()} == (
             self.tasks
         )
@@ -397,8 +397,8 @@ class Lives(RuleBasedStateMachine):
     def every_task_is_in_one_place(self) -> None:
         for vehicle in VEHICLES:
             tasks = self.fleet.of(vehicle)
-            begun = [] if tasks.begun is None else [tasks.begun.id]
-            places = [*tasks.waiting, *begun, *(task.id for task in tasks.aside)]
+            active = [] if tasks.active is None else [tasks.active.id]
+            places = [*tasks.waiting, *active, *(task.id for task in tasks.suspended)]
             not_over = [
                 task.id
                 for task in self.tasks.values()
@@ -406,7 +406,7 @@ class Lives(RuleBasedStateMachine):
             ]
             assert sorted(places) == sorted(not_over)
             running = [i for i in not_over if self.tasks[i].state in RUNNING]
-            assert running in ([], begun)
+            assert running in ([], active)
 
     @invariant()
     def the_queues_are_in_order_and_bounded(self) -> None:

@@ -9,7 +9,6 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Move
@@ -22,6 +21,7 @@ from mav_tasks.tasks.lifecycle import (
     TaskState,
 )
 from mav_tasks.tasks.outlook import position
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Pose, TaskId
 from mav_tasks.tasks.view import DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.samples import draft, idle_vehicle, ours
@@ -37,9 +37,9 @@ class TasksOfAVehicle(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.now = 10.0
-        self.book = TaskBook()
+        self.registry = TaskRegistry()
         limits = Settings(queueing=Queueing(capacity=CAPACITY))
-        self.tasks = Fleet(self.book, limits).of(1)
+        self.tasks = Fleet(self.registry, limits).of(1)
         self.along = 0.0
         self.armed = False
         # the model: what must be waiting, in order, and what is known of every task
@@ -64,8 +64,8 @@ class TasksOfAVehicle(RuleBasedStateMachine):
     @rule(data=st.data())
     def withdraw(self, data: st.DataObject) -> None:
         _, task_id = data.draw(st.sampled_from(self.waiting))
-        if not self.book.is_durable(TaskId(task_id)):
-            self.tasks.withdraw(self.book[TaskId(task_id)], now=self.now)
+        if not self.registry.is_durable(TaskId(task_id)):
+            self.tasks.withdraw(self.registry[TaskId(task_id)], now=self.now)
         self.note()
 
     @rule()
@@ -78,13 +78,13 @@ class TasksOfAVehicle(RuleBasedStateMachine):
         try:
             self.tasks.proceed(self.view(), actor="client", now=self.now)
         except Rejection:
-            assert self.tasks.begun is not None
+            assert self.tasks.active is not None
         self.note()
 
     @rule(clear=st.booleans())
     def stop(self, clear: bool) -> None:
         self.tasks.stop(clear=clear, actor="client", now=self.now)
-        assert self.tasks.begun is None
+        assert self.tasks.active is None
         self.note()
 
     @rule()
@@ -96,7 +96,7 @@ class TasksOfAVehicle(RuleBasedStateMachine):
 
     @rule()
     def commit(self) -> None:
-        self.book.durable = self.book.recorded
+        self.registry.durable = self.registry.recorded
 
     # what the vehicle does
 
@@ -110,23 +110,23 @@ class TasksOfAVehicle(RuleBasedStateMachine):
         for _ in range(ticks):
             self.now += 0.05
             self.move(what)
-            begun = self.tasks.begun
-            before = None if begun is None else self.book.is_durable(begun.id)
+            active = self.tasks.active
+            before = None if active is None else self.registry.is_durable(active.id)
             demand = self.tasks.step(self.view(what), now=self.now)
             moves = demand.kind is DemandKind.DRIVE and not demand.velocity.is_zero
             if moves:
-                assert begun is not None
-                assert (begun.state, before) == (TaskState.EXECUTING, True)
+                assert active is not None
+                assert (active.state, before) == (TaskState.EXECUTING, True)
                 assert not self.tasks.is_stopped
             self.armed = demand.kind in (DemandKind.TAKE, DemandKind.DRIVE)
             self.note()
 
     def move(self, what: str) -> None:
-        begun = self.tasks.begun
-        if begun is None or begun.progress.anchor is None:
-            self.along = 0.0 if begun is None else self.along
-        elif begun.state is TaskState.EXECUTING:
-            end = begun.progress.anchor.north + LENGTH
+        active = self.tasks.active
+        if active is None or active.progress.anchor is None:
+            self.along = 0.0 if active is None else self.along
+        elif active.state is TaskState.EXECUTING:
+            end = active.progress.anchor.north + LENGTH
             self.along = end if what == "arrived" else min(end, self.along + 0.02)
 
     def view(self, what: str = "good") -> VehicleView:
@@ -150,7 +150,7 @@ class TasksOfAVehicle(RuleBasedStateMachine):
     # the model follows the journal, and nothing else
 
     def note(self) -> None:
-        for event in self.book.take_events():
+        for event in self.registry.take_events():
             self.apply(event)
 
     def apply(self, event: Event) -> None:
@@ -176,7 +176,7 @@ class TasksOfAVehicle(RuleBasedStateMachine):
 
     @invariant()
     def no_task_is_lost_and_none_is_in_two_states(self) -> None:
-        assert {task.id: task.state for task in self.book.all()} == self.states
+        assert {task.id: task.state for task in self.registry.all()} == self.states
         assert not self.gone & set(self.states)
 
     @invariant()
@@ -188,13 +188,13 @@ class TasksOfAVehicle(RuleBasedStateMachine):
 
     @invariant()
     def at_most_one_task_is_begun(self) -> None:
-        begun = [task_id for task_id, state in self.states.items() if state in ACTIVE]
-        now = self.tasks.begun
-        assert begun == ([] if now is None else [now.id])
+        active = [task_id for task_id, state in self.states.items() if state in ACTIVE]
+        now = self.tasks.active
+        assert active == ([] if now is None else [now.id])
 
     @invariant()
     def versions_count_the_changes(self) -> None:
-        for task in self.book.all():
+        for task in self.registry.all():
             assert (task.version > 1) == (task.state is not TaskState.QUEUED)
             if task.state in TERMINAL:
                 assert position(self.tasks, task) is None

@@ -29,7 +29,7 @@ def needs(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
-    """Give a factory of worlds that are ready to be used."""
+    """Return a factory of worlds that are ready to be used."""
     worlds: list[World] = []
     agreement = Agreement()
     agreement.look_on(monkeypatch)
@@ -50,5 +50,5 @@ def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
 
 @pytest.fixture
 def world(make_world: MakeWorld) -> World:
-    """Give a world in which nothing is unusual."""
+    """Return a world in which nothing is unusual."""
     return make_world()

@@ -36,11 +36,11 @@ def test_one_that_does_not_follow_is_told_of_within_3_s(make_world: MakeWorld) -
     world = make_world(body=partial(Sticky, least=9.0, rolling=0.9))
     world.client.move(5.0)
     world.until_state(1, S.EXECUTING)
-    begun = world.now
+    active = world.now
     words = "asked for 0.5 m/s, stands"
     world.until(lambda: any(words in text for text in world.client.texts()), within=3.0)
     assert world.state(1)[0] is S.EXECUTING, "before it is stuck"
-    assert world.now - begun < 3.0
+    assert world.now - active < 3.0
     world.until_state(1, S.FAILED)
 
 

@@ -32,12 +32,12 @@ from tests.scenarios.conftest import MakeWorld
 
 
 def state_of(world: World) -> Snapshot:
-    """Give everything but the counts of what came in."""
+    """Return everything but the counts of what came in."""
     return replace(world.server.engine.snapshot(now=world.now), decoded="")
 
 
 def counts(world: World, link: str) -> dict[str, int]:
-    """Give what the server has counted on one side, by kind."""
+    """Return what the server has counted on one side, by kind."""
     on_vehicles, on_clients = world.server.engine.snapshot(now=world.now).decoded.split(", clients")
     counted = on_clients if link == CLIENT_LINK else on_vehicles
     return {kind: int(number) for kind, number in re.findall(r"(\w+)=(\d+)", counted)}
@@ -53,7 +53,7 @@ def looks_whole(data: bytes) -> bool:
 
 
 def good_packets(random: Random) -> list[bytes]:
-    """Give packets that would do something if they were whole."""
+    """Return packets that would do something if they were whole."""
     mav = common.MAVLink(None, random.choice((1, 250, 255, 9)), random.choice((1, 191, 190)))
     mav.seq = random.randrange(256)
     messages = [
@@ -72,7 +72,7 @@ def good_packets(random: Random) -> list[bytes]:
 
 
 def garbage(random: Random) -> bytes:
-    """Give a datagram that means nothing: noise, cut off, flipped, or of an unknown id."""
+    """Return a datagram that means nothing: noise, cut off, flipped, or of an unknown id."""
     packet = bytearray(random.choice(good_packets(random)))
     match random.randrange(5):
         case 0:
@@ -273,7 +273,7 @@ def packed(message: object, system_id: int = 255, component_id: int = 190) -> by
 
 
 def whole(message_id: int, crc_extra: int, payload: bytes, source: tuple[int, int]) -> bytes:
-    """Give a MAVLink 2 packet with a good CRC and any payload."""
+    """Return a MAVLink 2 packet with a good CRC and any payload."""
     head = bytes((len(payload), 0, 0, 0, *source)) + struct.pack("<I", message_id)[:3]
     crc = common.x25crc(head + payload)
     crc.accumulate(bytes((crc_extra,)))

@@ -41,7 +41,7 @@ def taken_by_hand(world: World) -> None:
     world.rover.autopilot.operator_sticks(0.5, 0.2)
 
 
-def led_away(world: World) -> None:
+def displaced(world: World) -> None:
     """Somebody drives it metres aside by hand, and parks it."""
     world.operator_mode(Mode.MANUAL)
     world.rover.autopilot.operator_sticks(0.0, 1.2)
@@ -266,10 +266,10 @@ def test_a_remainder_far_away_is_not_driven_to(world: World) -> None:
     world.suspend_server(1.0)
     world.run(4)
     assert world.state(1) == (S.HELD, R.LATE)
-    led_away(world)
+    displaced(world)
     remainder = world.client.command(RELEASE, 1, 1)
     world.run(0.2)
-    assert remainder.answer == (DENIED, R.OFF_LINE)
+    assert remainder.answer == (DENIED, R.OFF_TRACK)
     again = world.client.command(RELEASE, 1, 0)
     world.run(0.2)
     assert again.result == ACCEPTED
@@ -298,9 +298,9 @@ def test_what_was_set_aside_is_held_when_somebody_led_the_rover_away(world: Worl
     world.client.mode(RTL)
     world.until_state(2, S.EXECUTING)
     world.run(0.5)
-    led_away(world)
+    displaced(world)
     world.client.command(CANCEL, 2)
     world.run(2)
     world.client.proceed()
     world.run(3)
-    assert (world.state(1), world.stands()) == ((S.HELD, R.OFF_LINE), True)
+    assert (world.state(1), world.stands()) == ((S.HELD, R.OFF_TRACK), True)

@@ -5,8 +5,8 @@ from random import Random
 import pytest
 
 from mav_tasks.links.memory import Conditions
-from mav_tasks.tasks.driving.itinerary import goal_of
 from mav_tasks.tasks.driving.legs import leg_of, length_of
+from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState
 from rover_sim.faults import Faults
 from rover_sim.personas import PX4, Mode

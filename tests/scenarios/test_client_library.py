@@ -37,7 +37,7 @@ EVER = 400.0  # s, in which a handle must have learned how its task ended
 
 @pytest.fixture
 def make_world() -> Iterator[MakeWorld]:
-    """Give a factory of worlds with a server that is ready."""
+    """Return a factory of worlds with a server that is ready."""
     worlds: list[RoverWorld] = []
 
     def make(*, seed: int = 1, settings: Settings | None = None, **options: Any) -> RoverWorld:
@@ -54,7 +54,7 @@ def make_world() -> Iterator[MakeWorld]:
 
 @pytest.fixture
 def world(make_world: MakeWorld) -> RoverWorld:
-    """Give a world with one rover."""
+    """Return a world with one rover."""
     return make_world()
 
 
@@ -79,7 +79,7 @@ async def end_of(task: Task) -> TaskState:
 
 
 def short(number: int) -> Drive:
-    """Give a goal that is told from all others by its duration."""
+    """Return a goal that is told from all others by its duration."""
     return Drive(0.0, 0.5, 0.05 + number / 1000)
 
 
@@ -339,7 +339,7 @@ def begin_anew(world: RoverWorld, *, next_id: int = 1) -> None:
     world.server._is_killed = False
     world.server.start()
     assert world.server._server is not None
-    world.server._server.engine._book.restore((), next_id=next_id)
+    world.server._server.engine._registry.restore((), next_id=next_id)
 
 
 def test_handles_work_with_ids_above_what_a_float32_counts(world: RoverWorld) -> None:
@@ -600,9 +600,9 @@ def test_who_submits_faster_than_he_may_only_waits(make_world: MakeWorld) -> Non
 
     async def script() -> None:
         async with world.client() as client:
-            begun = asyncio.get_running_loop().time()
+            active = asyncio.get_running_loop().time()
             tasks = [await client.submit(short(n)) for n in range(16)]
-            assert asyncio.get_running_loop().time() - begun > 2.0
+            assert asyncio.get_running_loop().time() - active > 2.0
             assert [task.id for task in tasks] == list(range(1, 17))
 
     world.run(script())

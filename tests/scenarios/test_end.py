@@ -128,7 +128,7 @@ def test_last_words_are_there_exactly_while_a_rover_is_engaged(world: World) -> 
 
     def note(now: float) -> None:
         listener = Observer()
-        for words in engine.last_words:
+        for words in engine.emergency_stop_packets:
             listener.sent(now, words.data)
         seen.append((world.control() != "IDLE", listener.sent_since(0)))
 

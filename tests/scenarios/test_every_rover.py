@@ -43,7 +43,7 @@ def fleet() -> Iterator[Fleet]:
 
 
 def answers(client: FakeClient, command: int) -> list[tuple[tuple[int, int], int]]:
-    """Give (source, result) of every ack of a command."""
+    """Return (source, result) of every ack of a command."""
     acks = [(p.source, client.decoded(p)) for p in client.of_id(77)]
     return [(source, ack.result) for source, ack in acks if ack.command == command]
 

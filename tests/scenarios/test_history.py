@@ -19,7 +19,7 @@ S = TaskState
 
 @pytest.fixture
 def make_world() -> Iterator[MakeWorld]:
-    """Give a factory of worlds with a server that is ready."""
+    """Return a factory of worlds with a server that is ready."""
     worlds: list[RoverWorld] = []
 
     def make(*, seed: int = 1, **options: Any) -> RoverWorld:

@@ -33,8 +33,8 @@ from tests.scenarios.test_roles import (
     SUBMITTER,
     WAYPOINT,
     MakeRoles,
+    active,
     answer,
-    begun,
     join,
     place,
     upload,
@@ -67,7 +67,7 @@ def test_a_radio_s_status_makes_nobody_a_client_where_all_is_signed(world: World
 
 
 def connected(world: World, key: Key) -> FakeClient:
-    """Give a client that has dialled, as over TCP, and signs."""
+    """Return a client that has dialled, as over TCP, and signs."""
     client = signing(world, key, name="dialled")
     change = PeerChanged(CLIENT_LINK, client.name, up=True)
     world.server.pump.handle(change, now=world.now)
@@ -211,7 +211,7 @@ def test_only_an_operator_s_stop_clears_the_queue(with_roles: MakeRoles) -> None
     """Everybody stops a rover; but the tasks of others are theirs."""
     world = with_roles()
     observer, operator = join(world, OBSERVER), join(world, OPERATOR)
-    task = begun(world, 20.0)
+    task = active(world, 20.0)
     waiting = world.client.move(1.0)
     assert answer(world, observer.stop(clear=True)) == (ACCEPTED, task)
     assert world.paused() is R.STOPPED

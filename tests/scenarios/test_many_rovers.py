@@ -62,7 +62,7 @@ class MakeFleet(Protocol):
 
 @pytest.fixture
 def make_fleet() -> Iterator[MakeFleet]:
-    """Give a factory of fleets that are ready to be used."""
+    """Return a factory of fleets that are ready to be used."""
     fleets: list[Fleet] = []
 
     def make(layout: Layout, **kw: Any) -> Fleet:
@@ -95,7 +95,7 @@ class Diary(NamedTuple):
 
 
 def diary_of(fleet: Fleet, number: int) -> Diary:
-    """Give what the journal has of a rover, and every setpoint and command that left for it."""
+    """Return what the journal has of a rover, and every setpoint and command that left for it."""
     driven = [(at, m.get_type(), m.to_dict()) for at, m in fleet.observers[number - 1].driven]
     return Diary(fleet.journal_of(number), driven)
 
@@ -104,7 +104,7 @@ def diary_of(fleet: Fleet, number: int) -> Diary:
 
 
 def end_of(start: Pose, goals: list[Move | Rotate]) -> tuple[float, float, float]:
-    """Give north, east and heading in degrees after goals that end exactly where they say."""
+    """Return north, east and heading in degrees after goals that end exactly where they say."""
     north, east, yaw = start.north, start.east, start.yaw
     for goal in goals:
         if isinstance(goal, Move):
@@ -116,7 +116,7 @@ def end_of(start: Pose, goals: list[Move | Rotate]) -> tuple[float, float, float
 
 
 def acks_from(client: FakeClient, number: int) -> list[tuple[int, int, int]]:
-    """Give (command, result, result_param2) of the acks from a rover's task server."""
+    """Return (command, result, result_param2) of the acks from a rover's task server."""
     return [
         (int(ack.command), int(ack.result), int(ack.result_param2))
         for ack in client.acks
@@ -238,7 +238,7 @@ class Flood:
         ]
 
     def next_deadline(self) -> float:
-        """Give when the next burst is due."""
+        """Return when the next burst is due."""
         return self._next_at
 
     def turn(self, *, now: float) -> None:
@@ -685,13 +685,15 @@ def test_a_rover_that_comes_back_on_another_link_is_driven_there_and_no_more_at_
     fleet.until(lambda: fleet.work_at("new", since), within=6)
     moved_at = fleet.work_at("new", since)[0]
     fleet.until_state(1, S.EXECUTING)
-    last_words = fleet.server.engine.last_words  # what is sent when the server itself fails
+    emergency_stop_packets = (
+        fleet.server.engine.emergency_stop_packets
+    )  # what is sent when the server itself fails
     fleet.until_state(1, S.COMPLETED)
 
     assert near_pose(fleet.pose_of(1), (4.0, 0.0, 0.0))
     assert (S.PAUSED, R.POSITION_LOST) in fleet.history(1)
     assert fleet.work_at("a", moved_at) == []
-    assert {word.peer for word in last_words} == {"new", "b"}
+    assert {word.peer for word in emergency_stop_packets} == {"new", "b"}
     asked = fleet.other.arm(False, target=(1, 1))  # what a client has for it goes there, too
     fleet.run(0.1)
     assert asked.answer == (ACCEPTED, 0)
@@ -777,7 +779,7 @@ class QueueStatus(NamedTuple):
 
 
 def queue_statuses(client: FakeClient) -> list[QueueStatus]:
-    """Give those that a client has received."""
+    """Return those that a client has received."""
     found = []
     for packet in client.of_id(TASK_QUEUE_STATUS):
         values = struct.unpack("<5I14I2B2I", packet.payload.ljust(86, b"\0"))

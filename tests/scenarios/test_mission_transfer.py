@@ -42,7 +42,7 @@ def bad_net(random: Random, *, loss: float) -> Conditions:
 
 
 def survey(random: Random, count: int, *, number: int = 0) -> list[Item]:
-    """Give a plan of which no item equals another, nor any of a plan with another ``number``."""
+    """Return a plan of which no item equals another, nor any of a plan with another ``number``."""
     items = [Item(WAYPOINT, frame=0, current=1, **at(number, 0))]
     for seq in range(1, count):
         if random.random() < 0.1:
@@ -64,7 +64,7 @@ def survey(random: Random, count: int, *, number: int = 0) -> list[Item]:
 
 
 def payloads(items: Sequence[Item]) -> list[bytes]:
-    """Give what a client that downloads these is sent, bit by bit."""
+    """Return what a client that downloads these is sent, bit by bit."""
     mav = common.MAVLink(None, 1, 1)
     return [payload(item.message(seq, 0, (255, 190)), mav) for seq, item in enumerate(items)]
 
@@ -98,7 +98,7 @@ def received(download: Download) -> list[bytes]:
 
 
 def places(task: Task) -> list[int]:
-    """Give x of each item of a task's plan."""
+    """Return x of each item of a task's plan."""
     assert isinstance(task.goal, Plan)
     return [item.x for item in unpacked(task.goal.source)]
 
@@ -249,13 +249,13 @@ class Story:
         )
 
     def kept(self) -> list[list[tuple[int, int]]]:
-        """Give every plan that the server ever took for one."""
+        """Return every plan that the server ever took for one."""
         sources = [e.source for e in self.world.store.events if isinstance(e, PlanStored)]
         sources += [t.goal.source for t in self.world.tasks() if isinstance(t.goal, Plan)]
         return [[(i.x, i.y) for i in unpacked(source)] for source in sources]
 
     def stale(self) -> list[tuple[tuple[str, int | None], tuple[str, int | None]]]:
-        """Give the requests for another item than the first, the first after a count."""
+        """Return the requests for another item than the first, the first after a count."""
         asked = self.world.wire.asked
         each = [[what for what in asked if what[0] == name] for name in ("client", "other")]
         return [pair for one in each for pair in pairwise(one) if pair[0][1] is None and pair[1][1]]

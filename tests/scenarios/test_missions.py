@@ -383,7 +383,7 @@ def servo(number: int, pwm: float = 1500.0) -> Item:
 
 
 def ordered(world: World, since: float = 0.0) -> list[float]:
-    """Give param2 of the servo commands that went to the rover."""
+    """Return param2 of the servo commands that went to the rover."""
     return [
         message.param2
         for at, message in world.observer.driven

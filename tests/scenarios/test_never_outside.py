@@ -60,7 +60,7 @@ def fenced(world: World, items: list[Item]) -> int | None:
 
 
 def tasks(world: World, random: Random) -> list[Callable[[], object]]:
-    """Give what the rover may be asked for."""
+    """Return what the rover may be asked for."""
     client = world.client
 
     def speed() -> float:

@@ -79,7 +79,7 @@ def commands() -> Iterator[Word]:
 
 
 def message_of(cls: Any) -> Any:
-    """Give a message of zeros for the first rover; plain pymavlink, none of ours."""
+    """Return a message of zeros for the first rover; plain pymavlink, none of ours."""
     values: list[Any] = []
     for name in cls.fieldnames:
         place = cls.ordered_fieldnames.index(name)
@@ -211,15 +211,15 @@ class Walk:
         return False
 
     def state(self) -> tuple[object, ...]:
-        """Give what is to be the same again."""
+        """Return what is to be the same again."""
         autopilot, tasks = self.world.rover.autopilot, self.vehicle.tasks
-        begun = tasks.begun
+        active = tasks.active
         return (
             autopilot.armed,
             autopilot.mode,
             self.world.paused(),
             self.world.control(),
-            None if begun is None else (begun.id, begun.state),
+            None if active is None else (active.id, active.state),
             len(tuple(tasks.waiting)),
             self.vehicle.motion_rights.has_granted((self.client.server, self.client.name)),
             self.vehicle.motion_rights.has_granted((self.client.server, self.world.client.name)),
@@ -280,8 +280,8 @@ class Walk:
         if self.enter is stopped and not (kind is Kind.GO and self.role in ("operator", "safety")):
             assert self.world.paused() is R.STOPPED, where
         if kind is Kind.HALT and self.enter is task_drives and word.number != 54011:
-            begun = self.vehicle.tasks.begun
-            assert begun is None or begun.state is not S.EXECUTING, where
+            active = self.vehicle.tasks.active
+            assert active is None or active.state is not S.EXECUTING, where
 
 
 ASKED_OF_THE_ROVER = (512,)  # REQUEST_MESSAGE of what the server does not know itself

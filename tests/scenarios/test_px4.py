@@ -44,14 +44,14 @@ class TestDriving:
         self, make_world: MakeWorld, persona: Persona
     ) -> None:
         world = make_world(persona=persona)
-        begun = world.now
+        active = world.now
         world.client.move(2.0)
         world.run(0.05)
         go_to(world, -1.0, 2.0)
         world.client.command(DRIVE, 0.5, 0, 2.0)
         world.until_idle(tasks=3, within=90)
         assert [task.state for task in world.tasks()] == [S.COMPLETED] * 3
-        story = [what for what in world.observer.sent_since(begun) if what not in ("511", "512")]
+        story = [what for what in world.observer.sent_since(active) if what not in ("511", "512")]
         order = list(dict.fromkeys(story))
         assert order == ["HOLD", "zero", "arm", "stay", "GUIDED", "move", "disarm"]
         assert not world.rover.autopilot.armed

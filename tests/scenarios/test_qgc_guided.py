@@ -96,9 +96,9 @@ class TestAlsoWhileDriving:
         party = driving(world, profile)
         manual = {True: 0, False: 1 << 16}[persona is PROMPT]
         party.operator.set_mode(manual)
-        begun = world.now
+        active = world.now
         world.until(lambda: party.vehicle.state.mode == manual, within=1.3)
-        assert world.now - begun < 0.3, "the heartbeat comes at once"
+        assert world.now - active < 0.3, "the heartbeat comes at once"
         assert world.rover.autopilot.mode is Mode.MANUAL
         assert world.state(1) == (S.PAUSED, R.TAKEOVER)
         assert party.qgc.screen.complaints == []

@@ -40,10 +40,10 @@ class TestCommands:
         self, profile: Profile, least: float, most: float
     ) -> None:
         pair = Pair(profile, answers={31012: []}).connected()
-        begun = pair.now
+        active = pair.now
         pair.party.operator.action(31012)
         pair.run(10)
-        shown = pair.popup_at("Vehicle did not respond to command: MAV_CMD(31012)") - begun
+        shown = pair.popup_at("Vehicle did not respond to command: MAV_CMD(31012)") - active
         assert least <= shown <= most
         assert sum(getattr(m, "command", 0) == 31012 for _, _, m in pair.stub.heard) == 1
 
@@ -142,11 +142,11 @@ class TestGuided:
 
     def test_without_an_ack_for_the_item_complains(self) -> None:
         pair = Pair(autopilot=APM_AUTOPILOT, mode=15, silent={"MISSION_ITEM"}).driving()
-        begun = pair.now
+        active = pair.now
         pair.party.operator.go_to(47.3978, 8.5456)
         pair.run(3)
         words = "Vehicle did not respond to mission item communication: Guided Mode Item"
-        shown = pair.popup_at(f"Mission transfer failed. Error: {words}") - begun
+        shown = pair.popup_at(f"Mission transfer failed. Error: {words}") - active
         assert 1.5 <= shown <= 1.8
 
     def test_after_unsupported_only_the_item_is_sent(self) -> None:
@@ -192,11 +192,11 @@ class TestGuided:
         pair = Pair(takes_modes=False).driving()
         pair.party.plans.upload(PLAN)
         pair.run(1)
-        begun = pair.now
+        active = pair.now
         pair.party.operator.go_on()
         pair.run(6)
         assert pair.party.qgc.count_sent("SET_MODE") == 3
-        assert pair.popup_at(guided.NOT_STARTED.format("Mission")) - begun == pytest.approx(
+        assert pair.popup_at(guided.NOT_STARTED.format("Mission")) - active == pytest.approx(
             3.9, abs=0.2
         )
 

@@ -64,7 +64,7 @@ MakeRoles = Callable[..., World]
 
 @pytest.fixture
 def with_roles(make_world: MakeWorld) -> MakeRoles:
-    """Give a factory of worlds in which addresses have roles, with limits."""
+    """Return a factory of worlds in which addresses have roles, with limits."""
 
     def make(*, guided: str = "queue", **limits: Limits) -> World:
         roles = Roles(unsigned="safety", addresses=ADDRESSES, **limits)
@@ -84,7 +84,7 @@ def answer(world: World, sent: Sent) -> tuple[int, int] | None:
     return sent.answer
 
 
-def begun(world: World, distance: float, *, who: FakeClient | None = None) -> int:
+def active(world: World, distance: float, *, who: FakeClient | None = None) -> int:
     """Have a task driven; gives its id."""
     sent = (who or world.client).move(distance)
     assert answer(world, sent) == (ACCEPTED, sent.task_id)
@@ -129,7 +129,7 @@ REFUSED: dict[str, Callable[[FakeClient], Sent]] = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_an_observer_changes_nothing(with_roles: MakeRoles, what: str) -> None:
     world = with_roles()
-    task = begun(world, 4.0)
+    task = active(world, 4.0)
     world.until_state(task, S.EXECUTING)
     observer = join(world, OBSERVER)
     before = world.tasks()
@@ -223,7 +223,7 @@ def test_only_an_operator_releases_a_stop_which_is_kept_with_its_sender(
 ) -> None:
     world = with_roles()
     people = {number: join(world, number) for number in (OBSERVER, SUBMITTER, OPERATOR)}
-    task = begun(world, 20.0)
+    task = active(world, 20.0)
     assert answer(world, people[OBSERVER].stop()) == (ACCEPTED, task)
     assert world.paused() is R.STOPPED
     (pause,) = world.events(QueuePaused)
@@ -298,7 +298,7 @@ def test_a_submitter_does_not_exceed_its_limits(with_roles: MakeRoles) -> None:
 def test_its_tasks_drive_no_faster_whoever_sets_the_speed(with_roles: MakeRoles) -> None:
     world = with_roles(submitter=Limits(max_speed=0.2))
     submitter, operator = join(world, SUBMITTER), join(world, OPERATOR)
-    task = begun(world, 2.0, who=submitter)
+    task = active(world, 2.0, who=submitter)
     operator.command(CHANGE_SPEED, 1, 1.5)
     fastest = 0.0
 
@@ -367,7 +367,7 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
 def test_a_submitter_makes_no_task_pre_emptive(with_roles: MakeRoles) -> None:
     world = with_roles()
     submitter = join(world, SUBMITTER)
-    running = begun(world, 3.0)
+    running = active(world, 3.0)
     waiting = submitter.move(1.0)
     world.run(0.2)
     sent = submitter.command(MODIFY, waiting.task_id, PREEMPTIVE, 1)
@@ -380,7 +380,7 @@ def test_a_submitter_makes_no_task_pre_emptive(with_roles: MakeRoles) -> None:
 
 def test_who_may_submit_no_more_calls_off_nothing_by_command_cancel(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(roles=Roles(unsigned="submitter")))
-    running = begun(world, 3.0)
+    running = active(world, 3.0)
     observers = Settings(roles=Roles(unsigned="observer"))
     world.server.engine.handle(SettingsChanged(observers), now=world.now)
     cancel = Packer().pack(m.CommandCancel(1, 191, MOVE), Address(255, 190), seq=200)
@@ -439,7 +439,7 @@ def test_who_only_watches_is_no_operator_who_is_there(make_world: MakeWorld) -> 
     """A rover that waits for its operator must not take somebody who may do nothing for him."""
     roles = Roles(unsigned="observer", addresses={"255/190": "operator"})
     world = make_world(settings=Settings(roles=roles, operator_lost="pause"))
-    task = begun(world, 30.0)
+    task = active(world, 30.0)
     observer = join(world, OBSERVER)
     observer.stream(heartbeat(), rate=4)
     world.client.heartbeats = False

@@ -38,7 +38,7 @@ def signed_world(make_world: MakeWorld, *, records: Path | None = None) -> World
 
 
 def sent_to_rover(world: World) -> list[bytes]:
-    """Give the list that all packets to the first rover are noted in from now on."""
+    """Return the list that all packets to the first rover are noted in from now on."""
     sent: list[bytes] = []
 
     def listen(source: str, target: str, data: bytes) -> bool:

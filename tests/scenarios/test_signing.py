@@ -27,7 +27,7 @@ COMMAND_LONG = 76
 
 
 def put(world: World, *keys: Key, takes_unsigned: bool = False, setup: str = "known") -> World:
-    """Give a server its keys, and its link for clients a policy."""
+    """Return a server its keys, and its link for clients a policy."""
     server, now = world.server, world.now
     settings = Settings(signing=Signing(setup=setup))
     if settings != Settings():
@@ -48,7 +48,7 @@ def signing(world: World, key: Key, *, behind: float = 0.0, name: str = "signer"
 
 
 def counts(world: World) -> tuple[int, int, int]:
-    """Give the packets refused: unsigned, of no key, and old."""
+    """Return the packets refused: unsigned, of no key, and old."""
     found = world.server.engine.signatures.counts
     return found.unsigned, found.unverified, found.old
 
@@ -162,7 +162,7 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def kept(make_world: MakeWorld, path: Path) -> World:
-    """Give a world whose server keeps everything on a disk."""
+    """Return a world whose server keeps everything on a disk."""
     return make_world(store=PromptSqliteStore(path, wall_offset=UTC))
 
 

@@ -18,7 +18,7 @@ FIND = 1.0  # s, in which a server that is there is found: no rover's heartbeat 
 
 @pytest.fixture
 def make_world() -> Iterator[MakeWorld]:
-    """Give a factory of worlds whose server has started and heard its rovers."""
+    """Return a factory of worlds whose server has started and heard its rovers."""
     worlds: list[RoverWorld] = []
 
     def make(*, is_silent: bool = False, **options: Any) -> RoverWorld:

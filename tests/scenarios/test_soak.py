@@ -108,7 +108,7 @@ def test_a_task_that_the_server_forgets_is_missed(world: SoakWorld) -> None:
     drive(world)
     world.client.move(1, nonce=8)
     world.run(0.1)
-    del world.server.engine._book._tasks[2]  # type: ignore[arg-type]
+    del world.server.engine._registry._tasks[2]  # type: ignore[arg-type]
     with pytest.raises(Violation, match="task 2 was accepted, and is lost"):
         world.run(1.1)
 
@@ -141,7 +141,7 @@ def test_one_submission_that_becomes_two_tasks_is_noticed(
 
 
 def called_off(world: SoakWorld) -> list[Event]:
-    """Give what the journal has of a submission that was called off and then not stored in time."""
+    """Return the journal of a submission that was withdrawn and then not stored in time."""
     world.disk_store.delay = 1.0
     first = world.client.move(1, nonce=7)
     world.run(0.1)

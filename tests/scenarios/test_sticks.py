@@ -40,7 +40,7 @@ def body_of(frame: Frame, start: object) -> object:
 
 
 def stands_after(world: World) -> float:
-    """Give the seconds after which it stands for good."""
+    """Return the seconds after which it stands for good."""
     began, moved = world.now, world.now
     while world.now < began + 12.0:
         world.run(0.05)

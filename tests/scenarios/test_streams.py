@@ -131,7 +131,7 @@ def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: Wor
     world.until_state(1, S.EXECUTING)
     world.run(1)
     assert not any(outgoing.is_first for outgoing in sent)
-    words = world.server.engine.last_words
+    words = world.server.engine.emergency_stop_packets
     assert [outgoing.is_first for outgoing in words] == [False, True]  # zero, HOLD
     world.client.stop()
     world.until(world.stands, within=3)

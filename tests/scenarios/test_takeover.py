@@ -124,7 +124,7 @@ def test_pushed_off_its_line_by_more_than_a_metre_it_is_held(driving: World) -> 
     assert abs(world.truth.east) > 1.0
     world.client.proceed()
     world.run(2)
-    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    assert world.state(1) == (S.HELD, R.OFF_TRACK)
     assert world.state(2)[0] is S.QUEUED
     assert world.stands()
 

@@ -54,7 +54,7 @@ def test_each_change_has_its_severity(world: World) -> None:
 
 
 def severities(world: World) -> dict[str, int]:
-    """Give what the task server has said, with the severity of each."""
+    """Return what the task server has said, with the severity of each."""
     return {m.text: m.severity for m in world.client.of_type("STATUSTEXT")}
 
 

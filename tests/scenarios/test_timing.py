@@ -60,7 +60,7 @@ def of_journal(world: World, new: S) -> Timing:
 
 
 def captured(world: World) -> list[float]:
-    """Give the list that the times of all setpoints to rovers end up in."""
+    """Return the list that the times of all setpoints to rovers end up in."""
     times: list[float] = []
 
     def sees(source: str, target: str, data: bytes) -> bool:

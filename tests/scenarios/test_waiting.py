@@ -129,9 +129,9 @@ def test_a_task_is_as_urgent_as_who_waits_for_it(world: World) -> None:
     running = submit(world, 0.5)
     usual = submit(world, priority=7)
     needed = submit(world, priority=1)
-    urgent = submit(world, after=needed, priority=9)
+    immediate = submit(world, after=needed, priority=9)
     world.until_idle(tasks=4)
-    assert order_of_start(world) == [running, needed, urgent, usual]
+    assert order_of_start(world) == [running, needed, immediate, usual]
 
 
 @pytest.mark.parametrize(

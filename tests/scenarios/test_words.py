@@ -30,7 +30,7 @@ def station(world: World) -> FakeClient:
 
 
 def said(client: FakeClient) -> dict[str, int]:
-    """Give the first pieces of the texts, and their severity."""
+    """Return the first pieces of the texts, and their severity."""
     return {m.text: m.severity for m in client.of_type("STATUSTEXT") if not m.chunk_seq}
 
 

@@ -98,7 +98,7 @@ def test_a_wrong_heading_is_found_within_half_a_metre(
     GOALS[goal](world, speed)
     world.until(lambda: is_over(world), within=20)
     world.client.rotate(90)
-    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    assert world.state(1) == (S.HELD, R.OFF_TRACK)
     nothing_follows(world)
     assert way.furthest < WRONG[speed]
     assert any("is its heading right?" in text for text in world.client.texts())
@@ -119,7 +119,7 @@ def test_wheels_that_turn_the_wrong_way_are_found_within_half_a_metre(
     way = Way(world)
     world.client.move(20, speed=speed)
     world.until(lambda: is_over(world), within=20)
-    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    assert world.state(1) == (S.HELD, R.OFF_TRACK)
     nothing_follows(world)
     assert way.furthest < WRONG[speed]
 
@@ -141,7 +141,7 @@ def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_
     world.watch(look)
     world.client.move(20, speed=speed)
     world.until(lambda: is_over(world), within=30)
-    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    assert world.state(1) == (S.HELD, R.OFF_TRACK)
     nothing_follows(world)
     assert 1.0 < furthest < beside
 
@@ -288,7 +288,7 @@ def test_a_heading_that_stands_while_it_drives_a_curve_is_found(world: World) ->
     world.client.command(DRIVE, SLOW, 30, 60)  # a circle of 1 m
     way = Way(world)
     world.until(lambda: is_over(world), within=20)
-    assert world.state(1) == (S.HELD, R.OFF_LINE)
+    assert world.state(1) == (S.HELD, R.OFF_TRACK)
     nothing_follows(world)
     assert way.furthest < 2.1
 
@@ -303,7 +303,7 @@ def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
     world.run(0.5)
     world.client.command(DRIVE, speed, 0, 60)
     world.until(lambda: is_over(world), within=20)
-    assert world.state(1) in ((S.HELD, R.OFF_LINE), (S.HELD, R.FENCE))
+    assert world.state(1) in ((S.HELD, R.OFF_TRACK), (S.HELD, R.FENCE))
     nothing_follows(world)
     assert world.truth.north < WRONG[speed]
 

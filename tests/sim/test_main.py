@@ -277,7 +277,7 @@ def test_without_pybullet_the_rover_is_the_kinematic_one_and_says_so(tmp_path: P
 
 
 def without_pybullet(folder: Path) -> str:
-    """Give a path for imports on which pybullet cannot be had."""
+    """Return a path for imports on which pybullet cannot be had."""
     (folder / "pybullet.py").write_text('raise ImportError("not installed")\n')
     return os.pathsep.join((str(folder), str(ROOT), str(ROOT / "sim")))
 

@@ -24,7 +24,7 @@ def speed(wish: float) -> Item:
 
 
 def survey() -> tuple[list[Item], dict[int, tuple[float, float]], list[int]]:
-    """Give 60 items, the place in metres of each that is driven to, and the order of all."""
+    """Return 60 items, the place in metres of each that is driven to, and the order of all."""
     items = [Item(WAYPOINT, frame=0, current=1)]
     places: dict[int, tuple[float, float]] = {}
 

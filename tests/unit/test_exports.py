@@ -27,8 +27,8 @@ def test_the_engine_has_five_methods_and_two_views() -> None:
 
 def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
     engine = Engine(settings.Settings(), now=0.0)
-    assert public(engine) == ["last_words", "not_in_force", "signatures"]
-    assert (engine.last_words, engine.not_in_force) == ((), ())
+    assert public(engine) == ["emergency_stop_packets", "not_in_force", "signatures"]
+    assert (engine.emergency_stop_packets, engine.not_in_force) == ((), ())
 
 
 def test_time_comes_in_as_a_keyword() -> None:

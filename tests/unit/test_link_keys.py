@@ -7,7 +7,7 @@ import pytest
 from mav_tasks.errors import InsecureLinkError, UsageError
 from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
 from mav_tasks.link_keys import check_keys, in_words
-from mav_tasks.links.asked import links_of
+from mav_tasks.links.config_check import links_of
 from mav_tasks.settings import Links
 
 AT = datetime(2026, 11, 21, 14, 30, tzinfo=UTC)

@@ -48,7 +48,7 @@ class FakeLink:
 class Driving(Probe):
     """One that has a rover in its hands."""
 
-    def last_words(self) -> list[bytes]:
+    def emergency_stop_packets(self) -> list[bytes]:
         return [b"zero", b"hold"]
 
 

@@ -70,17 +70,17 @@ def test_a_failing_store_is_told_to_the_engine_and_ends_nothing(
 
 
 class Failing:
-    """A witness that fails in one of its methods."""
+    """An observer that fails in one of its methods."""
 
     def __init__(self, method: str) -> None:
         self._method = method
         self.told: list[str] = []
 
-    def took_in(self, item: object, *, now: float) -> None:
-        self._tell("took_in")
+    def on_input(self, item: object, *, now: float) -> None:
+        self._tell("on_input")
 
-    def gave_out(self, packets: object, events: object, *, now: float) -> None:
-        self._tell("gave_out")
+    def on_output(self, packets: object, events: object, *, now: float) -> None:
+        self._tell("on_output")
 
     def close(self) -> None:
         self._tell("close")
@@ -91,12 +91,12 @@ class Failing:
             raise ValueError(method)
 
 
-@pytest.mark.parametrize("method", ["took_in", "gave_out", "close"])
-def test_a_witness_that_fails_is_let_go_and_ends_nothing(
+@pytest.mark.parametrize("method", ["on_input", "on_output", "close"])
+def test_an_observer_that_fails_is_let_go_and_ends_nothing(
     method: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     failing, other = Failing(method), Failing("never")
-    pump = Pump(Engine(Settings(), now=0.0), MemoryStore(), send, witnesses=[failing, other])
+    pump = Pump(Engine(Settings(), now=0.0), MemoryStore(), send, observers=[failing, other])
     link = LinkChanged("clients", LinkSide.CLIENTS, up=True, peers=("somebody",))
     vehicles = LinkChanged("vehicles", LinkSide.VEHICLES, up=True, peers=("rover",))
     for now in (0.0, 1.0):
@@ -106,8 +106,8 @@ def test_a_witness_that_fails_is_let_go_and_ends_nothing(
         pump.turn(now=now)
     pump.close()
     assert failing.told.count(method) == 1
-    assert other.told.count("took_in") == 6
-    assert other.told.count("gave_out") >= 2
+    assert other.told.count("on_input") == 6
+    assert other.told.count("on_output") >= 2
     assert other.told[-1] == "close"
     assert [record.levelname for record in caplog.records] == ["ERROR"]
 
@@ -248,7 +248,7 @@ class FakeStream:
         told, self.told = self.told, []
         return told
 
-    def tend(self) -> None:
+    def poll(self) -> None:
         self.tends.put_nowait(None)
 
     def close(self) -> None:
@@ -411,7 +411,7 @@ class Broken(Recorder):
     def __init__(self) -> None:
         super().__init__()
         zero, hold = (Outgoing("stream", "peer", word) for word in (b"zero", b"hold"))
-        self.last_words = (zero, hold._replace(is_first=True))
+        self.emergency_stop_packets = (zero, hold._replace(is_first=True))
 
     def handle(self, item: object, *, now: float) -> None:
         super().handle(item, now=now)

@@ -49,7 +49,7 @@ class Noting(Engine):
         return self.due
 
     def take(self, *kinds: type) -> list[object]:
-        """Give the inputs of these kinds, each once."""
+        """Return the inputs of these kinds, each once."""
         found = [item for _, item in self.inputs if isinstance(item, kinds)]
         self.inputs = [each for each in self.inputs if not isinstance(each[1], kinds)]
         return found

@@ -49,7 +49,7 @@ def mode(path: Path) -> int:
 
 
 def modes_below(folder: Path) -> tuple[set[int], set[int]]:
-    """Give the modes of all files and of all folders."""
+    """Return the modes of all files and of all folders."""
     found = list(folder.rglob("*"))
     files = {mode(path) for path in found if path.is_file()}
     return files, {mode(path) for path in found if path.is_dir()}

@@ -208,7 +208,7 @@ def golden() -> list[dict[str, Any]]:
 
 
 def _signed(mav: Any, message: Any, number: int) -> str:
-    """Give it with pymavlink's signature; as the guide's, the times of some need six bytes."""
+    """Return it with pymavlink's signature; as the guide's, the times of some need six bytes."""
     mav.signing.secret_key = SECRET
     mav.signing.sign_outgoing = True
     mav.signing.link_id = LINK_IDS[number % len(LINK_IDS)]

@@ -35,7 +35,7 @@ class Pair:
 
 
 def measure(revision: str, names: Sequence[str], *, rounds: int) -> list[Pair]:
-    """Give what each measurement says of both servers."""
+    """Return what each measurement says of both servers."""
     pairs: list[Pair] = []
     with checked_out(revision) as tree:
         for name in names:
@@ -48,7 +48,7 @@ def measure(revision: str, names: Sequence[str], *, rounds: int) -> list[Pair]:
 
 
 def render(pairs: Sequence[Pair]) -> str:
-    """Give the table as text."""
+    """Return the table as text."""
     return table.aligned([HEAD, *map(_cells, pairs)])
 
 
@@ -81,7 +81,7 @@ def _numbers(rounds: Sequence[dict[str, str]], what: str) -> tuple[float, ...]:
 
 
 def _unit(figure: str) -> str:
-    """Give what stands behind the first number."""
+    """Return what stands behind the first number."""
     behind = NUMBER.split(figure, maxsplit=1)[1]
     return behind.partition(",")[0].strip()
 

@@ -59,14 +59,14 @@ def simulated_rovers(count: int, port: int) -> Iterator[None]:
 
 
 def free_port() -> int:
-    """Give a UDP port of the loopback interface that nobody has at the moment."""
+    """Return a UDP port of the loopback interface that nobody has at the moment."""
     with udp_socket() as probe:
         port: int = probe.getsockname()[1]
         return port
 
 
 def udp_socket(port: int = 0) -> socket.socket:
-    """Give a bound loopback UDP socket that waits at most a second."""
+    """Return a bound loopback UDP socket that waits at most a second."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
     sock.bind((HOST, port))

@@ -37,7 +37,7 @@ PAGE = 4_096  # bytes
 
 
 def measure(profile: str | None = None) -> list[Row]:
-    """Give the rows of latency and of rate, with the store in memory."""
+    """Return the rows of latency and of rate, with the store in memory."""
     packets = _packets()
     echo = _echo(packets)
     ours = _server(packets, *(() if profile is None else ("--profile", profile)))
@@ -56,7 +56,7 @@ def measure(profile: str | None = None) -> list[Row]:
 
 
 def measure_durable() -> list[Row]:
-    """Give the same with the store on a disk, beside an echo and one fsync of that disk."""
+    """Return the same with the store on a disk, beside an echo and one fsync of that disk."""
     packets = _packets()
     with TemporaryDirectory(dir=Path.cwd()) as folder:  # the disk that the project is on
         sync = _fsync(Path(folder))
@@ -80,7 +80,7 @@ def measure_durable() -> list[Row]:
 
 
 def measure_recorded() -> list[Row]:
-    """Give latency and rate with each kind of record, beside those without any."""
+    """Return latency and rate with each kind of record, beside those without any."""
     packets = _packets()
     without = _server(packets)
     rows: list[Row] = []
@@ -115,7 +115,7 @@ def _server(packets: list[bytes], *options: str) -> tuple[float, float, float]:
 
 
 def _fsync(folder: Path) -> tuple[float, float]:
-    """Give p50 and p99, in seconds, of appending a page to a file and forcing it to the disk."""
+    """Return p50 and p99, in seconds, of appending a page to a file and forcing it to the disk."""
     times: list[float] = []
     with (folder / "bare").open("ab", buffering=0) as file:
         for _ in range(SYNCS):
@@ -145,7 +145,7 @@ def _run(
     answer_id: int,
     vehicle: ScriptedVehicle | None,
 ) -> tuple[float, float, float]:
-    """Give p50 and p99 in seconds with one outstanding, and answers a second with many."""
+    """Return p50 and p99 in seconds with one outstanding, and answers a second with many."""
     supply = iter(packets)
     _one_by_one(client, list(islice(supply, WARM_UP)), answer_id, vehicle)
     times = _one_by_one(client, list(islice(supply, ONE_BY_ONE)), answer_id, vehicle)
@@ -173,7 +173,7 @@ def _one_by_one(
 def _many(
     client: socket.socket, packets: list[bytes], answer_id: int, vehicle: ScriptedVehicle | None
 ) -> float:
-    """Give the answers a second while OUTSTANDING commands are under way."""
+    """Return the answers a second while OUTSTANDING commands are under way."""
     client.settimeout(PATIENCE)
     supply = iter(packets)
     answered = lost = under_way = 0

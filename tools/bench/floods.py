@@ -47,7 +47,7 @@ class Figures:
 
 
 def measure() -> list[Row]:
-    """Give the rows of every kind of flood."""
+    """Return the rows of every kind of flood."""
     calm = _figures("")
     return [row for kind in KINDS for row in _rows(kind, _figures(kind), calm)]
 
@@ -162,7 +162,7 @@ def _setpoints(kind: str) -> tuple[list[float], int]:
 
 
 def _server_of(port: int) -> int:
-    """Give the process of ours that has a port: children of this one are few."""
+    """Return the process of ours that has a port: children of this one are few."""
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
             words = (folder / "cmdline").read_bytes().split(b"\0")
@@ -172,7 +172,7 @@ def _server_of(port: int) -> int:
 
 
 def _resident(process: int) -> int:
-    """Give the memory that a process holds, in kB."""
+    """Return the memory that a process holds, in kB."""
     pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") // KILOBYTE
 

@@ -26,7 +26,7 @@ GOAL = 0.6
 
 
 def measure(profile: str | None = None) -> list[Row]:
-    """Give the row of forwarding."""
+    """Return the row of forwarding."""
     bare, ours = _bare(), _ours(profile)
     return [
         Row(
@@ -61,7 +61,7 @@ def _ours(profile: str | None) -> float:
 
 
 def _rate(vehicle: socket.socket, client: socket.socket, to: tuple[str, int]) -> float:
-    """Give the packets a second that reach the client."""
+    """Return the packets a second that reach the client."""
     vehicle.connect(to)
     client.settimeout(PATIENCE)
     packets = cycle(_telemetry())

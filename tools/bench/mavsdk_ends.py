@@ -77,7 +77,7 @@ def _connect(url: str, stack: ExitStack) -> Any:
 
 
 def _items(count: int, number: int) -> list[Any]:
-    """Give a line of waypoints, a metre apart; no two numbers have one in common."""
+    """Return a line of waypoints, a metre apart; no two numbers have one in common."""
     return [
         MissionItem(
             seq=seq,
@@ -104,7 +104,7 @@ def _compare(url: str, came: list[Any], sent: list[Any]) -> None:
 
 
 def _as_came(item: Any) -> Any:
-    """Give an item as the library has it: float32, as on the wire."""
+    """Return an item as the library has it: float32, as on the wire."""
     return MissionItem.from_c_struct(item.to_c_struct())
 
 

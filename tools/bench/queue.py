@@ -11,10 +11,10 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.store.sqlite import SqliteStore
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import Move
+from mav_tasks.tasks.pending_tasks import PendingTasks
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
-from mav_tasks.tasks.waiting_room import WaitingRoom
 
 from .table import Row
 
@@ -29,7 +29,7 @@ KEPT_EVENTS = 10_000
 
 
 def measure() -> list[Row]:
-    """Give the rows of time, memory and restart."""
+    """Return the rows of time, memory and restart."""
     tame_collector()  # as the server does
     few, _ = _times(FEW)
     many, kept = _times(MANY)
@@ -67,9 +67,9 @@ def _draft(number: int) -> Draft:
     return Draft(1, 54000, Move(1.0 + number), SUBMITTER, Terms(priority=number % 11), marks)
 
 
-def _fill(count: int) -> tuple[TaskBook, WaitingRoom]:
-    book = TaskBook()
-    room = WaitingRoom(book, SETTINGS)
+def _fill(count: int) -> tuple[TaskRegistry, PendingTasks]:
+    book = TaskRegistry()
+    room = PendingTasks(book, SETTINGS)
     for number in range(count):
         room.submit(_draft(number), now=number * 1e-3)
         if number % KEPT_EVENTS == 0:
@@ -79,7 +79,7 @@ def _fill(count: int) -> tuple[TaskBook, WaitingRoom]:
 
 
 def _times(count: int) -> tuple[float, float]:
-    """Give seconds for each task submitted and taken, and bytes for each that waits."""
+    """Return seconds for each task submitted and taken, and bytes for each that waits."""
     book, room = _fill(count)
     drafts = [_draft(count + number) for number in range(SAMPLE)]
     start = perf_counter()
@@ -100,12 +100,12 @@ def _times(count: int) -> tuple[float, float]:
 
 
 def _restart() -> float:
-    """Give the seconds from opening the store to an engine that has all tasks again."""
+    """Return the seconds from opening the store to an engine that has all tasks again."""
     with TemporaryDirectory(dir=Path.cwd()) as folder:
         path = Path(folder) / "tasks.sqlite3"
         store = SqliteStore(path, wall_offset=_no_offset)
-        book = TaskBook()
-        room = WaitingRoom(book, SETTINGS)
+        book = TaskRegistry()
+        room = PendingTasks(book, SETTINGS)
         for number in range(MANY):
             room.submit(_draft(number), now=monotonic())
         store.append(book.take_events())

@@ -67,10 +67,10 @@ def meet(vehicle: ScriptedVehicle, client: socket.socket, server: tuple[str, int
 
 
 def loopback(port: int) -> tuple[str, int]:
-    """Give the address of a port of this machine."""
+    """Return the address of a port of this machine."""
     return (HOST, port)
 
 
 def ground_station() -> m.Heartbeat:
-    """Give the heartbeat of a ground station."""
+    """Return the heartbeat of a ground station."""
     return m.Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)

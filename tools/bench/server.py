@@ -23,7 +23,7 @@ from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink import messages as m
-from mav_tasks.recording import witnesses
+from mav_tasks.recording import observers
 from mav_tasks.runner import Runner
 from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Clients, Limits, Log, Queueing, Recording, Roles, Settings
@@ -82,12 +82,12 @@ async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
     settings = _settings(drives=options.drive, is_limited=options.default_limits)
     engine = Engine(settings, now=now)
     recording = Recording(tlog=options.tlog, decisions=options.record)
-    recorders = witnesses(recording, settings, None, now=now)
+    recorders = observers(recording, settings, None, now=now)
     tame_collector()
     clients = [UdpLink(LinkUrl("udpin", HOST, options.client_port))]
     print(READY, flush=True)
     return await Runner(
-        engine, store, clients=clients, vehicles=[vehicle_link], witnesses=recorders
+        engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders
     ).run()
 
 

@@ -21,7 +21,7 @@ EACH = 0.003  # s between the submissions to two rovers
 
 
 def measure() -> list[Row]:
-    """Give a row for each number of rovers."""
+    """Return a row for each number of rovers."""
     return [_row(rovers, _errors(rovers)) for rovers in ROVERS]
 
 

@@ -27,7 +27,7 @@ GOAL = 0.6
 
 
 def measure() -> list[Row]:
-    """Give the row of the simulation; where pybullet is missing, a row that says so."""
+    """Return the row of the simulation; where pybullet is missing, a row that says so."""
     try:
         plain = _plain()
     except MissingExtra as missing:

@@ -29,7 +29,7 @@ LIBRARY = "from mav_tasks import Client, Move"
 
 
 def measure() -> list[Row]:
-    """Give the rows of start and help."""
+    """Return the rows of start and help."""
     python = median(_run(sys.executable, "-c", "pass") for _ in range(REPEATS))
     start = median(_first_heartbeat() for _ in range(REPEATS))
     shown = median(_run(str(MAV_TASKS), "--help") for _ in range(REPEATS))

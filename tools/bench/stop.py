@@ -21,7 +21,7 @@ BEAT = 0.5  # s, between the vehicle's heartbeats
 
 
 def measure() -> list[Row]:
-    """Give the rows without and with the flood."""
+    """Return the rows without and with the flood."""
     calm, flooded = _times(0), _times(FLOOD)
     return [
         _row("STOP → zero setpoint, p99", flooded[1], calm[1], goal=GOAL),

@@ -23,7 +23,7 @@ HEAD = ("what", "figure", "yardstick", "ratio", "goal", "met")
 
 
 def render(rows: Sequence[Row]) -> str:
-    """Give the table as text, columns aligned."""
+    """Return the table as text, columns aligned."""
     verdict = {True: "yes", False: "NO", None: ""}
     cells = [HEAD] + [
         (row.what, row.figure, row.yardstick, row.ratio, row.goal, verdict[row.met]) for row in rows
@@ -32,7 +32,7 @@ def render(rows: Sequence[Row]) -> str:
 
 
 def aligned(cells: Sequence[Sequence[str]]) -> str:
-    """Give cells as text, columns aligned, with a line under the first row."""
+    """Return cells as text, columns aligned, with a line under the first row."""
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = ["  ".join(cell.ljust(w) for cell, w in zip(c, widths, strict=True)) for c in cells]
     lines.insert(1, "  ".join("-" * width for width in widths))

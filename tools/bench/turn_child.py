@@ -166,7 +166,7 @@ class Stand:
                 self._live()
 
     def move(self) -> bytes:
-        """Give a packet that submits another task."""
+        """Return a packet that submits another task."""
         self._submitted += 1
         return self._command(MOVE, 1.0, 0.0, 0.0, self._submitted, 0.0, 0.0, 5.0)
 
@@ -225,7 +225,7 @@ class Stand:
 
 
 def stand_with_queue() -> Stand:
-    """Give an engine as it is when turns are measured."""
+    """Return an engine as it is when turns are measured."""
     stand = Stand(base_mode=CUSTOM | ARMED)
     stand.run(MEETING)
     for _ in range(WAITING):
@@ -235,7 +235,7 @@ def stand_with_queue() -> Stand:
 
 
 def counted_turn() -> dict[str, Any]:
-    """Give the calls of one turn; the first few are those of an engine that is not warm yet."""
+    """Return the calls of one turn; the first few are those of an engine that is not warm yet."""
     stand = stand_with_queue()
     for _ in range(3):
         stand.run(3 * APART)
@@ -246,7 +246,7 @@ def counted_turn() -> dict[str, Any]:
 
 
 def counted_wake_ups() -> list[dict[str, Any]]:
-    """Give the calls of each wake-up of some seconds in which nothing happens."""
+    """Return the calls of each wake-up of some seconds in which nothing happens."""
     stand = Stand(base_mode=CUSTOM)
     stand.run(SETTLED)
     counted: list[dict[str, Any]] = []
@@ -262,7 +262,7 @@ def counted_wake_ups() -> list[dict[str, Any]]:
 
 
 def cpu(turns: int) -> float:
-    """Give the processor's seconds of one turn, on average over about so many."""
+    """Return the processor's seconds of one turn, on average over about so many."""
     clock, rounds = Clock(), -(-turns // AT_ONCE)
     for _ in range(rounds):
         stand = stand_with_queue()

@@ -30,7 +30,7 @@ GOAL_CPU = 2.0  # times less than the other revision
 
 
 def measure(against: str = FIRST, *, names: int = 0) -> list[Row]:
-    """Give the rows of calls and time; ``names``: so many functions are printed, by their calls."""
+    """Return the rows of calls and time; print the ``names`` most called functions."""
     with ExitStack() as stack:
         theirs = stack.enter_context(_asked(stack.enter_context(checked_out(against))))
         ours = stack.enter_context(_asked(ROOT))

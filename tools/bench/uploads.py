@@ -20,7 +20,7 @@ GOAL = 3.0  # times MAVSDK's own
 
 
 def measure(profile: str | None = None) -> list[Row]:
-    """Give two rows for each number of items; each upload is acknowledged once it is durable."""
+    """Return two rows for each number of items; each upload is acknowledged once it is durable."""
     port, vehicle_port, mavsdk_port = free_port(), free_port(), free_port()
     url, mavsdk_url = f"udpout://{HOST}:{port}", f"udpout://{HOST}:{mavsdk_port}"
     with TemporaryDirectory(dir=Path.cwd()) as folder:  # the disk that the project is on

@@ -10,7 +10,7 @@ from copy import copy
 from typing import Any
 
 from mav_tasks.engine.clients.gcs_side import Received
-from mav_tasks.engine.missions.mission_desk import MESSAGES as MISSION_MESSAGES
+from mav_tasks.engine.missions.mission_server import MESSAGES as MISSION_MESSAGES
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m

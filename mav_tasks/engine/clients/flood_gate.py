@@ -60,7 +60,7 @@ class FloodGates:
             )
 
     def let_in(self, item: Packets, *, now: float) -> Packets:
-        """Give what is looked at of what came in."""
+        """Return what is looked at of what came in."""
         gate = self._gates.get(item.link)
         if gate is None:
             return item
@@ -76,7 +76,7 @@ class FloodGates:
 
 
 def stops_in(data: bytes) -> bytes:
-    """Give what of a datagram looks like STOPs, one after the other; b"" if nothing does."""
+    """Return what of a datagram looks like STOPs, one after the other; b"" if nothing does."""
     found = islice(_STOP.finditer(data), MOST_STOPS)
     return b"".join(_packet_at(data, each.start()) for each in found)
 
@@ -109,7 +109,7 @@ class FloodGate:
         self._buckets.clear()
 
     def let_in(self, datagrams: Datagrams, *, now: float) -> Datagrams:
-        """Give those that are looked at: the very same, where all are."""
+        """Return those that are looked at: the very same, where all are."""
         buckets = self._buckets
         let_in: list[tuple[Peer, bytes]] = []
         left_out = 0

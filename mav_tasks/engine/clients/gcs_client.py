@@ -7,14 +7,14 @@ from math import inf
 from mav_tasks.engine.clients.rights import NOTHING, Rights
 from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
 from mav_tasks.services.command_receiver import Answer, Pending
-from mav_tasks.services.message_interval import Thinner
+from mav_tasks.services.message_interval import StreamRateLimiter
 from mav_tasks.services.task_status import TaskStatusSender
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Clients
@@ -40,7 +40,7 @@ class GcsClient:
 
     def __init__(
         self,
-        outlet: Outlet,
+        outlet: PacketSender,
         *,
         settings: Clients,
         wake: Callable[[float], None],
@@ -78,7 +78,7 @@ class GcsClient:
         #: has used our dialect: gets TASK_STATUS
         self.uses_dialect = False
         self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
-        self.thinner = Thinner(default_interval=settings.stream_interval)
+        self.thinner = StreamRateLimiter(default_interval=settings.stream_interval)
         self.statuses = TaskStatusSender(rate=settings.status_rate, wake=wake, now=now)
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
@@ -114,7 +114,7 @@ class GcsClient:
         return self.waited > OLD
 
     def submitter(self, source: Address) -> Submitter:
-        """Give who submits when a packet of ``source`` comes from here."""
+        """Return who submits when a packet of ``source`` comes from here."""
         submitter = self._submitters.get((source, self.signed_by.name))
         if submitter is None:
             if len(self._submitters) >= MAX_ADDRESSES:

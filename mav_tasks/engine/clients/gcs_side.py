@@ -12,7 +12,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.rights import RightsBook
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
 from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -107,7 +107,7 @@ class GcsSide:
         """Keep telemetry from a way out that does not take it."""
         client = self._clients.get((change.link, change.peer))
         if client is not None:
-            client.thinner.stretch.note(change.is_congested, now=now)
+            client.thinner.backoff.note(change.is_congested, now=now)
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
@@ -251,7 +251,7 @@ class GcsSide:
         self, link: str, peer: Peer, *, is_configured: bool, is_connected: bool, now: float
     ) -> GcsClient:
         return GcsClient(
-            Outlet(link, peer, self._queue, self._packer, self._signatures),
+            PacketSender(link, peer, self._queue, self._packer, self._signatures),
             settings=self._settings.clients,
             wake=self._statuses.bring_forward,
             is_configured=is_configured,

@@ -22,7 +22,7 @@ from mav_tasks.services import param_receiver
 from mav_tasks.services.param_receiver import HASH_CHECK, name_in
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Submitter
 
@@ -43,14 +43,14 @@ class _Wish(NamedTuple):
     value: float
 
 
-class ParameterDesk:
+class ParameterServer:
     """Answers about the server's parameters, and the settings that follow from them."""
 
     def __init__(
         self,
         gcs: GcsSide,
         vehicles: VehicleSide,
-        book: TaskBook,
+        registry: TaskRegistry,
         submissions: Submissions,
         *,
         settings: Settings,
@@ -58,7 +58,7 @@ class ParameterDesk:
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
-        self._book = book
+        self._registry = registry
         self._submissions = submissions
         self._configured = settings
         self._kept = dict(kept)
@@ -90,7 +90,7 @@ class ParameterDesk:
         return self._settings
 
     def take_change(self) -> Settings:
-        """Give the settings after a change that is in force now."""
+        """Return the settings after a change that is in force now."""
         self.is_changed = False
         return self._settings
 
@@ -170,7 +170,7 @@ class ParameterDesk:
         except Rejection as refusal:
             self._refuse(wish, refusal.text, MavParamError.PERMISSION_DENIED, now=now)
             return
-        self._book.record(ParameterSet(name, value, str(wish.who), now))
+        self._registry.record(ParameterSet(name, value, str(wish.who), now))
         self._pending[name] = wish
         self._submissions.gate.hold(wish, now=now)
 
@@ -200,7 +200,7 @@ class ParameterDesk:
 
     def _record_kept(self, wish: _Wish, *, now: float) -> None:
         kept = self._kept.get(wish.name)
-        self._book.record(ParameterSet(wish.name, kept, str(wish.who), now))
+        self._registry.record(ParameterSet(wish.name, kept, str(wish.who), now))
 
     def _refuse(self, wish: _Wish, text: str, why: int, *, now: float) -> None:
         client, source = wish.client, wish.vehicle.server_address

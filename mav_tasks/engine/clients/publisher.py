@@ -6,9 +6,9 @@ store is too slow it is told all the same; a state that is shown on request wait
 
 from typing import NamedTuple
 
-from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.summary import summary_of
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands import translate
@@ -19,7 +19,6 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink.enums import MavSeverity, MavState
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
     TaskAdvanced,
@@ -29,6 +28,7 @@ from mav_tasks.tasks.events import (
     TaskWaits,
 )
 from mav_tasks.tasks.lifecycle import TERMINAL
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
 
@@ -45,8 +45,8 @@ class Publisher:
         self,
         gcs: GcsSide,
         vehicles: VehicleSide,
-        book: TaskBook,
-        displays: Displays,
+        registry: TaskRegistry,
+        displays: MessageRequests,
         submissions: Submissions,
         rates: TelemetryRates,
         timers: Timers,
@@ -55,7 +55,7 @@ class Publisher:
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
-        self._book = book
+        self._registry = registry
         self._displays = displays
         self._submissions = submissions
         self._rates = rates
@@ -114,7 +114,7 @@ class Publisher:
 
     def note_change(self, task_id: TaskId) -> None:
         """Have the submitter of a task told of its state, and who has asked about it."""
-        task = self._book.get(task_id)
+        task = self._registry.get(task_id)
         if task is None or task_id in self._ended:
             return
         for client in self._gcs.clients:
@@ -124,7 +124,7 @@ class Publisher:
                 client.statuses.changed(task.id)
 
     def _awaits(self, client: GcsClient) -> bool:
-        return self._book.is_awaited_at(client.outlet.link, client.endpoint)
+        return self._registry.is_awaited_at(client.outlet.link, client.endpoint)
 
     def _beat(self, *, now: float) -> None:
         """Each second: the task servers' heartbeats, and what goes by them."""
@@ -141,9 +141,9 @@ class Publisher:
             if now < client.statuses.next_deadline():
                 continue
             active: dict[int, int] = {
-                vehicle.system_id: begun
+                vehicle.system_id: active_id
                 for vehicle in self._vehicles.all
-                if (begun := vehicle.tasks.executor.task_id) is not None
+                if (active_id := vehicle.tasks.executor.task_id) is not None
             }
             for task_id in client.statuses.due(active, now=now):
                 if task_id not in self._ended:
@@ -162,8 +162,8 @@ class Publisher:
         for vehicle in self._vehicles.all:
             if not vehicle.is_heard(now=now):
                 continue
-            begun = vehicle.tasks.begun is not None
-            heartbeat = component_heartbeat(MavState.ACTIVE if begun else MavState.STANDBY)
+            active = vehicle.tasks.active is not None
+            heartbeat = component_heartbeat(MavState.ACTIVE if active else MavState.STANDBY)
             source, new = vehicle.server_address, list[GcsClient]()
             for client in self._gcs.clients:
                 if client.is_heard and vehicle.system_id in client.introduced:

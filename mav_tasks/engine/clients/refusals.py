@@ -11,9 +11,9 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 
 STREAM_EACH = 30.0  # s, the log's own window for words that repeat themselves
 REMEMBERED = 256  # streams of clients
@@ -22,8 +22,8 @@ REMEMBERED = 256  # streams of clients
 class Refusals:
     """Records refusals; of a flood of them only so many."""
 
-    def __init__(self, book: TaskBook) -> None:
-        self._book = book
+    def __init__(self, registry: TaskRegistry) -> None:
+        self._registry = registry
         self._streams: dict[Hashable, float] = {}  # when each was recorded last
 
     def message(
@@ -54,6 +54,6 @@ class Refusals:
         self, client: GcsClient, system_id: int, packet: Packet, refusal: Rejection, *, now: float
     ) -> None:
         reason, actor = TaskReason(refusal.reason), str(client.submitter(packet.source))
-        self._book.record(
+        self._registry.record(
             SubmissionRefused(system_id, -packet.message_id, reason, refusal.text, actor, now)
         )

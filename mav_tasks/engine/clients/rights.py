@@ -58,7 +58,7 @@ class Rights(NamedTuple):
             raise self.refusal(words)
 
     def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
-        """Give what is said when it may not."""
+        """Return what is said when it may not."""
         return Rejection(reason, f"role {self.role} {words}")
 
     def check_priority(self, priority: int) -> None:
@@ -72,7 +72,7 @@ class Rights(NamedTuple):
         self.require(OPERATOR, "make a task pre-emptive")
 
     def checked(self, draft: Draft, *, waiting: int) -> Draft:
-        """Give a task as it may be submitted by somebody of whom so many wait; Rejection."""
+        """Return a task as it may be submitted by somebody of whom so many wait; Rejection."""
         self.require(SUBMITTER, "submit tasks")
         self.check_priority(draft.terms.priority)
         kinds = () if self.limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
@@ -94,7 +94,7 @@ class Rights(NamedTuple):
         return replace(draft, terms=self.bounded(draft.terms))
 
     def bounded(self, terms: Terms) -> Terms:
-        """Give terms that keep a task to the speed, whatever speed is set for it."""
+        """Return terms that keep a task to the speed, whatever speed is set for it."""
         if self.limits.max_speed >= NO_LIMIT.max_speed:
             return terms
         return replace(terms, top_speed=self.limits.max_speed)
@@ -115,7 +115,7 @@ class RightsBook:
         return f"RightsBook(unsigned: {self._roles.unsigned})"
 
     def of(self, key: Key, submitter: Submitter) -> Rights:
-        """Give the rights of who sent a packet that was signed with this key."""
+        """Return the rights of who sent a packet that was signed with this key."""
         if key is not UNSIGNED:
             return self._by_role[key.role]
         addresses = self._roles.addresses
@@ -126,7 +126,7 @@ class RightsBook:
 
 
 def _kinds_of(goal: Goal) -> list[str]:
-    """Give the kinds of tasks that a goal is, a plan of one step being as that step."""
+    """Return the kinds of tasks that a goal is, a plan of one step being as that step."""
     if not isinstance(goal, Plan):
         return [kind_of(goal)]
     kinds = [kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
@@ -144,6 +144,6 @@ def _performs(goal: Goal) -> bool:
 
 
 def _fastest(goal: Goal) -> float:
-    """Give the highest speed that a goal names, m/s."""
+    """Return the highest speed that a goal names, m/s."""
     steps = goal.steps if isinstance(goal, Plan) else (goal,)
     return max((speed_named_by(step) for step in steps), default=0.0)

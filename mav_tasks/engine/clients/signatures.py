@@ -178,7 +178,7 @@ class Signatures:
         return key is UNSIGNED or self._keys.get(key.name) == key
 
     def key_of_secret(self, secret: bytes) -> Key | None:
-        """Give the key that has this secret, if one has."""
+        """Return the key that has this secret, if one has."""
         return next((key for key in self._keys.values() if key.secret == secret), None)
 
     def sign_to(self, link: str, peer: Peer, key: Key | None) -> None:
@@ -201,7 +201,7 @@ class Signatures:
     # in
 
     def admit(self, link: str, peer: Peer, packet: Packet) -> Key | None:
-        """Give whose a packet is; None: it is not to be looked at. Its CRC was found right."""
+        """Return whose a packet is; None: it is not to be looked at. Its CRC was found right."""
         there = self._links.get(link)
         if there is None:
             return UNSIGNED
@@ -291,7 +291,7 @@ class Signatures:
     # out
 
     def sealed(self, link: str, peer: Peer, raw: bytes) -> bytes:
-        """Give a packet as it is to leave."""
+        """Return a packet as it is to leave."""
         signer = self._signers.get((link, peer))
         if signer is None:
             there = self._links.get(link)
@@ -316,7 +316,7 @@ class Signatures:
         self._own[own] = max(signer.last, self._own.get(own, 0))
 
     def sealed_late(self, outgoing: Outgoing) -> Outgoing:
-        """Give a packet that was made long before as it is to leave now."""
+        """Return a packet that was made long before as it is to leave now."""
         data = self.sealed(outgoing.link, outgoing.peer, outgoing.data)
         return outgoing._replace(data=data)
 
@@ -341,7 +341,7 @@ class Signatures:
     # kept
 
     def take_times(self) -> SignaturesSeen | None:
-        """Give what the store has to keep by now, if it is time for that."""
+        """Return what the store has to keep by now, if it is time for that."""
         is_used_up = self._highest > 0 and self._signed_until < self._highest + RESERVE // 2
         if self.now < self.keep_at and not is_used_up:
             return None

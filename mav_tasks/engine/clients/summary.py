@@ -21,10 +21,10 @@ def summary_of(tasks: VehicleTasks) -> str:
         return f"STOP in force, press Continue{wait}"
     if held is not None:
         return f"Task {held.id} held: {words_of(held.reason)}. Press {BUTTONS}{wait}"
-    begun = _in_state(tasks, TaskState.PAUSED)
+    active = _in_state(tasks, TaskState.PAUSED)
     why = PAUSED.get(tasks.paused, words_of(tasks.paused))
-    if tasks.paused and begun is not None:
-        return f"Task {begun.id} paused, press Continue: {why}{wait}"
+    if tasks.paused and active is not None:
+        return f"Task {active.id} paused, press Continue: {why}{wait}"
     if tasks.paused and waiting:
         return f"{waiting} tasks wait, press Continue: {why}"
     return ""
@@ -32,5 +32,5 @@ def summary_of(tasks: VehicleTasks) -> str:
 
 def _in_state(tasks: VehicleTasks, state: TaskState) -> Task | None:
     """Return the first task of this state that has begun."""
-    begun = [] if tasks.begun is None else [tasks.begun]
-    return next((task for task in (*begun, *tasks.aside) if task.state is state), None)
+    active = [] if tasks.active is None else [tasks.active]
+    return next((task for task in (*active, *tasks.suspended) if task.state is state), None)

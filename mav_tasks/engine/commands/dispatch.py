@@ -7,11 +7,11 @@ asked. What is not ours is forwarded to the vehicle, whose answer comes back thr
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
-from mav_tasks.engine.clients.displays import Displays
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
-from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import (
     GOALS,
     bad,
@@ -36,8 +36,8 @@ from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
@@ -60,18 +60,18 @@ class Commands:
         self,
         gcs: GcsSide,
         vehicles: VehicleSide,
-        book: TaskBook,
+        registry: TaskRegistry,
         submissions: Submissions,
         plans: Plans,
         modes: ModeRequests,
         control: TaskControl,
-        displays: Displays,
+        displays: MessageRequests,
         settings: Settings,
     ) -> None:
         self._settings = settings
         self._gcs = gcs
         self._vehicles = vehicles
-        self._book = book
+        self._registry = registry
         self._submissions = submissions
         self._plans = plans
         self._modes = modes
@@ -102,7 +102,9 @@ class Commands:
             if known.answer is not None:
                 client.answer(known.answer, packet.source)
             return
-        asked = Asked(client, vehicle, packet, receiver.remember(command, packet.raw, now=now))
+        asked = CommandRequest(
+            client, vehicle, packet, receiver.remember(command, packet.raw, now=now)
+        )
         epoch = vehicle.tasks.halts.epoch
         try:
             if asked.kind is Kind.GO:
@@ -112,7 +114,7 @@ class Commands:
             if self._is_tried_again(asked, now=now):
                 asked.answer(MavResult.CANCELLED, refusal.reason)
             elif client.may_be_refused(now=now):
-                self._book.record(asked.refuse(refusal, now=now))
+                self._registry.record(asked.refuse(refusal, now=now))
             else:  # a flood of them fills neither disk nor net
                 asked.answer(result_of(refusal.reason), refusal.reason)
         note_halt(asked, before=epoch)
@@ -154,7 +156,7 @@ class Commands:
         if words and client.may_be_refused(now=now):
             client.tell_refusal(words, address, now=now)
 
-    def _is_tried_again(self, asked: Asked, *, now: float) -> bool:
+    def _is_tried_again(self, asked: CommandRequest, *, now: float) -> bool:
         """Whether a mode that has just been refused is asked for, and refused, once more.
 
         QGroundControl asks three times, and shows a box for each refusal that is called so.
@@ -164,7 +166,7 @@ class Commands:
             asked.command, within=MODE_TRIED_AGAIN, now=now
         )
 
-    def _dispatch(self, asked: Asked, *, now: float) -> None:
+    def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
         if asked.command.target.system_id == EVERYBODY:  # what is not ours came once for each rover
             number = asked.command.command
             raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
@@ -245,7 +247,7 @@ class Commands:
             self._check_question(asked, now=now)
             relay(asked, now=now)
 
-    def _check_question(self, asked: Asked, *, now: float) -> None:
+    def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Refuse an observer's question that is too much for the link to the rover."""
         if asked.row.kind is Kind.QUESTION and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
@@ -255,16 +257,16 @@ class Commands:
             if why_not is not None:
                 raise asked.rights.refusal(why_not, R.RATE_LIMITED)
 
-    def _refuse_unknown(self, asked: Asked, *, now: float) -> None:
+    def _refuse_unknown(self, asked: CommandRequest, *, now: float) -> None:
         words = f"command {asked.command.command}: not supported in this version"
         unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
-        self._book.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
+        self._registry.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
 
     def _claims(self, command: int) -> bool:
         """Whether a command to the autopilot itself is ours to see to."""
         return is_task_command(command) or self._settings.claim
 
-    def _reposition(self, asked: Asked, *, now: float) -> None:
+    def _reposition(self, asked: CommandRequest, *, now: float) -> None:
         """A "go to"; or, without a place, a pause."""
         if not has_place(asked.command):
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
@@ -277,7 +279,7 @@ class Commands:
         if not is_older:
             self._undo_hold_before(asked, now=now)
 
-    def _undo_hold_before(self, asked: Asked, *, now: float) -> None:
+    def _undo_hold_before(self, asked: CommandRequest, *, now: float) -> None:
         number = asked.vehicle.hold_before.undoing(asked.sender, now=now)
         if number is not None and asked.rights.reach(OPERATOR):
             undoes = _UndoesHold(asked.vehicle, number, asked.actor)
@@ -336,7 +338,7 @@ class Commands:
             client.tell(words, MavSeverity.WARNING, source, now=now)
         client.answer(Answer(command.command, result, param2, source), packet.source)
 
-    def _pause_continue(self, asked: Asked, *, now: float) -> int | None:
+    def _pause_continue(self, asked: CommandRequest, *, now: float) -> int | None:
         vehicle = asked.vehicle
         match asked.command.params[0]:
             case 0.0:
@@ -346,7 +348,7 @@ class Commands:
             case value:
                 raise Rejection(R.BAD_PARAMETER, f"param1 {value:g}: 0 pauses, 1 continues")
 
-    def _pause(self, asked: Asked, *, now: float) -> TaskId | None:
+    def _pause(self, asked: CommandRequest, *, now: float) -> TaskId | None:
         vehicle = asked.vehicle
         self._submissions.held(vehicle, asked.submitter)
         paused = vehicle.joint.pause(actor=asked.actor, now=now)
@@ -369,7 +371,7 @@ def _leave_hold(undoes: _UndoesHold, *, now: float) -> None:
     """It was not stored in time."""
 
 
-def _is_of_what_nobody_sends(asked: Asked) -> bool:
+def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:
     """Whether it is about the messages of a component that is not there.
 
     An autopilot answers for those: also about what it sends.
@@ -379,7 +381,7 @@ def _is_of_what_nobody_sends(asked: Asked) -> bool:
     return asked.command.command in intervals and component not in asked.vehicle.components
 
 
-def _check_last_item(asked: Asked) -> None:
+def _check_last_item(asked: CommandRequest) -> None:
     last = whole(asked.command, 2, "last item", high=0xFFFF)
     if last:
         raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)

@@ -61,7 +61,7 @@ INTEGERS = (5, 6)  # x and y of COMMAND_INT
 _MARK = Struct("<BBHh7d")
 
 
-class Wish(NamedTuple):
+class ParsedCommand(NamedTuple):
     """What a command asks for: a goal, and on what terms."""
 
     goal: SingleGoal
@@ -69,7 +69,7 @@ class Wish(NamedTuple):
     marks: Marks
 
 
-def wish_of(
+def parse_command(
     command: Command,
     packet: bytes,
     driving: Driving,
@@ -77,8 +77,8 @@ def wish_of(
     now: float,
     priority: int = DEFAULT_PRIORITY,
     is_cruising: bool = False,
-) -> Wish:
-    """Give what a command that becomes a task asks for; Rejection names a bad parameter.
+) -> ParsedCommand:
+    """Return what a command that becomes a task asks for; Rejection names a bad parameter.
 
     ``priority`` and ``is_cruising`` are those of a standard command, which cannot name them.
     """
@@ -88,15 +88,15 @@ def wish_of(
     if command.command not in TASK_COMMANDS:
         refuse_infinite(command)
         terms = _terms(priority, is_cruising=is_cruising)
-        return Wish(goal, terms, marks_of(command, packet))
+        return ParsedCommand(goal, terms, marks_of(command, packet))
     marks = marks_of(command, packet, nonce=identifier(command, 4, "nonce"))
     after = identifier(command, 5, "run after")
     delay = number(command, 6, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
     named = whole(command, 7, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY)
     start_at = now + delay if delay > 0 else None
     if after or start_at is not None:
-        return Wish(goal, Terms(priority=named, after=after, start_at=start_at), marks)
-    return Wish(goal, _terms(named), marks)
+        return ParsedCommand(goal, Terms(priority=named, after=after, start_at=start_at), marks)
+    return ParsedCommand(goal, _terms(named), marks)
 
 
 @cache  # nearly all are alike, and to make them anew takes its time
@@ -105,12 +105,12 @@ def _terms(priority: int, *, is_cruising: bool = False) -> Terms:
 
 
 def goal_of(command: Command, driving: Driving) -> SingleGoal:
-    """Give the goal of a command that becomes a task; Rejection names a bad parameter."""
+    """Return the goal of a command that becomes a task; Rejection names a bad parameter."""
     return GOALS[command.command](command, driving)
 
 
 def marks_of(command: Command, packet: bytes, *, nonce: int = 0) -> Marks:
-    """Give by what a submission is recognised when it comes again; NaN is equal to NaN.
+    """Return by what a submission is recognised when it comes again; NaN is equal to NaN.
 
     With a nonce nothing else is asked, so that the packet's own digest is not needed.
     """
@@ -130,7 +130,7 @@ def _digest(data: bytes) -> str:
 
 
 def bad(words: str, *, param: int) -> Rejection:
-    """Give the refusal of a parameter, 1 to 7."""
+    """Return the refusal of a parameter, 1 to 7."""
     return Rejection(R.BAD_PARAMETER, words, param=param)
 
 
@@ -143,7 +143,7 @@ def number(
     high: float,
     default: float | None = None,
 ) -> float:
-    """Give a parameter, or raise a Rejection that names it. NaN is "not given"."""
+    """Return a parameter, or raise a Rejection that names it. NaN is "not given"."""
     value = command.params[index - 1]
     if low <= value <= high:
         return value
@@ -159,7 +159,7 @@ def number(
 def whole(
     command: Command, index: int, name: str, *, low: int = 0, high: int, default: int | None = 0
 ) -> int:
-    """Give a parameter that must be a whole number, or raise a Rejection that names it.
+    """Return a parameter that must be a whole number, or raise a Rejection that names it.
 
     ``default`` None: it must be given.
     """
@@ -190,7 +190,7 @@ def identifier(
 
 
 def flag(command: Command, index: int, name: str, *, default: int | None = 0) -> bool:
-    """Give a parameter that is 0 or 1."""
+    """Return a parameter that is 0 or 1."""
     return whole(command, index, name, high=1, default=default) == 1
 
 
@@ -203,7 +203,7 @@ def has_place(command: Command) -> bool:
 
 
 def place_in(command: Command) -> Place | None:
-    """Give the place in x and y, or None if none is given; Rejection names what is wrong."""
+    """Return the place in x and y, or None if none is given; Rejection names what is wrong."""
     if not has_place(command):
         return None
     x, y = command.params[4:6]
@@ -239,7 +239,7 @@ def _place(command: Command) -> Place:
 
 
 def _yaw(command: Command, index: int, *, turn: float) -> float | None:
-    """Give a heading of at most a full ``turn``, None where none is asked for.
+    """Return a heading of at most a full ``turn``, None where none is asked for.
 
     Many clients leave a 0 there that is not meant as north.
     """
@@ -248,21 +248,21 @@ def _yaw(command: Command, index: int, *, turn: float) -> float | None:
 
 
 def _speed(command: Command, index: int, driving: Driving) -> float | None:
-    """Give a speed in m/s, None for the default: 0, -1 or NaN."""
+    """Return a speed in m/s, None for the default: 0, -1 or NaN."""
     if command.params[index - 1] == -1.0:
         return None
     return _speed_or_default(command, index, driving)
 
 
 def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:
-    """Give a speed in m/s, None for the default: 0 or NaN."""
+    """Return a speed in m/s, None for the default: 0 or NaN."""
     if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
         return None
     return number(command, index, "speed", low=MIN_SPEED, high=driving.max_speed)
 
 
 def _rate_or_default(command: Command, index: int, driving: Driving) -> float | None:
-    """Give a rate of turn in rad/s, None for the default: 0 or NaN."""
+    """Return a rate of turn in rad/s, None for the default: 0 or NaN."""
     if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
         return None
     fastest = degrees(driving.max_turn_rate)
@@ -325,7 +325,7 @@ def _waypoint(command: Command, _driving: Driving) -> SingleGoal:
 
 
 def reposition_flags(command: Command) -> int:
-    """Give the MAV_DO_REPOSITION_FLAGS of a "go to"."""
+    """Return the MAV_DO_REPOSITION_FLAGS of a "go to"."""
     return whole(command, 2, "flags", high=MAX_FLAGS)
 
 

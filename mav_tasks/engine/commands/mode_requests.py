@@ -9,7 +9,7 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import Rights
-from mav_tasks.engine.commands.asked import Asked, AskedByMessage
+from mav_tasks.engine.commands.command_request import CommandRequest, MessageRequest
 from mav_tasks.engine.commands.ordering import note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
@@ -20,9 +20,9 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
 
 R = TaskReason
@@ -35,7 +35,7 @@ STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
 class _Started(NamedTuple):
     """A mission that was started, or goes on, for whoever has asked for that."""
 
-    asked: Asked
+    asked: CommandRequest
     task: Task
 
 
@@ -45,7 +45,7 @@ class ModeRequests:
     def __init__(
         self,
         gcs: GcsSide,
-        book: TaskBook,
+        registry: TaskRegistry,
         submissions: Submissions,
         plans: Plans,
         refusals: Refusals,
@@ -53,7 +53,7 @@ class ModeRequests:
     ) -> None:
         self._refusals = refusals
         self._gcs = gcs
-        self._book = book
+        self._registry = registry
         self._submissions = submissions
         self._plans = plans
         self._claims = settings.claim
@@ -63,7 +63,7 @@ class ModeRequests:
         """Take new settings."""
         self._claims = settings.claim
 
-    def asked(self, asked: Asked, *, now: float) -> bool:
+    def asked(self, asked: CommandRequest, *, now: float) -> bool:
         """See to a wish for a mode; False: it is for the vehicle itself to answer."""
         vehicle, client = asked.vehicle, asked.client
         main, sub = asked.command.params[1:3]
@@ -97,7 +97,7 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
         return True
 
-    def heard(self, asked: AskedByMessage, *, now: float) -> None:
+    def heard(self, asked: MessageRequest, *, now: float) -> None:
         """See to the message SET_MODE."""
         vehicle = asked.vehicle
         epoch = vehicle.tasks.halts.epoch
@@ -114,7 +114,7 @@ class ModeRequests:
 
     # missions
 
-    def start_plan(self, asked: Asked, *, first: int, now: float) -> None:
+    def start_plan(self, asked: CommandRequest, *, first: int, now: float) -> None:
         """Start or continue the uploaded mission; one that is over is another task."""
         vehicle, submitter = asked.vehicle, asked.submitter
         self._plans.check_start(asked.rights, vehicle, submitter)
@@ -135,7 +135,7 @@ class ModeRequests:
     def _give_up(self, started: _Started, *, now: float) -> None:
         self._plans.stage_again(started.asked.vehicle, started.task, now=now)
         refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
-        self._book.record(started.asked.refuse(refusal, now=now))
+        self._registry.record(started.asked.refuse(refusal, now=now))
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Begin the mission of a vehicle that was to be armed first, if it has just been."""
@@ -149,7 +149,7 @@ class ModeRequests:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
-        if vehicle.parts.is_by_hand and not vehicle.motion_rights.is_armed_by_client(now=now):
+        if vehicle.parts.is_manual and not vehicle.motion_rights.is_armed_by_client(now=now):
             return  # by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)
@@ -166,7 +166,7 @@ class ModeRequests:
             self._plans.restarted(vehicle, task, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
-    def _mark(self, asked: Asked, *, now: float) -> None:
+    def _mark(self, asked: CommandRequest, *, now: float) -> None:
         vehicle = asked.vehicle
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         vehicle.start_mark.put(
@@ -196,13 +196,13 @@ class ModeRequests:
 
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""
-        begun = vehicle.tasks.begun
+        active = vehicle.tasks.active
         has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
-        has_plan = has_plan or (begun is not None and isinstance(begun.goal, Plan))
+        has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
         return self._claims and mode == vehicle.persona.mission_mode and has_plan
 
 
-def _return_home(asked: Asked) -> Draft:
+def _return_home(asked: CommandRequest) -> Draft:
     """What the mode RTL asks for."""
     command = MavCmd.NAV_RETURN_TO_LAUNCH
     return Draft(

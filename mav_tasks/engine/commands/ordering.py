@@ -7,7 +7,7 @@ stood still. Who is refused may send it anew; that is told.
 
 from math import isfinite
 
-from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
@@ -25,14 +25,14 @@ EPOCHS = 1 << 24  # that a float32 tells apart
 AGAIN = "if you still mean it, send it again in 4 s"
 
 
-def require_newer(asked: Asked, *, now: float) -> None:
+def require_newer(asked: CommandRequest, *, now: float) -> None:
     """Raise Rejection (STALE) for a word that lets go and is older than what holds the rover."""
     words = why_older(asked, now=now)
     if words:
         raise Rejection(TaskReason.STALE, words)
 
 
-def why_older(asked: Asked, *, now: float) -> str:
+def why_older(asked: CommandRequest, *, now: float) -> str:
     """Return in words why a word that lets go does not count, "" if it does; remember it.
 
     It is older than what holds the rover. Each copy has to be asked about, also one that is known
@@ -86,7 +86,7 @@ def why_older(asked: Asked, *, now: float) -> str:
     return f"{halts.words} came since: {AGAIN}"
 
 
-def has_left_before_halt(asked: Asked, *, anybodys: bool = False, now: float) -> bool:
+def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False, now: float) -> bool:
     """Return whether the last halt is the same sender's, and this word had left before it.
 
     With ``anybodys`` the halt may be anybody's: it is enough that this word may have left before.
@@ -98,7 +98,7 @@ def has_left_before_halt(asked: Asked, *, anybodys: bool = False, now: float) ->
     return anybodys and line.sent_after(number, now=now) <= halts.at
 
 
-def note_halt(asked: Asked, *, before: int) -> None:
+def note_halt(asked: CommandRequest, *, before: int) -> None:
     """Note whose word the last halt was, if there was one since the epoch ``before``."""
     halts = asked.vehicle.tasks.halts
     is_repeated = halts.by is asked.sender and asked.kind is Kind.HALT

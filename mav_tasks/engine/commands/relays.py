@@ -4,7 +4,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.inputs import Peer
@@ -30,7 +30,7 @@ class _Asker(NamedTuple):
     answering: Address
 
 
-def check_relay(asked: Asked, row: Row, *, now: float) -> None:
+def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     """Refuse what would move a stopped vehicle, or drive one that a task drives."""
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
@@ -50,7 +50,7 @@ def check_relay(asked: Asked, row: Row, *, now: float) -> None:
         vehicle.motion_rights.passed(asked.client.key, now=now)
 
 
-def relay(asked: Asked, *, now: float) -> None:
+def relay(asked: CommandRequest, *, now: float) -> None:
     """Pass a command on; ``deliver`` brings its answer to who asked."""
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)

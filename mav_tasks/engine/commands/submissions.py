@@ -6,8 +6,8 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.commands.ability import driven
-from mav_tasks.engine.commands.asked import Asked
-from mav_tasks.engine.commands.goals import wish_of
+from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.commands.goals import parse_command
 from mav_tasks.engine.commands.ordering import (
     AGAIN,
     has_left_before_halt,
@@ -21,10 +21,10 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.goal import GoTo, describe
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
-from mav_tasks.tasks.recollection import Known, Recollection, Rule
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
 R = TaskReason
@@ -44,7 +44,7 @@ NONCE = 3  # where it is among the parameters
 class Submitted(NamedTuple):
     """A task that was taken in; whoever has asked for it is told when that is durable."""
 
-    asked: Asked
+    asked: CommandRequest
     task: Task
 
 
@@ -54,20 +54,20 @@ class Submissions:
     def __init__(
         self,
         gcs: GcsSide,
-        book: TaskBook,
-        recollection: Recollection,
+        registry: TaskRegistry,
+        deduplicator: SubmissionDeduplicator,
         timers: Timers,
         settings: Settings,
     ) -> None:
         self._gcs = gcs
-        self._book = book
-        self._recollection = recollection
+        self._registry = registry
+        self._deduplicator = deduplicator
         self._settings = settings
         #: what waits for the store, whosever it is
-        self.gate = CommitGate(book, timers, within=settings.watch.commit)
+        self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
         #: taken in, and not durable yet: who is to be told, each client once for a command
-        self._undecided: dict[TaskId, list[Asked]] = {}
+        self._undecided: dict[TaskId, list[CommandRequest]] = {}
         self._store_is_away = False
         self._is_closing = False
 
@@ -89,14 +89,14 @@ class Submissions:
         """Refuse new submissions until something has been committed again."""
         self._store_is_away = True
 
-    def submit(self, asked: Asked, *, now: float) -> None:
+    def submit(self, asked: CommandRequest, *, now: float) -> None:
         """Take in the task that a command asks for; Rejection says why not."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
             words = "it waited while the server stood still: send it again"
             raise Rejection(R.STALE, words)
         is_ours = command.command in TASK_COMMANDS
-        wish = wish_of(
+        wish = parse_command(
             command,
             asked.packet.raw,
             self._settings.driving,
@@ -134,14 +134,14 @@ class Submissions:
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
 
-    def run_now(self, asked: Asked, draft: Draft, *, now: float) -> None:
+    def run_now(self, asked: CommandRequest, draft: Draft, *, now: float) -> None:
         """Take in a task that runs at once; Rejection says why not."""
         asked.vehicle.joint.end_driving_of(asked.client.key, now=now)
         if not self._is_repeat(asked, draft, confirmation=0, now=now):
             task = self.take_in(asked.rights, asked.vehicle, draft, runs_now=True, now=now)
             self._await_commit(asked, task, now=now)
 
-    def submit_draft(self, asked: Asked, draft: Draft, *, now: float) -> Task:
+    def submit_draft(self, asked: CommandRequest, draft: Draft, *, now: float) -> Task:
         """Take in a task that a command means without naming it; Rejection says why not."""
         task = self.take_in(asked.rights, asked.vehicle, draft, now=now)
         self._await_commit(asked, task, now=now)
@@ -150,7 +150,7 @@ class Submissions:
     def submit_plan(self, rights: Rights, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
         """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
         task = self.take_in(rights, vehicle, draft, now=now)
-        self._recollection.remember(task, at=now, now=now)
+        self._deduplicator.remember(task, at=now, now=now)
         return task
 
     def take_in(
@@ -181,28 +181,28 @@ class Submissions:
         return vehicle.tasks.submit(draft, now=now)
 
     def known_plan(self, draft: Draft, *, begun_at: float, now: float) -> TaskId | None:
-        """Give the task that a plan is already, uploaded a moment before: its ack may be lost.
+        """Return the task that a plan is already, uploaded a moment before: its ack may be lost.
 
         So may be the ack of this copy: from here on the next one counts.
         """
-        known = self._recollection.known(draft, confirmation=1, origin=None, now=begun_at)
-        task = None if known is None else self._book.get(known.task_id)
+        known = self._deduplicator.known(draft, confirmation=1, origin=None, now=begun_at)
+        task = None if known is None else self._registry.get(known.task_id)
         if task is None:
             return None
-        self._recollection.remember(task, at=now, now=now)
+        self._deduplicator.remember(task, at=now, now=now)
         return task.id
 
     def take_back(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """A submission was not stored in time: it is none."""
-        self._recollection.forget(task)
+        self._deduplicator.forget(task)
         self._store_is_away = True
-        current = self._book.get(task.id)
+        current = self._registry.get(task.id)
         if current is not None and vehicle.tasks.waits(current):
             vehicle.tasks.withdraw(current, now=now)
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
         """A client wants a vehicle to stand: what it asks for next is another wish."""
-        self._recollection.held(submitter, vehicle.system_id)
+        self._deduplicator.held(submitter, vehicle.system_id)
 
     def _priority_of(self, submitter: Submitter) -> int:
         priorities = self._settings.clients.priorities
@@ -228,8 +228,8 @@ class Submissions:
         if self._store_is_away:
             raise Rejection(R.STORE_UNAVAILABLE, "the store is away: not accepted")
 
-    def _await_commit(self, asked: Asked, task: Task, *, now: float) -> None:
-        self._recollection.remember(task, at=now, now=now)
+    def _await_commit(self, asked: CommandRequest, task: Task, *, now: float) -> None:
+        self._deduplicator.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
         self.gate.hold(Submitted(asked, task), now=now)
 
@@ -240,11 +240,11 @@ class Submissions:
             _acknowledge(each, task.id)
         self._tell_queued(asked, task, now=now)
 
-    def _tell_queued(self, asked: Asked, task: Task, *, now: float) -> None:
+    def _tell_queued(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         """Tell everybody of a task; a station that has it wait for a button, as a warning."""
         tasks, source, goal = asked.vehicle.tasks, asked.vehicle.server_address, describe(task.goal)
         paused, is_blocked = tasks.paused, True
-        if tasks.urgent == task.id:
+        if tasks.immediate == task.id:
             words, is_blocked = f"Task {task.id} begins now: {goal}", False
         elif paused:  # who queued it may not be who paused
             words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
@@ -262,25 +262,27 @@ class Submissions:
     def _withdraw(self, submitted: Submitted, *, now: float) -> None:
         asked, task = submitted
         askers = self._undecided.pop(task.id)
-        was_for_now = asked.vehicle.tasks.urgent == task.id
+        was_for_now = asked.vehicle.tasks.immediate == task.id
         self.take_back(asked.vehicle, task, now=now)
         words = "not stored in time: not accepted"
         if was_for_now:
             words += "; tasks are paused"
         refusal = Rejection(R.STORE_UNAVAILABLE, words)
         for each in askers:
-            self._book.record(each.refuse(refusal, now=now))
+            self._registry.record(each.refuse(refusal, now=now))
 
-    def _is_repeat(self, asked: Asked, draft: Draft, *, confirmation: int, now: float) -> bool:
+    def _is_repeat(
+        self, asked: CommandRequest, draft: Draft, *, confirmation: int, now: float
+    ) -> bool:
         """Whether a submission came before; it is answered then."""
         # of places only, to compare them
         origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
-        known = self._recollection.known(draft, confirmation=confirmation, origin=origin, now=now)
+        known = self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
         if known is not None:
             self._answer_repeat(asked, known, now=now)
         return known is not None
 
-    def _answer_repeat(self, asked: Asked, known: Known, *, now: float) -> None:
+    def _answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """The same submission again: the same answer, or none yet if it has none yet."""
         if known.task_id in self._undecided:
             askers = self._undecided[known.task_id]
@@ -288,7 +290,7 @@ class Submissions:
                 askers.append(asked)
             return
         _acknowledge(asked, known.task_id)
-        task = self._book.get(known.task_id)
+        task = self._registry.get(known.task_id)
         # one click of QGroundControl's is a command and an item: two messages, and nothing twice
         is_other_message = task is not None and task.command != asked.command.command
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
@@ -298,7 +300,7 @@ class Submissions:
             asked.tell(words, MavSeverity.INFO, now=now)
 
 
-def _acknowledge(asked: Asked, task_id: TaskId) -> None:
+def _acknowledge(asked: CommandRequest, task_id: TaskId) -> None:
     """Name the task, and have a client that reads it told of its state, nonce and all."""
     asked.answer(MavResult.ACCEPTED, task_id)
     if asked.client.uses_dialect:

@@ -6,7 +6,7 @@ Each gives the id of the task acted on, 0 for none or many; a Rejection says why
 from dataclasses import replace
 
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
-from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number, whole
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -16,8 +16,8 @@ from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import MAX_PRIORITY, Submitter, Task, Terms
 
 R, P = TaskReason, TaskProperty
@@ -30,15 +30,15 @@ GROUND_OR_AIR = 1  # DO_CHANGE_SPEED, highest param1: airspeed counts as ground 
 class TaskControl:
     """What clients may do to tasks."""
 
-    def __init__(self, book: TaskBook, settings: Settings) -> None:
-        self._book = book
+    def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
+        self._registry = registry
         self._settings = settings
 
     def apply(self, settings: Settings) -> None:
         """Take new settings."""
         self._settings = settings
 
-    def act(self, asked: Asked, *, now: float) -> int:
+    def act(self, asked: CommandRequest, *, now: float) -> int:
         """Do what a command asks for."""
         match asked.command.command:
             case MavCmd.TASK_CANCEL:
@@ -66,13 +66,13 @@ class TaskControl:
 
         ``is_late``: it has waited while the server stood still. What is held since stays so.
         """
-        task = self._book.latest(submitter, command, vehicle=vehicle.system_id)
+        task = self._registry.latest(submitter, command, vehicle=vehicle.system_id)
         if task is None or (is_late and task.state is TaskState.HELD):
             return
         if rights.reach(row_of_message(CommandCancel.id).role):
             vehicle.joint.cancel(task, kill=False, actor=str(submitter), now=now)
 
-    def _cancel(self, asked: Asked, *, now: float) -> int:
+    def _cancel(self, asked: CommandRequest, *, now: float) -> int:
         """Call one task off; a copy gets the first one's answer, and calls off no other."""
         first = asked.receiver.answer_to_counted_copy(asked.command, now=now)
         if first is not None and first.result == MavResult.ACCEPTED:
@@ -82,10 +82,10 @@ class TaskControl:
             raise Rejection(R(first.result_param2), words)
         task_id = identifier(asked.command, 1, "task", default=None)
         kill = flag(asked.command, 2, "kill")
-        begun = asked.vehicle.tasks.begun
-        if task_id == 0 and begun is None:
+        active = asked.vehicle.tasks.active
+        if task_id == 0 and active is None:
             raise Rejection(R.NOT_FOUND, "no task is running")
-        task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
+        task = active if task_id == 0 and active is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "cancel")
         if asked.client.is_late and task.state is TaskState.HELD:  # others would go on
             words = f"it waited while the server stood still, and task {task.id} is held since"
@@ -93,12 +93,12 @@ class TaskControl:
         asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
 
-    def _clear(self, asked: Asked, *, now: float) -> int:
+    def _clear(self, asked: CommandRequest, *, now: float) -> int:
         begun_too = flag(asked.command, 1, "scope")
         asked.vehicle.joint.clear(begun_too=begun_too, actor=asked.actor, now=now)
         return 0
 
-    def _release(self, asked: Asked, *, now: float) -> int:
+    def _release(self, asked: CommandRequest, *, now: float) -> int:
         """Release or skip a held task; a copy decides nothing about what is held since."""
         copy = asked.receiver.answer_to_copy(asked.command, now=now)
         if copy is not None:
@@ -107,10 +107,10 @@ class TaskControl:
             return copy.result_param2
         task_id = identifier(asked.command, 1, "task", default=None)
         how = whole(asked.command, 2, "how", high=SKIP, default=None)
-        begun = asked.vehicle.tasks.begun
-        if task_id == 0 and (begun is None or begun.state is not TaskState.HELD):
+        active = asked.vehicle.tasks.active
+        if task_id == 0 and (active is None or active.state is not TaskState.HELD):
             raise Rejection(R.NOT_FOUND, "no task is held")
-        task = begun if task_id == 0 and begun is not None else self._find(asked, task_id)
+        task = active if task_id == 0 and active is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "release")
         if task.state is not TaskState.HELD:
             raise Rejection(R.WRONG_STATE, f"task {task.id} is not held, it is {_words(task)}")
@@ -123,7 +123,7 @@ class TaskControl:
             )
         return task.id
 
-    def _modify(self, asked: Asked, *, now: float) -> int:
+    def _modify(self, asked: CommandRequest, *, now: float) -> int:
         task = self._find(asked, _task_id(asked.command))
         asked.rights.require_own(task, asked.submitter, "modify")
         terms = _modified(task, asked.command, now=now)
@@ -134,7 +134,7 @@ class TaskControl:
         asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
         return task.id
 
-    def _change_speed(self, asked: Asked, *, now: float) -> int:
+    def _change_speed(self, asked: CommandRequest, *, now: float) -> int:
         whole(asked.command, 1, "speed type", high=GROUND_OR_AIR)
         wish = asked.command.params[1]
         if wish == NO_CHANGE:
@@ -143,8 +143,8 @@ class TaskControl:
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 
-    def _find(self, asked: Asked, task_id: int) -> Task:
-        task = self._book.get(task_id)
+    def _find(self, asked: CommandRequest, task_id: int) -> Task:
+        task = self._registry.get(task_id)
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         if task.vehicle != asked.vehicle.system_id:
@@ -163,7 +163,7 @@ def _words(task: Task) -> str:
 
 
 def _modified(task: Task, command: Command, *, now: float) -> Terms:
-    """Give a task's terms with one of them changed."""
+    """Return a task's terms with one of them changed."""
     terms = task.terms
     wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
     if task.state not in WAITING and wanted in _OF_WAITING:

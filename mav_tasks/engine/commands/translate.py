@@ -12,8 +12,8 @@ from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.driving.guidance import Leg
-from mav_tasks.tasks.driving.itinerary import present_goal
 from mav_tasks.tasks.driving.legs import first_leg, leg_count, leg_of, length_of
+from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.events import (
     SERVER,
@@ -101,7 +101,7 @@ TEXT = 50  # bytes of TASK_STATUS.text
 
 
 def result_of(reason: int) -> MavResult:
-    """Give the MAV_RESULT that a refusal is acknowledged with."""
+    """Return the MAV_RESULT that a refusal is acknowledged with."""
     return RESULT_OF.get(reason, MavResult.DENIED)
 
 
@@ -158,7 +158,7 @@ def task_status(
 def task_timing(
     task: Task, timing: Timing | None, *, period: float, reader: Address, now: float
 ) -> m.TaskTiming:
-    """Give the TASK_TIMING of a task; ``period`` is that of its vehicle's setpoints, in seconds."""
+    """Return the TASK_TIMING of a task; ``period`` of its vehicle's setpoints is in seconds."""
     return m.TaskTiming(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
         task_id=task.id,
@@ -180,12 +180,12 @@ def queue_status(
 
     ``heard_at``: when its last heartbeat came, None: there was none in this run.
     """
-    begun = tasks.begun
+    active = tasks.active
     age = NEVER if heard_at is None else min(max(1, round((now - heard_at) * 1000)), NEVER - 1)
     return m.TaskQueueStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
         version=version & 0xFFFFFFFF,
-        running_id=0 if begun is None else begun.id,
+        running_id=0 if active is None else active.id,
         next_id=tasks.next_waiting or 0,
         capacity=tasks.capacity,
         counts=counts,
@@ -247,12 +247,12 @@ def _severity(reason: TaskReason) -> MavSeverity:
 
 
 def message_id_of(command: Command) -> int:
-    """Give the message id in param1 of REQUEST_MESSAGE and its kind; -1 for nonsense."""
+    """Return the message id in param1 of REQUEST_MESSAGE and its kind; -1 for nonsense."""
     return _whole(command.params[0])
 
 
 def task_id_of(command: Command) -> int:
-    """Give the task id in param2 of REQUEST_MESSAGE for what is about tasks; -1 for nonsense."""
+    """Return the task id in param2 of REQUEST_MESSAGE for what is about tasks; -1 for nonsense."""
     large = large_number(command.params[1])
     number = _whole(command.params[1]) if large is None else large
     return number if large is not None or number <= EXACT else -1
@@ -269,7 +269,7 @@ def is_of_finished(command: Command) -> bool:
 
 
 def _float32(value: float) -> float:
-    """Give a number that a float32 can hold; NaN, unknown, for one beyond all sense."""
+    """Return a number that a float32 can hold; NaN, unknown, for one beyond all sense."""
     return value if abs(value) < FLOAT32_MAX else nan
 
 
@@ -284,7 +284,7 @@ def _leg(task: Task) -> Leg | None:
 
 
 def _size_of(leg: Leg | None) -> tuple[int, float]:
-    """Give the whole of a leg, and in which TASK_UNIT that is."""
+    """Return the whole of a leg, and in which TASK_UNIT that is."""
     match leg:
         case None:
             return UNIT_NONE, 0.0
@@ -297,7 +297,7 @@ def _size_of(leg: Leg | None) -> tuple[int, float]:
 
 
 def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
-    """Give how much of a task is done, if so much of the leg is that is ``length`` as a whole."""
+    """Return how much of a task is done, if so much of the leg is that is ``length`` as a whole."""
     if task.state is TaskState.COMPLETED:
         return 100
     if task.progress.anchor is None:
@@ -307,7 +307,7 @@ def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
-    """Give the item of a plan that is being driven, of other tasks the leg; and of how many."""
+    """Return the item of a plan that is being driven, of other tasks the leg; and of how many."""
     if isinstance(goal, Plan):
         count = goal.item_count
         step = goal.item_number(max(progress.step, goal.first)) - 1
@@ -316,7 +316,7 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
 
 
 def _words(task: Task, reason: TaskReason, says: str) -> str:
-    """Give a task, its state and the reason in words; ``says``: the vehicle's own about that."""
+    """Return a task, its state and the reason in words; ``says``: the vehicle's own about that."""
     label = f" '{task.terms.label}'" if task.terms.label else ""
     words = f"{describe(task.goal)}{label}: {STATES[task.state]}"
     if not reason:

@@ -55,7 +55,7 @@ def check_rally_item(item: Item, seq: int) -> None:
 
 
 def fence_of(items: Sequence[Item]) -> Fence:
-    """Give the fence of items of which each was found good; Rejection when they make none."""
+    """Return the fence of items of which each was found good; Rejection when they make none."""
     zones: list[Zone] = []
     seq = 0
     while seq < len(items):
@@ -89,7 +89,7 @@ def fence_for_vehicle(items: Sequence[Item]) -> tuple[Item, ...]:
 
 
 def rally_of(items: Sequence[Item]) -> tuple[GlobalPlace, ...]:
-    """Give the places of rally points."""
+    """Return the places of rally points."""
     return tuple(_place(item) for item in items)
 
 

@@ -7,7 +7,7 @@ that; both are one task. It is answered by a MISSION_ACK.
 from math import inf
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
-from mav_tasks.engine.commands.asked import Asked
+from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -18,14 +18,14 @@ from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, Ma
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import NO_MESSAGE, Command, Pending
 from mav_tasks.services.mission_item import item_of
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 
 GO_THERE, ONLY_HIGHER = 2, 3  # MISSION_ITEM.current
 
 
-class AskedByItem(Asked):
+class GuidedItemRequest(CommandRequest):
     """The same as asked by a command, but for the answer."""
 
     @property
@@ -58,9 +58,9 @@ class AskedByItem(Asked):
 class GoToItems:
     """What becomes of such items."""
 
-    def __init__(self, submissions: Submissions, book: TaskBook) -> None:
+    def __init__(self, submissions: Submissions, registry: TaskRegistry) -> None:
         self._submissions = submissions
-        self._book = book
+        self._registry = registry
 
     def receive(
         self,
@@ -72,7 +72,9 @@ class GoToItems:
         now: float,
     ) -> None:
         """Take in a "go to"; what only changes the height is accepted, and does nothing here."""
-        asked = AskedByItem(client, vehicle, packet, Pending(_command_of(message), packet.raw, now))
+        asked = GuidedItemRequest(
+            client, vehicle, packet, Pending(_command_of(message), packet.raw, now)
+        )
         try:
             if message.current == ONLY_HIGHER:
                 asked.answer(MavResult.ACCEPTED)
@@ -83,11 +85,11 @@ class GoToItems:
             self._submissions.submit(asked, now=now)
         except Rejection as refusal:
             if client.may_be_refused(now=now):
-                self._book.record(asked.refuse(refusal, now=now))
+                self._registry.record(asked.refuse(refusal, now=now))
 
 
 def _command_of(message: m.MissionItem | m.MissionItemInt) -> Command:
-    """Give the command that an item is; a place beyond all numbers is none that could be given."""
+    """Return the command that an item stands for; a place out of range is infinite."""
     item = item_of(message)
     x, y = (inf, inf) if item is None else (float(item.x), float(item.y))
     first = (message.param1, message.param2, message.param3, message.param4)

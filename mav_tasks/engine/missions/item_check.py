@@ -6,7 +6,13 @@ which one it is.
 
 from mav_tasks.engine.commands.goals import bad
 from mav_tasks.engine.missions.fence_items import check_fence_item, check_rally_item
-from mav_tasks.engine.missions.plan_items import Manner, Wanted, plan_of, result_of, step_of
+from mav_tasks.engine.missions.plan_items import (
+    MissionParseOptions,
+    ParsedMission,
+    plan_of,
+    result_of,
+    step_of,
+)
 from mav_tasks.engine.missions.plans import STORED
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -27,7 +33,9 @@ class ItemCheck:
         self._vehicle = vehicle
         self._is_at_autopilot = component == AUTOPILOT
         self._settings = settings
-        self._read_by: tuple[int, Manner] | None = None  # length of the plan, and the manner
+        self._read_by: tuple[int, MissionParseOptions] | None = (
+            None  # length of the plan, and the manner
+        )
         self._read: list[tuple[Item, Step]] = []  # each item is read once: that takes its time
         self._refusal: Rejection | None = None
 
@@ -61,8 +69,8 @@ class ItemCheck:
             return result_of(refusal)
         return None
 
-    def plan_of(self, items: tuple[Item, ...], *, now: float) -> Wanted:
-        """Give the plan of a whole upload; Rejection says why it is none."""
+    def plan_of(self, items: tuple[Item, ...], *, now: float) -> ParsedMission:
+        """Return the plan of a whole upload; Rejection says why it is none."""
         count = len(items)
         steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
         wanted = plan_of(items, steps, has_home=self._manner.has_home, now=now)
@@ -73,9 +81,9 @@ class ItemCheck:
         return wanted
 
     @property
-    def _manner(self) -> Manner:
+    def _manner(self) -> MissionParseOptions:
         persona, driving = self._vehicle.persona, self._settings.driving
-        return Manner.of(persona, is_staged=self._is_at_autopilot, driving=driving)
+        return MissionParseOptions.of(persona, is_staged=self._is_at_autopilot, driving=driving)
 
     def _step(self, item: Item, seq: int, *, count: int) -> Step:
         manner = self._manner

@@ -7,21 +7,21 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
 from mav_tasks.services.mission_receiver import Sender, ToClient
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 
 
 class MissionAnswers:
     """Answers to whoever asked, while that client is still there."""
 
-    def __init__(self, gcs: GcsSide, book: TaskBook) -> None:
+    def __init__(self, gcs: GcsSide, registry: TaskRegistry) -> None:
         self._gcs = gcs
-        self._book = book
+        self._registry = registry
 
     def client(self, sender: Sender) -> GcsClient | None:
-        """Give the client that a sender is at, if it is still there."""
-        assert isinstance(sender.key, tuple), "only MissionDesks.receive makes senders"
+        """Return the client that a sender is at, if it is still there."""
+        assert isinstance(sender.key, tuple), "only MissionServers.receive makes senders"
         key, _signed_by = sender.key
         return self._gcs.client(key)
 
@@ -51,6 +51,6 @@ class MissionAnswers:
         if client is not None:
             client.tell_refusal(refusal.text, vehicle.server_address, now=now)
         reason, actor = TaskReason(refusal.reason), str(sender.address)
-        self._book.record(
+        self._registry.record(
             SubmissionRefused(vehicle.system_id, -message_id, reason, refusal.text, actor, now)
         )

@@ -14,8 +14,8 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.services.mission_receiver import Sender
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Task, TaskId
 
 R = TaskReason
@@ -40,14 +40,14 @@ class MissionClearing:
     def __init__(
         self,
         vehicles: VehicleSide,
-        book: TaskBook,
+        registry: TaskRegistry,
         submissions: Submissions,
         plans: Plans,
         answers: MissionAnswers,
         write_through: WriteThrough,
     ) -> None:
         self._vehicles = vehicles
-        self._book = book
+        self._registry = registry
         self._submissions = submissions
         self._plans = plans
         self._answers = answers
@@ -93,7 +93,9 @@ class MissionClearing:
         """One kind after the other, what the vehicle keeps first there; then the answer."""
         actor = str(sender.address)
         if not kinds:
-            task = self._book.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
+            task = (
+                self._registry.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
+            )
             cleared = _Cleared(vehicle, sender, asked, tuple(before.items()), task)
             self._submissions.gate.hold(cleared, now=now)
             return
@@ -115,7 +117,7 @@ class MissionClearing:
 
     def _accept(self, cleared: _Cleared, *, now: float) -> None:
         vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)
-        self._vehicles.touch(vehicle)
+        self._vehicles.mark_dirty(vehicle)
         self._call_off(vehicle, task, actor=actor, now=now)
         self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ACCEPTED)
@@ -128,7 +130,7 @@ class MissionClearing:
 
     def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
         """End a mission that was interrupted: without its plan nobody could have it go on."""
-        current = None if task is None else self._book.get(task.id)
+        current = None if task is None else self._registry.get(task.id)
         if current is not None and current.state in AT_REST:
             vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
 

@@ -18,7 +18,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
     PlanStored,
@@ -29,6 +28,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
 INTERVAL = 1.0  # s, of MISSION_CURRENT
@@ -64,7 +64,7 @@ class MissionReports:
         self,
         gcs: GcsSide,
         vehicles: VehicleSide,
-        book: TaskBook,
+        registry: TaskRegistry,
         plans: Plans,
         timers: Timers,
         settings: Settings,
@@ -73,7 +73,7 @@ class MissionReports:
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
-        self._book = book
+        self._registry = registry
         self._plans = plans
         self._next_at = now
         self._timer = timers.timer(Turn.REPORTS, self._report)
@@ -100,7 +100,7 @@ class MissionReports:
                 case PlanStored():
                     changed.add(event.vehicle)
                 case TaskChanged() | TaskAdvanced():
-                    task = self._book.get(event.task_id)
+                    task = self._registry.get(event.task_id)
                     if task is not None and isinstance(task.goal, Plan):
                         changed.add(event.vehicle)
         for system_id in changed:
@@ -132,7 +132,7 @@ class MissionReports:
             return
         self._tell(vehicle, m.MissionItemReached(event.step))
         self._last[event.vehicle] = _Last(event.task_id, event.step)
-        task = self._book.get(event.task_id) if event.performs else None
+        task = self._registry.get(event.task_id) if event.performs else None
         if task is not None:
             item = self._plans.item_of(task, event.step)
             vehicle.perform(performed(item, Address(vehicle.system_id, AUTOPILOT)), now=now)
@@ -143,7 +143,7 @@ class MissionReports:
             ack, command = answered.ack, answered.command
             what = "no answer" if ack is None else f"refused, result {ack.result}"
             words = f"command {command} of a plan: {what}"
-            self._book.record(VehicleNoted(vehicle.system_id, words, now))
+            self._registry.record(VehicleNoted(vehicle.system_id, words, now))
 
     def _tell(self, vehicle: Vehicle, message: m.Message) -> None:
         source = Address(vehicle.system_id, AUTOPILOT)

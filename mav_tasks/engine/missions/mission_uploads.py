@@ -33,9 +33,9 @@ from mav_tasks.services.mission_receiver import (
     Sender,
     Upload,
 )
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.goal import Plan, describe
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
 
 R = TaskReason
@@ -54,7 +54,7 @@ def refusal_of(result: int, words: str) -> Rejection:
     return Rejection(reason, f"upload: {words or 'an item cannot be read'}")
 
 
-class UploadDesk:
+class UploadSession:
     """Where uploads to one address are taken in."""
 
     def __init__(self, check: ItemCheck, form: RequestForm) -> None:
@@ -65,7 +65,7 @@ class UploadDesk:
 class _Mission(NamedTuple):
     """A mission that was taken in as a task, in the place of another plan if it is staged."""
 
-    desk: UploadDesk
+    desk: UploadSession
     vehicle: Vehicle
     sender: Sender
     task: Task
@@ -75,7 +75,7 @@ class _Mission(NamedTuple):
 class _Kept(NamedTuple):
     """Fence or rally points, or no mission, in the place of what was stored ``before``."""
 
-    desk: UploadDesk
+    desk: UploadSession
     vehicle: Vehicle
     kind: int
     plan_id: int
@@ -91,7 +91,7 @@ class MissionUploads:
         self,
         gcs: GcsSide,
         vehicles: VehicleSide,
-        book: TaskBook,
+        registry: TaskRegistry,
         submissions: Submissions,
         plans: Plans,
         answers: MissionAnswers,
@@ -99,7 +99,7 @@ class MissionUploads:
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
-        self._book = book
+        self._registry = registry
         self._submissions = submissions
         self._plans = plans
         self._answers = answers
@@ -109,7 +109,7 @@ class MissionUploads:
 
     def flush(
         self,
-        desk: UploadDesk,
+        desk: UploadSession,
         vehicle: Vehicle,
         *,
         refusal: Rejection | None = None,
@@ -127,10 +127,10 @@ class MissionUploads:
                 why = ended if told.why else refusal or desk.check.take_refusal() or ended
                 self.refused(told.sender, vehicle, why, now=now)
         for upload in uploads:
-            self._vehicles.touch(vehicle)
+            self._vehicles.mark_dirty(vehicle)
             self._decide(desk, vehicle, upload, now=now)
 
-    def _decide(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+    def _decide(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         try:
             self._submissions.check_open()
             if upload.mission_type != MISSION:
@@ -155,7 +155,9 @@ class MissionUploads:
         is_staged = upload.sender.addressed.component_id == AUTOPILOT
         return len(upload.items) <= (vehicle.persona.has_home_item and is_staged)
 
-    def _take_in(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+    def _take_in(
+        self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
+    ) -> None:
         """A mission: a task that waits to be started, or is queued."""
         sender = upload.sender
         is_staged = sender.addressed.component_id == AUTOPILOT
@@ -193,7 +195,7 @@ class MissionUploads:
         self._vehicles.get(vehicle.system_id)  # something may begin there
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
         self.flush(desk, vehicle, now=now)
-        replaced = self._book.get(TaskId(before.plan_id))
+        replaced = self._registry.get(TaskId(before.plan_id))
         if task.terms.is_staged and replaced is not None:
             self._plans.end(vehicle, replaced, R.REPLACED, actor=str(sender.address), now=now)
         if task.terms.is_staged:
@@ -204,14 +206,16 @@ class MissionUploads:
 
     def _withdraw(self, mission: _Mission, *, now: float) -> None:
         desk, vehicle, sender, task, before = mission
-        self._vehicles.touch(vehicle)
+        self._vehicles.mark_dirty(vehicle)
         self._submissions.take_back(vehicle, task, now=now)
         if task.terms.is_staged:
             self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
         refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
         self._refuse(desk, vehicle, refusal, now=now)
 
-    def _replace(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+    def _replace(
+        self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
+    ) -> None:
         """Fence and rally points, which the vehicle keeps as well, and the empty mission."""
         if upload.mission_type == MISSION:
             self._store(desk, vehicle, upload, now=now)
@@ -224,7 +228,7 @@ class MissionUploads:
         refuse = partial(self._refuse, desk, vehicle)
         self._write_through.write(vehicle, kind, items, store, refuse, now=now)
 
-    def _store(self, desk: UploadDesk, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
+    def _store(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         sender, kind = upload.sender, upload.mission_type
         before, task = self._plans.stored(vehicle.system_id, kind), self._plans.task(vehicle)
         plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
@@ -236,7 +240,7 @@ class MissionUploads:
     def _accept_kept(self, kept: _Kept, *, now: float) -> None:
         desk, vehicle = kept.desk, kept.vehicle
         if kept.kind == MISSION:
-            self._vehicles.touch(vehicle)
+            self._vehicles.mark_dirty(vehicle)
             self._plans.let_go(vehicle, kept.task, R.CLEARED, actor=kept.actor, now=now)
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=kept.plan_id, now=now)
         self.flush(desk, vehicle, now=now)
@@ -247,7 +251,7 @@ class MissionUploads:
         self._refuse(kept.desk, kept.vehicle, refusal, now=now)
 
     def _refuse(
-        self, desk: UploadDesk, vehicle: Vehicle, refusal: Rejection, *, now: float
+        self, desk: UploadSession, vehicle: Vehicle, refusal: Rejection, *, now: float
     ) -> None:
         desk.receiver.finish(result_of(refusal), opaque_id=0, now=now)
         self.flush(desk, vehicle, refusal=refusal, now=now)

@@ -32,7 +32,7 @@ from mav_tasks.services.command_receiver import NO_MESSAGE, Command
 from mav_tasks.services.mission_item import NOT_GIVEN, Item, packed
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.itinerary import loops_in_vain
+from mav_tasks.tasks.driving.mission_sequencer import loops_in_vain
 from mav_tasks.tasks.goal import (
     Delay,
     GoTo,
@@ -80,7 +80,7 @@ RESULT_OF: dict[int, MavMissionResult] = {
 }
 
 
-class Manner(NamedTuple):
+class MissionParseOptions(NamedTuple):
     """By what items are read: the ways of a vehicle, and the server's limits."""
 
     has_home: bool  # the first one is home, as ArduPilot has it
@@ -88,12 +88,12 @@ class Manner(NamedTuple):
     driving: Driving
 
     @classmethod
-    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "Manner":
-        """Give that of a vehicle; ``is_staged``: the plan is for the autopilot itself."""
+    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "MissionParseOptions":
+        """Return that of a vehicle; ``is_staged``: the plan is for the autopilot itself."""
         return cls(persona.has_home_item and is_staged, Ability.of(persona), driving)
 
 
-class Wanted(NamedTuple):
+class ParsedMission(NamedTuple):
     """What a plan asks for: its steps, the terms that it names for itself, and its nonce, or 0."""
 
     plan: Plan
@@ -102,13 +102,13 @@ class Wanted(NamedTuple):
 
 
 def result_of(refusal: Rejection) -> MavMissionResult:
-    """Give the MAV_MISSION_RESULT of a refusal."""
+    """Return the MAV_MISSION_RESULT of a refusal."""
     if refusal.param:
         return MavMissionResult(MavMissionResult.INVALID_PARAM1 + refusal.param - 1)
     return RESULT_OF.get(refusal.reason, MavMissionResult.DENIED)
 
 
-def step_of(item: Item, seq: int, *, count: int, manner: Manner) -> Step:
+def step_of(item: Item, seq: int, *, count: int, manner: MissionParseOptions) -> Step:
     """Return what an item asks for. Rejection names the item by its number in the file."""
     if manner.has_home and seq == 0:
         return Nothing()
@@ -140,8 +140,8 @@ def _step_of(item: Item, *, count: int, driving: Driving) -> Step:
     raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
 
 
-def steps_of(items: Sequence[Item], *, manner: Manner) -> tuple[Step, ...]:
-    """Give what all items of a plan ask for."""
+def steps_of(items: Sequence[Item], *, manner: MissionParseOptions) -> tuple[Step, ...]:
+    """Return what all items of a plan ask for."""
     return tuple(
         step_of(item, seq, count=len(items), manner=manner) for seq, item in enumerate(items)
     )
@@ -149,7 +149,7 @@ def steps_of(items: Sequence[Item], *, manner: Manner) -> tuple[Step, ...]:
 
 def plan_of(
     items: Sequence[Item], steps: tuple[Step, ...], *, has_home: bool, now: float
-) -> Wanted:
+) -> ParsedMission:
     """Return the plan of items and of what they ask for; Rejection when they make no plan."""
     has_options = bool(items) and items[-1].command == MavCmd.TASK_OPTIONS
     plan = Plan(steps, packed(items), has_home=has_home, has_options=has_options)
@@ -157,11 +157,11 @@ def plan_of(
     if loop is not None:
         words = f"item {plan.item_number(loop)}: a loop in which nothing is driven"
         raise Rejection(R.BAD_PARAMETER, words)
-    return Wanted(plan, _terms_of(items, now=now), _nonce_of(items))
+    return ParsedMission(plan, _terms_of(items, now=now), _nonce_of(items))
 
 
 def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
-    """Give the command that an item is for the vehicle itself."""
+    """Return the command that an item is for the vehicle itself."""
     p1, p2, p3, p4 = map(_given, (item.param1, item.param2, item.param3, item.param4))
     p7 = _given(item.z)
     if item.frame == MavFrame.MISSION:
@@ -172,7 +172,7 @@ def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
 
 
 def _given(value: float) -> float:
-    """Give a number for the vehicle: never NaN, which aborts some."""
+    """Return a number for the vehicle: never NaN, which aborts some."""
     return 0.0 if isnan(value) else value
 
 
@@ -191,7 +191,7 @@ def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
 
 
 def _nonce_of(items: Sequence[Item]) -> int:
-    """Give the client's mark in the options; what can be none is not looked at."""
+    """Return the client's mark in the options; what can be none is not looked at."""
     marks = [item.x for item in items if item.command == MavCmd.TASK_OPTIONS]
     return marks[-1] if marks and 0 < marks[-1] <= MAX_NONCE else 0
 

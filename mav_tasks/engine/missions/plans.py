@@ -10,18 +10,18 @@ from typing import NamedTuple
 
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.missions.fence_items import fence_of, rally_of
-from mav_tasks.engine.missions.plan_items import Manner, plan_of, steps_of
+from mav_tasks.engine.missions.plan_items import MissionParseOptions, plan_of, steps_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
 from mav_tasks.services.mission_item import Item, item_at, packed, unpacked
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
 R, S = TaskReason, TaskState
@@ -55,13 +55,13 @@ class Plans:
 
     def __init__(
         self,
-        book: TaskBook,
+        registry: TaskRegistry,
         fleet: Fleet,
         settings: Settings,
         *,
         restored: Mapping[tuple[int, int], tuple[int, str]],
     ) -> None:
-        self._book = book
+        self._registry = registry
         self._fleet = fleet
         self._settings = settings
         self._stored = {
@@ -77,19 +77,19 @@ class Plans:
         self._settings = settings
 
     def stored(self, vehicle: int, kind: int) -> Stored:
-        """Give a vehicle's mission, fence or rally points."""
+        """Return a vehicle's mission, fence or rally points."""
         return self._stored.get((vehicle, kind), NOTHING)
 
     def shown(self, vehicle: Vehicle) -> Task | None:
-        """Give the mission that clients are shown: the one that is driven, else the staged."""
-        begun = vehicle.tasks.begun
-        if begun is not None and isinstance(begun.goal, Plan):
-            return begun
+        """Return the mission that clients are shown: the one that is driven, else the staged."""
+        active = vehicle.tasks.active
+        if active is not None and isinstance(active.goal, Plan):
+            return active
         return self.task(vehicle)
 
     def task(self, vehicle: Vehicle) -> Task | None:
-        """Give the task that the staged mission is, while it is remembered."""
-        return self._book.get(TaskId(self.stored(vehicle.system_id, MISSION).plan_id))
+        """Return the task that the staged mission is, while it is remembered."""
+        return self._registry.get(TaskId(self.stored(vehicle.system_id, MISSION).plan_id))
 
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
         """Let a plan take the place of the one before; NOTHING: there is none any more."""
@@ -98,7 +98,9 @@ class Plans:
         self._stored[vehicle.system_id, kind] = stored
         self._apply_bounds(vehicle.system_id, kind, stored.items)
         source = packed(stored.items)
-        self._book.record(PlanStored(vehicle.system_id, kind, stored.plan_id, source, actor, now))
+        self._registry.record(
+            PlanStored(vehicle.system_id, kind, stored.plan_id, source, actor, now)
+        )
 
     def _apply_bounds(self, system_id: int, kind: int, items: tuple[Item, ...]) -> None:
         bounds = self._fleet.of(system_id).bounds
@@ -119,7 +121,7 @@ class Plans:
         self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
     ) -> None:
         """A mission is not the vehicle's any more: if it has not begun, it never will."""
-        current = None if task is None else self._book.get(task.id)
+        current = None if task is None else self._registry.get(task.id)
         if current is not None:
             self.end(vehicle, current, reason, actor=actor, now=now)
         self._first.pop(vehicle.system_id, None)
@@ -135,9 +137,9 @@ class Plans:
         rights.require(SUBMITTER, "start a plan")
         if vehicle.tasks.paused:
             rights.require(OPERATOR, "start a plan while tasks are paused")
-        if vehicle.armed and vehicle.parts.is_by_hand:
+        if vehicle.armed and vehicle.parts.is_manual:
             rights.require(OPERATOR, "end driving by hand")
-        for task in (vehicle.tasks.begun, self.task(vehicle)):
+        for task in (vehicle.tasks.active, self.task(vehicle)):
             if task is not None and isinstance(task.goal, Plan):
                 rights.require_own(task, submitter, "start that plan")
 
@@ -152,13 +154,18 @@ class Plans:
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
         self._check_queue(vehicle)
-        vehicle.parts.check_not_by_hand(now=now)
+        vehicle.parts.check_not_manual(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
-        begun, task = vehicle.tasks.begun, self.task(vehicle)
+        active, task = vehicle.tasks.active, self.task(vehicle)
         is_fresh = task is not None and waits_for_start(task)
-        if begun and begun.id != stored.plan_id and isinstance(begun.goal, Plan) and not is_fresh:
-            self._set_going(vehicle, begun, actor=str(submitter), now=now)
-            return begun
+        if (
+            active
+            and active.id != stored.plan_id
+            and isinstance(active.goal, Plan)
+            and not is_fresh
+        ):
+            self._set_going(vehicle, active, actor=str(submitter), now=now)
+            return active
         if not stored.items:
             raise Rejection(R.NOT_FOUND, "no plan is uploaded")
         if first >= len(stored.items):
@@ -172,7 +179,7 @@ class Plans:
             return self._again(vehicle, stored, submitter, first=first, now=now)
         if first:
             vehicle.tasks.skip_to(task, first, now=now)
-        self._set_going(vehicle, self._book[task.id], actor=str(submitter), now=now)
+        self._set_going(vehicle, self._registry[task.id], actor=str(submitter), now=now)
         self._note_start(vehicle, submitter, task, now=now)
         return task
 
@@ -204,7 +211,7 @@ class Plans:
 
     def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """A start was not stored in time: it is none."""
-        current = self._book.get(task.id)
+        current = self._registry.get(task.id)
         self._started.pop(vehicle.system_id, None)
         if current is not None and current.state in WAITING:
             terms = replace(current.terms, is_staged=True)
@@ -235,7 +242,9 @@ class Plans:
     def _again(
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
     ) -> Draft:
-        manner = Manner.of(vehicle.persona, is_staged=True, driving=self._settings.driving)
+        manner = MissionParseOptions.of(
+            vehicle.persona, is_staged=True, driving=self._settings.driving
+        )
         steps = steps_of(stored.items, manner=manner)
         wanted = plan_of(stored.items, steps, has_home=manner.has_home, now=now)
         plan = replace(wanted.plan, first=first)
@@ -275,7 +284,7 @@ class Plans:
     # showing
 
     def current(self, vehicle: Vehicle, *, seq: int | None = None) -> m.MissionCurrent:
-        """Give MISSION_CURRENT; ``seq`` instead of the item that is driven."""
+        """Return MISSION_CURRENT; ``seq`` instead of the item that is driven."""
         task, system_id = self.shown(vehicle), vehicle.system_id
         stored = self.stored(system_id, MISSION)
         count = len(stored.items)
@@ -298,12 +307,12 @@ class Plans:
         )
 
     def item_of(self, task: Task, step: int) -> Item:
-        """Give an item of a task's plan as it came."""
+        """Return an item of a task's plan as it came."""
         return item_at(plan_of_task(task).source, step)
 
 
 def plan_of_task(task: Task) -> Plan:
-    """Give the plan of a task that is known to be one."""
+    """Return the plan of a task that is known to be one."""
     assert isinstance(task.goal, Plan), "the task of a mission is a plan"
     return task.goal
 
@@ -314,7 +323,7 @@ def waits_for_start(task: Task) -> bool:
 
 
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:
-    """Give the MISSION_STATE."""
+    """Return the MISSION_STATE."""
     if not has_plan:
         return 1  # NO_MISSION
     match None if task is None else task.state:

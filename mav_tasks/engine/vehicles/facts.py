@@ -38,7 +38,7 @@ def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
         may_arm=authority.may_arm,
         waits=_waits(parts, now=now),
         is_led=kind in (ModeKind.MANUAL, ModeKind.OTHER),
-        is_urgent=tasks.urgent is not None,
+        is_urgent=tasks.immediate is not None,
         is_idle=tasks.is_idle,
         is_stopping=pilot.guard.ladder.is_on,
         is_late=is_late,
@@ -63,12 +63,12 @@ def _queue(paused: TaskReason) -> Queue:
 
 
 def _work(tasks: VehicleTasks) -> Work:
-    begun = tasks.begun
-    if begun is None:
+    active = tasks.active
+    if active is None:
         return Work.NONE if tasks.is_empty else Work.WAITS
-    if begun.state in RUNNING:
-        return Work.ENDS if begun.state is TaskState.CANCELLING else Work.RUNS
-    if begun.reason in TAKEN:
+    if active.state in RUNNING:
+        return Work.ENDS if active.state is TaskState.CANCELLING else Work.RUNS
+    if active.reason in TAKEN:
         return Work.TAKEN
     return Work.LOST if tasks.resumes_by_itself else Work.STANDS
 

@@ -63,7 +63,7 @@ class FrameMonitor:
                 self._work_out()
 
     def frame(self) -> Frame | None:
-        """Give the frame, or None before anything was heard of it."""
+        """Return the frame, or None before anything was heard of it."""
         if self._booted_at is None:
             return None
         if self._origin is None:
@@ -106,7 +106,7 @@ class FrameMonitor:
 
 
 def _place(message: m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt) -> GlobalPlace | None:
-    """Give the place that a message names; None if there is none such, or it is not known."""
+    """Return the place that a message names; None if there is none such, or it is not known."""
     if isinstance(message, m.GlobalPositionInt):
         latitude, longitude = message.lat, message.lon
     else:

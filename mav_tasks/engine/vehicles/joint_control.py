@@ -114,8 +114,8 @@ class JointControl:
     def shut_down(self, *, now: float) -> None:
         """The server ends: pause what is begun and stop what we drive; nothing begins any more."""
         self._pilot.close()
-        begun = self._parts.tasks.begun
-        self._stops_task = begun is not None and begun.state in RUNNING
+        active = self._parts.tasks.active
+        self._stops_task = active is not None and active.state in RUNNING
         self.on(Event.CLOSE, Word(), now=now)
 
     def note_rest(self, *, now: float) -> None:
@@ -128,8 +128,8 @@ class JointControl:
     def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
         """Call a task off; if it is the begun one, zeros leave in this very step."""
         tasks = self._parts.tasks
-        begun = tasks.begun
-        event = Event.CANCEL if begun is not None and begun.id == task.id else Event.UNQUEUE
+        active = tasks.active
+        event = Event.CANCEL if active is not None and active.id == task.id else Event.UNQUEUE
 
         def call_off() -> None:
             tasks.cancel(task, kill=kill, reason=R.CANCELLED, actor=actor, now=now)
@@ -158,7 +158,7 @@ class JointControl:
     def proceed(self, *, actor: str, now: float) -> TaskId | None:
         """Release STOP, takeover and pause; arming is allowed again. A held task stays held.
 
-        Raise Rejection while the begun task could not take the vehicle. Return the task that goes
+        Raise Rejection while the active task could not take the vehicle. Return the task that goes
         on.
         """
         authority = self._parts.authority
@@ -276,7 +276,7 @@ class JointControl:
         """
         if self._parts.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
-        self._parts.check_not_by_hand(now=now)
+        self._parts.check_not_manual(now=now)
         self.end_driving_of(client, now=now)
         self.on(Event.LANDED, Word(), now=now)
 
@@ -285,5 +285,5 @@ class JointControl:
 
         By way of HOLD, from which tasks take the vehicle.
         """
-        if self._parts.is_by_hand:
+        if self._parts.is_manual:
             self.on(Event.LEAVE_MANUAL, Word(), now=now)

@@ -39,7 +39,7 @@ class KnownProfile:
 
     @property
     def why_drives_on(self) -> str:
-        """Give in words why it would go on without setpoints; "": it stops, or is not known."""
+        """Return in words why it would go on without setpoints; "": it stops, or is not known."""
         is_off = self.chosen is not None and self.chosen.loss_stop == "no"
         return "its profile says that it does not stop by itself" if is_off else ""
 
@@ -54,7 +54,7 @@ class KnownProfile:
         self._choose()
 
     def take_news(self) -> str:
-        """Give in words what is used, or why nothing is; "" if that is no news."""
+        """Return in words what is used, or why nothing is; "" if that is no news."""
         words = self._words()
         if words == self._told:
             return ""

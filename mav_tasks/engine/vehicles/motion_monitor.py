@@ -62,7 +62,7 @@ class MotionMonitor:
         return heard
 
     def latest(self) -> Motion | None:
-        """Give the last measured motion, or None before both messages have come."""
+        """Return the last measured motion, or None before both messages have come."""
         if self._latest is None:
             self._latest = self._motion()
         return self._latest

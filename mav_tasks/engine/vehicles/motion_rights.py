@@ -16,7 +16,7 @@ class MotionRights:
         return f"MotionRights({self._parts.authority!r})"
 
     def why_not_moved(self, client: Hashable, *, takes_over: bool = False) -> str:
-        """Give in words what keeps a client's motion message from passing, "" if nothing does.
+        """Return in words what keeps a client's motion message from passing, "" if nothing does.
 
         ``takes_over``: it asks for the mode in which clients drive as well.
         """

@@ -10,16 +10,16 @@ from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
 from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.vehicles.start_mark import StartMark
 from mav_tasks.engine.vehicles.stick_watch import StickWatch
+from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
-from mav_tasks.engine.vehicles.whereabouts import Whereabouts
 from mav_tasks.errors import Rejection
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
@@ -36,10 +36,10 @@ class Parts:
 
     system_id: int
     persona: Persona
-    book: TaskBook
+    registry: TaskRegistry
     tasks: VehicleTasks
     requests: VehicleRequests
-    where: Whereabouts
+    where: VehiclePosition
     monitor: HeartbeatMonitor
     authority: Authority
     settings: Settings
@@ -64,7 +64,7 @@ class Parts:
         return f"vehicle {self.system_id}"
 
     @property
-    def is_by_hand(self) -> bool:
+    def is_manual(self) -> bool:
         """Whether it is in a mode in which a person drives."""
         return self.monitor.custom_mode in self.persona.manual_modes
 
@@ -79,7 +79,7 @@ class Parts:
 
     def note(self, text: str, *, now: float) -> None:
         """Tell everybody."""
-        self.book.record(VehicleNoted(self.system_id, text, now))
+        self.registry.record(VehicleNoted(self.system_id, text, now))
 
     def withdraw_arming(self, *, now: float) -> None:
         """Somebody else has a hand on it: it is armed no more, also after a restart of ours."""
@@ -109,9 +109,9 @@ class Parts:
         if marker is not None and marker.submitter.key in keys:
             self.forget_start()
 
-    def check_not_by_hand(self, *, now: float) -> None:
+    def check_not_manual(self, *, now: float) -> None:
         """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
-        if not (self.monitor.armed and self.is_by_hand):
+        if not (self.monitor.armed and self.is_manual):
             return
         if self.is_driven_by_others(now=now):
             raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
@@ -119,7 +119,7 @@ class Parts:
             raise Rejection(TaskReason.WRONG_MODE, "driven by hand: it must stand first")
 
     def view(self, *, drives_on: bool, now: float) -> VehicleView:
-        """Give one look at the vehicle for the task domain.
+        """Return one look at the vehicle for the task domain.
 
         ``drives_on``: it is not known to stand when nothing is asked of it, and must.
         """

@@ -65,11 +65,11 @@ class Pilot:
         tasks = parts.tasks
         self._face(now=now)
         seen = self._view(now)
-        begun_before = tasks.begun
+        begun_before = tasks.active
         demand = STOP if self._is_closing else tasks.step(seen, now=now)
-        self._is_back_home = self._is_back_home and tasks.begun is None
-        if begun_before is not None and tasks.begun is None:
-            ended = parts.book[begun_before.id]
+        self._is_back_home = self._is_back_home and tasks.active is None
+        if begun_before is not None and tasks.active is None:
+            ended = parts.registry[begun_before.id]
             parts.authority.revoke()
             self._note_end(ended)
             if ended.reason is TaskReason.STUCK:
@@ -92,7 +92,7 @@ class Pilot:
     def plan_tick(self, *, now: float) -> None:
         """Tick as long as there is anything to drive, or to watch."""
         is_engaged = self._parts.control.is_engaged
-        if is_engaged or self._parts.tasks.begun is not None or self.guard.ladder.is_on:
+        if is_engaged or self._parts.tasks.active is not None or self.guard.ladder.is_on:
             self.clock.plan(now=now)
         else:
             self.clock.stop()
@@ -136,9 +136,9 @@ class Pilot:
 
     def is_late(self, *, now: float) -> bool:
         """Whether what is driven went on without us for too long."""
-        begun = self._parts.tasks.begun
+        active = self._parts.tasks.active
         late = self.clock.lateness(now=now) > self._parts.settings.watch.late_tick
-        return late and begun is not None and begun.state is TaskState.EXECUTING
+        return late and active is not None and active.state is TaskState.EXECUTING
 
     def _face(self, *, now: float) -> None:
         """Tell its control what decides how it is asked to stand."""
@@ -204,9 +204,9 @@ class Pilot:
 
     def _take_measure(self, found: Found, demand: Demand, *, now: float) -> Seen | None:
         """Climb the stop ladder; what concerns a task is for the table to decide."""
-        control, begun = self._parts.control, self._parts.tasks.begun
+        control, active = self._parts.control, self._parts.tasks.active
         match found.measure:
-            case Measure.STOP_TASK if begun is not None and begun.state is TaskState.EXECUTING:
+            case Measure.STOP_TASK if active is not None and active.state is TaskState.EXECUTING:
                 return Seen(Event.TOO_FAST, TaskReason.OVERSPEED, found.words)
             case Measure.HOLD if demand.kind in GOES_ON:
                 words = "moves though it is told to stand: HOLD"

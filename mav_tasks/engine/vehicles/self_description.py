@@ -66,7 +66,7 @@ class SelfDescription:
         if turning.turning is not before:
             self._use_profile(now=now)
         if turning.turning is Turning.STEERED is not before:
-            self._parts.book.record(VehicleSeen(self._parts.system_id, "steers as a car", now))
+            self._parts.registry.record(VehicleSeen(self._parts.system_id, "steers as a car", now))
 
     def look(self, *, now: float) -> None:
         """See what is news, with each heartbeat."""
@@ -81,7 +81,7 @@ class SelfDescription:
         if news and (failsafe.is_unknown or failsafe.why_off):
             self._parts.note(news, now=now)
         elif news:
-            self._parts.book.record(VehicleSeen(self._parts.system_id, news, now))
+            self._parts.registry.record(VehicleSeen(self._parts.system_id, news, now))
 
     def _use_profile(self, *, now: float) -> None:
         """Go by what was measured of it; setpoints do not change their kind while it is driven."""
@@ -89,7 +89,7 @@ class SelfDescription:
         if news and self._known.chosen is None:
             self._parts.note(news, now=now)
         elif news:
-            self._parts.book.record(VehicleSeen(self._parts.system_id, news, now))
+            self._parts.registry.record(VehicleSeen(self._parts.system_id, news, now))
         self._parts.tasks.terms.brakes(self._known.stop)
         persona = self._known.persona
         speaks_alike = (persona.setpoint_mask, persona.setpoint_frame) == (

@@ -41,5 +41,5 @@ class SetpointClock:
         self.next_at = inf
 
     def lateness(self, *, now: float) -> float:
-        """Give the seconds by which a tick is late; below 0: none is."""
+        """Return the seconds by which a tick is late; below 0: none is."""
         return now - self.next_at

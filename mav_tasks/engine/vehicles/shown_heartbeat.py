@@ -37,7 +37,7 @@ class ShownHeartbeat:
         self._until = -inf
 
     def in_message(self, heartbeat: Heartbeat, *, now: float) -> Heartbeat:
-        """Give a copy of a heartbeat's message as clients are to see it."""
+        """Return a copy of a heartbeat's message as clients are to see it."""
         mode = self._mode if now < self._until else heartbeat.custom_mode
         return Heartbeat(
             type=heartbeat.type,
@@ -49,7 +49,7 @@ class ShownHeartbeat:
         )
 
     def applied(self, packet: Packet, *, now: float) -> Packet:
-        """Give a packet of the vehicle as clients are to see it."""
+        """Return a packet of the vehicle as clients are to see it."""
         if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
             return packet
         payload = packet.payload

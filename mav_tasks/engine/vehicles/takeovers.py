@@ -60,7 +60,7 @@ class Takeovers:
             if halt.reason in (R.STOPPED, R.DISARMED):
                 armed = parts.monitor.armed
                 parts.armings.outdate_earlier(armed=armed, until=self._may_show_until, now=now)
-        if halt is not None and parts.monitor.armed and not parts.is_by_hand:
+        if halt is not None and parts.monitor.armed and not parts.is_manual:
             event = Event.COME_BACK_HALTED
         elif not was_driven:
             event = Event.COME_BACK
@@ -145,7 +145,7 @@ class Takeovers:
             parts.note("is outside its own fence: tasks wait", now=now)
         elif news.is_outside is not None:
             words = "is inside its own fence again"
-            parts.book.record(VehicleSeen(parts.system_id, words, now))
+            parts.registry.record(VehicleSeen(parts.system_id, words, now))
         if news.cause and parts.tasks.paused is R.TAKEOVER:
             words = f"was taken by its failsafe: {news.cause}"
             self._joint.on(Event.EXPLAINED, Word(R.FAILSAFE, parts.actor, words), now=now)

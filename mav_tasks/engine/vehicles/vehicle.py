@@ -7,7 +7,7 @@ others have done to it, ``motion_rights`` whether a client's set-points pass.
 from collections.abc import Hashable
 from math import inf
 
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
@@ -22,8 +22,8 @@ from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.takeovers import Takeovers
+from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
-from mav_tasks.engine.vehicles.whereabouts import Whereabouts
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
@@ -33,11 +33,11 @@ from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.identity import identity_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleSeen
 from mav_tasks.tasks.goal import GlobalPlace
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
@@ -56,8 +56,8 @@ class Vehicle:
         *,
         heartbeat: m.Heartbeat,
         persona: Persona,
-        outlet: Outlet,
-        book: TaskBook,
+        outlet: PacketSender,
+        registry: TaskRegistry,
         tasks: VehicleTasks,
         settings: Settings,
         may_arm: bool,
@@ -75,10 +75,10 @@ class Vehicle:
         self.parts = parts = Parts(
             system_id,
             persona,
-            book,
+            registry,
             tasks,
             requests,
-            Whereabouts(settings.watch, tasks.bounds),
+            VehiclePosition(settings.watch, tasks.bounds),
             monitor,
             Authority(persona, may_arm=may_arm),
             settings,
@@ -87,7 +87,7 @@ class Vehicle:
         self.tasks, self.requests, self.control = tasks, requests, requests.control
         self.where, self.shown = parts.where, parts.shown
         self.hold_before, self.start_mark = parts.hold_before, parts.start_mark
-        self._book, self._monitor = book, monitor
+        self._registry, self._monitor = registry, monitor
         self.pilot = Pilot(parts, self._view)
         self.joint = JointControl(parts, self.pilot, self._view)
         self.motion_rights = MotionRights(parts)
@@ -168,7 +168,7 @@ class Vehicle:
         self._last_beat = (0, -inf)
         self.requests.ask_which_again()
 
-    def move_to(self, outlet: Outlet, *, may_arm: bool) -> None:
+    def move_to(self, outlet: PacketSender, *, may_arm: bool) -> None:
         """It is heard at another endpoint now; ``may_arm``: whether we may arm what is there."""
         self.comes_anew()
         self.requests.move_to(outlet)
@@ -270,7 +270,7 @@ class Vehicle:
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
         self.requests.ask_which_again()
-        self._book.record(VehicleSeen(self.system_id, "heard again", now))
+        self._registry.record(VehicleSeen(self.system_id, "heard again", now))
         self._takeovers.heard_again(now=now)
 
     def _note_component(self, component_id: int, *, now: float) -> None:
@@ -309,19 +309,19 @@ class Vehicle:
             component=target,
             command=command,
             standing=standing,
-            urgent=disarms,
+            immediate=disarms,
             now=now,
         )
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
         """Have the vehicle carry out what an item of a plan orders."""
-        begun = self.tasks.begun
-        if self.tasks.is_stopped or (begun is not None and begun.state not in RUNNING):
+        active = self.tasks.active
+        if self.tasks.is_stopped or (active is not None and active.state not in RUNNING):
             return  # called off in the very step in which it was ordered
         self.requests.perform(command, now=now)
 
     def next_deadline(self) -> float:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         deadline = min(self._clock.next_at, self.requests.next_deadline() or inf)
         if not self._was_heard:  # nothing is asked of one that cannot answer
             return deadline

@@ -7,7 +7,7 @@ from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -17,8 +17,8 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import INTERVAL
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import VehicleSeen
+from mav_tasks.tasks.registry import TaskRegistry
 
 MAX_PEERS = 256  # endpoints on one vehicle link
 BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
@@ -31,7 +31,7 @@ class Link:
     is_local: bool
     capacity: float | None
     heartbeat: Timer
-    outlets: dict[Peer, Outlet]
+    outlets: dict[Peer, PacketSender]
 
 
 class VehicleLinks:
@@ -45,7 +45,7 @@ class VehicleLinks:
         packer: Packer,
         signatures: Signatures,
         settings: Settings,
-        book: TaskBook,
+        registry: TaskRegistry,
         timers: Timers,
         beat: Callable[..., None],
         note_once: Callable[..., None],
@@ -61,12 +61,12 @@ class VehicleLinks:
         self._packer = packer
         self._signatures = signatures
         self._settings = settings
-        self._book = book
+        self._registry = registry
         self._note_once = note_once
         self._links: dict[str, Link] = {}
         #: which vehicle is where
         self.router = Router()
-        self._outlets: dict[Place, Outlet] = {}  # kept: their numbers go on
+        self._outlets: dict[Place, PacketSender] = {}  # kept: their numbers go on
         #: heartbeats of a known vehicle's id from another place: when the first one came
         self._rivals: dict[tuple[int, str, Peer], float] = {}
         #: where nobody is any more: whoever was there may be back at once, anywhere
@@ -78,7 +78,7 @@ class VehicleLinks:
         return f"VehicleLinks({list(self._links)})"
 
     def __iter__(self) -> Iterator[Link]:
-        """Give every link."""
+        """Return every link."""
         return iter(self._links.values())
 
     def apply(self, settings: Settings) -> None:
@@ -122,8 +122,8 @@ class VehicleLinks:
         """Whether a link of this name is a vehicle link."""
         return link in self._links
 
-    def meets(self, link_name: str, peer: Peer) -> tuple[Outlet, bool] | None:
-        """Give the way to somebody new at an endpoint, and whether it is new; None: too many."""
+    def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
+        """Return the way to somebody new at an endpoint, and whether it is new; None: too many."""
         link = self._links[link_name]
         outlet = link.outlets.get(peer)
         if outlet is not None:
@@ -167,7 +167,7 @@ class VehicleLinks:
         vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
         self.learn(vehicle.system_id, (link, peer))
         self._forget_if_empty(old)
-        self._book.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
+        self._registry.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
         return True
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
@@ -192,10 +192,10 @@ class VehicleLinks:
         is_driven = any(v.tasks.is_driving for v in self._all.values() if v.requests.place == place)
         return budget.why_not(who, packet, message, is_driven=is_driven, now=now)
 
-    def _outlet(self, link: str, peer: Peer) -> Outlet:
+    def _outlet(self, link: str, peer: Peer) -> PacketSender:
         outlet = self._outlets.get((link, peer))
         if outlet is None:
-            outlet = self._outlets[link, peer] = Outlet(
+            outlet = self._outlets[link, peer] = PacketSender(
                 link, peer, self._queue, self._packer, self._signatures
             )
         return outlet

@@ -7,7 +7,7 @@ from collections.abc import Hashable
 from math import inf
 
 from mav_tasks.engine.inputs import Outgoing, Peer
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -42,7 +42,7 @@ class VehicleRequests:
         self,
         target: Address,
         persona: Persona,
-        outlet: Outlet,
+        outlet: PacketSender,
         *,
         source: Address,
         watch: Watch,
@@ -69,7 +69,7 @@ class VehicleRequests:
         #: whether the vehicle has said which one it is
         self.is_identified = False
         #: zero and HOLD as packets, for an exit on which nothing can be computed any more
-        self.last_words = self._prepare_last_words()
+        self.emergency_stop_packets = self._prepare_last_words()
 
     @property
     def place(self) -> tuple[str, Peer]:
@@ -85,12 +85,12 @@ class VehicleRequests:
         """Speak otherwise from now on, to the same make of vehicle; it is not being driven."""
         self._persona = persona
         self.control.adopt(persona)
-        self.last_words = self._prepare_last_words()
+        self.emergency_stop_packets = self._prepare_last_words()
 
-    def move_to(self, outlet: Outlet) -> None:
+    def move_to(self, outlet: PacketSender) -> None:
         """The vehicle is heard at another endpoint now."""
         self._outlet = outlet
-        self.last_words = self._prepare_last_words()
+        self.emergency_stop_packets = self._prepare_last_words()
 
     def receive(self, ack: m.CommandAck, *, component: int, now: float) -> None:
         """Take an answer of the vehicle."""
@@ -118,7 +118,7 @@ class VehicleRequests:
         component: int,
         command: int,
         standing: Standing,
-        urgent: bool,
+        immediate: bool,
         now: float,
     ) -> None:
         """Forward a client's command; its answer comes from ``take_answers``."""
@@ -131,7 +131,7 @@ class VehicleRequests:
             standing=standing,
             now=now,
             give_up_after=self._watch.forward_answer,
-            urgent=urgent,
+            immediate=immediate,
         )
         self.flush(now=now)
 
@@ -208,7 +208,7 @@ class VehicleRequests:
         self._versions_asked, self._ask_version_at = 0, -inf
 
     def next_deadline(self) -> float | None:
-        """Give when a command is to be repeated or given up."""
+        """Return when a command is to be repeated or given up."""
         command, upload = self._sender.next_deadline(), self._uploader.next_deadline()
         if command is None or upload is None:
             return upload if command is None else command
@@ -247,12 +247,12 @@ class VehicleRequests:
         return bool(setpoints)
 
     def take_unperformed(self) -> list[Answered]:
-        """Give the orders of plans that the vehicle has refused or not answered since."""
+        """Return the orders of plans that the vehicle has refused or not answered since."""
         unperformed, self._unperformed = self._unperformed, []
         return unperformed
 
     def take_answers(self) -> list[Answered]:
-        """Give the answers to clients' commands since the last call."""
+        """Return the answers to clients' commands since the last call."""
         answers, self._answers = self._answers, []
         return answers
 

@@ -11,10 +11,10 @@ from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer
-from mav_tasks.engine.outlet import Outlet
+from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.timers import Timers
-from mav_tasks.engine.vehicles.agenda import Agenda
 from mav_tasks.engine.vehicles.control import Event
+from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
@@ -26,10 +26,10 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat
 from mav_tasks.services.persona import persona_of
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 NANO = 1e9  # TIMESYNC is in ns
@@ -78,20 +78,20 @@ class VehicleSide:
         queue: list[Outgoing],
         packer: Packer,
         signatures: Signatures,
-        book: TaskBook,
+        registry: TaskRegistry,
         fleet: Fleet,
         timers: Timers,
         settings: Settings,
     ) -> None:
         self._signatures = signatures
-        self._book = book
+        self._registry = registry
         self._fleet = fleet
         self._settings = settings
         #: as whom the server speaks to vehicles
         self.our_address = _own_address(settings)
         self._decoder = Decoder()
         #: which of them have something to do
-        self.agenda = Agenda(timers)
+        self.deadline_heap = DeadlineHeap(timers)
         self._old_until = -inf
         self._stood_for = 0.0  # s, that this process stood still before that
         self._noted: set[str] = set()
@@ -112,7 +112,7 @@ class VehicleSide:
             packer=packer,
             signatures=signatures,
             settings=settings,
-            book=book,
+            registry=registry,
             timers=timers,
             beat=self._beat,
             note_once=self._note_once,
@@ -122,18 +122,18 @@ class VehicleSide:
         return len(self._vehicles)
 
     def get(self, system_id: int) -> Vehicle | None:
-        """Give a vehicle, to do something to it."""
+        """Return a vehicle, to do something to it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None:
-            self.agenda.touch(vehicle)
+            self.deadline_heap.mark_dirty(vehicle)
         return vehicle
 
-    def touch(self, vehicle: Vehicle) -> None:
+    def mark_dirty(self, vehicle: Vehicle) -> None:
         """Note that something is about to be done to a vehicle that was only looked at."""
-        self.agenda.touch(vehicle)
+        self.deadline_heap.mark_dirty(vehicle)
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
-        """Give the vehicles that a target_system means, 0 all of them, to do something to them."""
+        """Return the vehicles that a target_system addresses; 0 addresses all of them."""
         if system_id:
             vehicle = self.get(system_id)
             return [] if vehicle is None else [vehicle]
@@ -179,7 +179,7 @@ class VehicleSide:
             words = (
                 f"is paused: key {names} counts no more. Cancel its tasks {ids}{more}, or continue"
             )
-            self._book.record(VehicleNoted(tasks.vehicle, words, now))
+            self._registry.record(VehicleNoted(tasks.vehicle, words, now))
             vehicle = self.get(tasks.vehicle)
             if vehicle is None:
                 tasks.pause(TaskReason.OPERATOR, actor=SERVER, now=now)
@@ -188,10 +188,10 @@ class VehicleSide:
 
     def commit(self, durable: int, *, now: float) -> None:
         """Let begin what waited for nothing but that events are durable up to this number."""
-        waiting = self.agenda.awaiting_commit()
-        self._book.durable = durable
+        waiting = self.deadline_heap.awaiting_commit()
+        self._registry.durable = durable
         for vehicle in waiting:
-            self.agenda.touch(vehicle)
+            self.deadline_heap.mark_dirty(vehicle)
             vehicle.joint.step(now)
 
     @property
@@ -206,7 +206,7 @@ class VehicleSide:
         self.links.apply(settings)
         for vehicle in self.all:
             vehicle.apply(settings)
-            self.agenda.touch(vehicle)  # its deadlines may be others
+            self.deadline_heap.mark_dirty(vehicle)  # its deadlines may be others
 
     def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
         """Take a packet in; gives the vehicle in whose name it is to be forwarded, if any.
@@ -262,12 +262,14 @@ class VehicleSide:
 
     def check_late(self, *, now: float) -> None:
         """Stop what was driven on without us; before anything else is done after a delay."""
-        due = min(self.agenda.next_deadline(), *(link.heartbeat.at for link in self.links), inf)
+        due = min(
+            self.deadline_heap.next_deadline(), *(link.heartbeat.at for link in self.links), inf
+        )
         if due + self._settings.watch.late_tick >= now:
             return
         self._old_until, self._stood_for = now + OLD_NEWS, now - due
         for vehicle in self.all:
-            self.agenda.touch(vehicle)
+            self.deadline_heap.mark_dirty(vehicle)
             vehicle.control.outdated(until=self._old_until)
             vehicle.joint.check_late(now=now)
 
@@ -275,7 +277,7 @@ class VehicleSide:
         """Return for how many seconds what is read now may have waited."""
         return self._stood_for if now < self._old_until else 0.0
 
-    def _beat(self, outlets: Mapping[Peer, Outlet], *, now: float) -> None:
+    def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
         """Each second and link: say that we are there, and ask for the time."""
         self._question.ts1 = round(now * NANO)
         self._asked.append(self._question.ts1)
@@ -315,7 +317,7 @@ class VehicleSide:
             heartbeat=heartbeat,
             persona=persona,
             outlet=outlet,
-            book=self._book,
+            registry=self._registry,
             tasks=self._fleet.of(packet.system_id),
             settings=self._settings,
             may_arm=self.links.may_arm(link_name),
@@ -323,8 +325,8 @@ class VehicleSide:
         )
         self._vehicles[packet.system_id] = vehicle
         self.links.learn(packet.system_id, (link_name, peer))
-        self.agenda.touch(vehicle)
-        self._book.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
+        self.deadline_heap.mark_dirty(vehicle)
+        self._registry.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         number = packet.system_id
         was_driven = self._fleet.was_driven(number)
         halt = self._fleet.last_halt(number, now=now)
@@ -343,14 +345,14 @@ class VehicleSide:
         for vehicle in self.all:
             place = self.links.router.place_of(vehicle.system_id)
             if target in (0, vehicle.system_id) and place is not None and place[0] == link:
-                self.agenda.touch(vehicle)
+                self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
         key = f"{system_id} {text}"
         if key not in self._noted and len(self._noted) < MOST_NOTES:
             self._noted.add(key)
-            self._book.record(VehicleNoted(system_id, text, now))
+            self._registry.record(VehicleNoted(system_id, text, now))
 
 
 def _own_address(settings: Settings) -> Address:

@@ -12,7 +12,6 @@ that remains is in the task's status.
 from math import radians
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import (
     APPROACH_GAIN,
     CREEP_RATE,
@@ -23,6 +22,7 @@ from mav_tasks.tasks.driving.guidance import (
     Velocity,
 )
 from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import Move, Rotate
 
 CORRECTIONS = 2  # times that the end is corrected from a standstill
@@ -113,7 +113,7 @@ class Arrival:
     def __repr__(self) -> str:
         return f"Arrival({self.along}, {self.around}, corrected {self._corrections} times)"
 
-    def slowest(self, course: Course) -> Slowest:
+    def slowest(self, course: PathFollower) -> Slowest:
         """Return how the last of a leg is to be driven."""
         along, around = self._driven(course), self.around
         return Slowest(along.least, around.least, along.gain(APPROACH_GAIN), around.gain(TURN_GAIN))
@@ -130,7 +130,7 @@ class Arrival:
 
     def stands_here(
         self,
-        course: Course,
+        course: PathFollower,
         motion: Motion,
         last: Velocity,
         *,
@@ -158,7 +158,7 @@ class Arrival:
             return True
         return False
 
-    def _judge(self, course: Course, *, driving: Driving) -> bool:
+    def _judge(self, course: PathFollower, *, driving: Driving) -> bool:
         """It stands: whether that is the end."""
         if self._is_settling and self._left_at_zero is not None:
             left, speed = self._left_at_zero
@@ -173,7 +173,7 @@ class Arrival:
         tried = self._gives_up or self._corrections > _corrections(course)
         return tried and course.is_settled(driving=driving)
 
-    def _watch(self, course: Course, *, driving: Driving, now: float) -> None:
+    def _watch(self, course: PathFollower, *, driving: Driving, now: float) -> None:
         """Look whether it still gets nearer."""
         left = abs(course.remaining)
         if self._best_at is None or left < self._best - NEARER:
@@ -182,7 +182,7 @@ class Arrival:
         self._gives_up = is_near and (self._gives_up or now - self._best_at > STALLED)
 
     def _look_for_effect(
-        self, course: Course, motion: Motion, last: Velocity, *, now: float
+        self, course: PathFollower, motion: Motion, last: Velocity, *, now: float
     ) -> None:
         """Look whether a slow speed near the end has an effect, unless it still turns."""
         asked = self._asked(course, last)
@@ -198,25 +198,25 @@ class Arrival:
                 self._creeping(course).had_no_effect(slowest)
             self._crept = None
 
-    def _creeping(self, course: Course) -> Creeping:
+    def _creeping(self, course: PathFollower) -> Creeping:
         if isinstance(course.leg, Rotate):
             return self.around
         return self._driven(course)
 
-    def _driven(self, course: Course) -> Creeping:
+    def _driven(self, course: PathFollower) -> Creeping:
         if course.has_one_try:
             return self.in_one_try
         return self.along if course.steering is None else self.as_car
 
-    def _measured(self, course: Course, motion: Motion) -> float:
+    def _measured(self, course: PathFollower, motion: Motion) -> float:
         """What it does: a rover slows down later than it is asked to."""
         return abs(motion.yaw_rate if isinstance(course.leg, Rotate) else motion.forward)
 
-    def _asked(self, course: Course, last: Velocity) -> float:
+    def _asked(self, course: PathFollower, last: Velocity) -> float:
         return abs(last.yaw_rate if isinstance(course.leg, Rotate) else last.forward)
 
 
-def _corrections(course: Course) -> int:
+def _corrections(course: PathFollower) -> int:
     """Return how often the end of a leg is corrected from a standstill, at the most."""
     if course.has_one_try:
         return 0

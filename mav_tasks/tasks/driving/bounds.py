@@ -50,7 +50,7 @@ class Bounds:
         return bool(self.fence.zones) and origin is None
 
     def local(self, origin: GlobalPlace | None) -> LocalFence | None:
-        """Give the fence in the frame of an origin, None where there is none."""
+        """Return the fence in the frame of an origin, None where there is none."""
         if origin is None or not self.fence.zones:
             return None
         if self._made_of != (self.fence, origin):
@@ -81,7 +81,7 @@ class Bounds:
         return fence.allows_way(start, end) or fence.escapes(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:
-        """Give a step to which the straight way from one before it is not allowed, if there is one.
+        """Return a step that the straight way from the one before may not reach, or None.
 
         As far as places are known beforehand; the rest is looked at when it begins.
         """
@@ -97,7 +97,7 @@ class Bounds:
         return None
 
     def refuge(self, pose: Pose, origin: GlobalPlace | None) -> GlobalPlace | None:
-        """Give the nearest rally point, None where there is none."""
+        """Return the nearest rally point, None where there is none."""
         if origin is None or not self.rally:
             return None
         return min(self.rally, key=lambda place: distance(pose, to_local(place, origin)))
@@ -120,7 +120,7 @@ def _place_of(step: Step, origin: GlobalPlace | None) -> LocalPlace | None:
 
 
 def _next_places(steps: Sequence[Step], number: int) -> list[int]:
-    """Give the steps whose places may be driven to next, by whichever jumps."""
+    """Return the steps whose places may be driven to next, by whichever jumps."""
     found: list[int] = []
     seen: set[int] = set()
     waiting = [number + 1]

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Leg, wrap
-from mav_tasks.tasks.driving.itinerary import begun, following, is_over, present_goal
 from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
+from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, started
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import (
@@ -61,7 +61,7 @@ def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
 
 
 def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
-    progress = progress if progress.step >= 0 else begun(plan, progress)
+    progress = progress if progress.step >= 0 else started(plan, progress)
     speed = progress.speed or known.driving.speed
     seconds, pose = 0.0, known.pose
     for _ in range(MOST_STEPS):

@@ -122,7 +122,7 @@ class LocalFence:
         return states[0] < states[-1] and states == sorted(states)
 
     def room(self, pose: Pose, *, forward: bool, limit: float) -> float:
-        """Give the metres straight ahead, or straight back, until the first forbidden place.
+        """Return the metres straight ahead, or straight back, until the first forbidden place.
 
         ``limit``, finite and not negative, if there is none before; 0.0 if the pose itself is not
         allowed.
@@ -136,7 +136,7 @@ class LocalFence:
         return limit
 
     def _walk(self, way: "_Way") -> Iterator[tuple[float, bool]]:
-        """Give from where on, in metres along a way, its places are allowed or not; in order.
+        """Yield from where on, in metres along a way, its places are allowed or not; in order.
 
         Between two marks all places are alike, and the one in the middle speaks for them.
         """
@@ -166,12 +166,12 @@ class _Way:
         return LocalPlace(north, east)
 
     def along(self, place: _Point) -> float:
-        """Give how far along the way, or its line beyond, a place is."""
+        """Return how far along the way, or its line beyond, a place is."""
         north, east = place
         return (north - self.start.north) * self.north + (east - self.start.east) * self.east
 
     def rights(self, places: Iterable[_Point]) -> list[float]:
-        """Give for each place how far it is to the right of the way or its line."""
+        """Return for each place how far it is to the right of the way or its line."""
         to_north, to_east = self.north, self.east
         here = self.start.east * to_north - self.start.north * to_east
         return [east * to_north - north * to_east - here for north, east in places]
@@ -263,7 +263,7 @@ def _local(zone: Zone, origin: GlobalPlace) -> _LocalZone:
 
 
 def _box(places: Iterable[LocalPlace]) -> tuple[float, float, float, float]:
-    """Give the least and greatest north, then east, of all that is near these places."""
+    """Return the least and greatest north, then east, of all that is near these places."""
     norths = [place.north for place in places]
     easts = [place.east for place in places]
     return min(norths) - EDGE, max(norths) + EDGE, min(easts) - EDGE, max(easts) + EDGE

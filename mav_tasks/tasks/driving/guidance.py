@@ -90,14 +90,14 @@ USUAL = Slowest()
 
 
 def wrap(angle: float) -> float:
-    """Give the same direction within ±pi."""
+    """Return the same direction within ±pi."""
     return atan2(sin(angle), cos(angle))
 
 
 def done_so_far(
     leg: Leg, anchor: Pose, pose: Pose, *, before: float, elapsed: float = 0.0
 ) -> float:
-    """Give the metres along the line, the radians turned, or the seconds, since the anchor.
+    """Return the metres along the line, the radians turned, or the seconds, since the anchor.
 
     ``before`` is the last such value: of the turns that fit a measured heading, the nearest to it
     is meant, which holds as long as the vehicle is seen at least twice in half a turn. Negative
@@ -119,7 +119,7 @@ def done_so_far(
 
 
 def cross_track(anchor: Pose, pose: Pose) -> float:
-    """Give the metres to the right of the line from the anchor along its yaw."""
+    """Return the metres to the right of the line from the anchor along its yaw."""
     return (pose.east - anchor.east) * cos(anchor.yaw) - (pose.north - anchor.north) * sin(
         anchor.yaw
     )
@@ -159,7 +159,7 @@ def steer(
     radius: float | None = None,
     slowest: Slowest = USUAL,
 ) -> Velocity:
-    """Give the velocity that brings the vehicle nearer to the leg's end, but for ``follow``'s legs.
+    """Return the velocity towards the leg's end; ``follow`` has its own for its legs.
 
     ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
     ``passing`` is the speed that a move has at its end, m/s, when another follows. ``by_course``:
@@ -223,7 +223,7 @@ def is_far_off(heading_error: float) -> bool:
 
 
 def corner_speed(turn: float, *, lead: float) -> float:
-    """Give the speed in m/s at which a way may bend by ``turn`` rad, begun ``lead`` m before.
+    """Return the speed in m/s at which a way may bend by ``turn`` rad, begun ``lead`` m before.
 
     0 where it has to stop first and turn on the spot.
     """
@@ -242,7 +242,7 @@ def approach(
     creep: float,
     at_end: float = 0.0,
 ) -> float:
-    """Give the speed at a distance: as fast as one may and can still brake, then gently."""
+    """Return the speed at a distance: as fast as one may and can still brake, then gently."""
     left = abs(remaining)
     braked = sqrt(at_end * at_end + 2 * 0.5 * braking * left)
     return max(min(creep, top), min(top, max(gain * left, at_end), braked))

@@ -30,14 +30,14 @@ FACE, WAY = range(2)
 
 
 def leg_count(goal: SingleGoal) -> int:
-    """Give the number of a goal's legs."""
+    """Return the number of a goal's legs."""
     if isinstance(goal, GoTo):
         return 2 + (goal.yaw is not None) + (goal.wait > 0)
     return 3 if isinstance(goal, MoveTurned) else 1
 
 
 def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
-    """Give the pose from which a leg that begins at ``pose`` counts."""
+    """Return the pose from which a leg that begins at ``pose`` counts."""
     if isinstance(goal, GoTo) and leg == WAY:
         assert target is not None, "the place was found before the task began"
         return replace(pose, yaw=bearing(pose, target))
@@ -45,7 +45,7 @@ def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None)
 
 
 def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
-    """Give the leg that is being driven."""
+    """Return the leg that is being driven."""
     anchor = progress.anchor
     assert anchor is not None, "a leg is driven from its anchor"
     match goal:
@@ -66,12 +66,12 @@ def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
 
 
 def first_leg(goal: SingleGoal) -> Leg | None:
-    """Give the first leg of a task that has not begun, if its size can be known by then."""
+    """Return the first leg of a task that has not begun, if its size can be known by then."""
     return goal if isinstance(goal, Move | Rotate | Drive | Wait | Head) else None
 
 
 def length_of(leg: Leg) -> float:
-    """Give the whole of a leg, unsigned: metres, radians or seconds."""
+    """Return the whole of a leg, unsigned: metres, radians or seconds."""
     match leg:
         case Move(distance=distance):
             return abs(distance)
@@ -84,7 +84,7 @@ def length_of(leg: Leg) -> float:
 
 
 def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
-    """Give the anchor of a goal of which ``done`` is behind a vehicle that stands at ``pose``.
+    """Return the anchor of a goal of which ``done`` is behind a vehicle that stands at ``pose``.
 
     For what is continued from here, because where it began can no longer be said.
     """
@@ -103,14 +103,14 @@ def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
 
 
 def bearing(pose: Pose, place: LocalPlace) -> float:
-    """Give the direction of a place; where the vehicle already is, its own heading."""
+    """Return the direction of a place; where the vehicle already is, its own heading."""
     if distance(pose, place) < 1e-6:
         return pose.yaw
     return atan2(place.east - pose.east, place.north - pose.north)
 
 
 def distance(pose: Pose, place: LocalPlace) -> float:
-    """Give the metres from a pose to a place."""
+    """Return the metres from a pose to a place."""
     return hypot(place.north - pose.north, place.east - pose.east)
 
 
@@ -128,7 +128,7 @@ def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
 
 
 def _turn(have: float, want: float, direction: int) -> float:
-    """Give the angle from one heading to another: the shorter way, or the way that is asked for."""
+    """Return the angle between two headings: the shorter way, or the one asked for."""
     short = wrap(want - have)
     if direction == 0 or short * direction >= 0 or abs(abs(short) - pi) < 1e-9:
         return copysign(short, direction) if direction else short

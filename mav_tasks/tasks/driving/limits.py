@@ -21,7 +21,7 @@ CREEP = 0.02  # m/s; slower than this is standing
 def within_fence(
     wish: Velocity, motion: Motion, fence: LocalFence | None, *, driving: Driving, now: float
 ) -> Velocity | None:
-    """Give what may be asked for so that the vehicle can stop before the fence; None: stop now.
+    """Return what may be asked for so that the vehicle can stop before the fence; None: stop now.
 
     It goes by the room ahead, or behind for one that reverses, in every direction in which the
     vehicle may point until it stands; and it has driven on since it was measured.
@@ -45,7 +45,7 @@ def within_fence(
 
 
 def _headings(wish: Velocity, motion: Motion) -> list[float]:
-    """Give the directions in which a vehicle may point until it stands, not far from each other."""
+    """Return directions, close to each other, in which a vehicle may point until it stands."""
     yaw = motion.pose.yaw
     if wish.course is not None:  # it turns there by itself, as fast as it can
         turns = [0.0, wrap(wish.course - yaw)]
@@ -58,7 +58,7 @@ def _headings(wish: Velocity, motion: Motion) -> list[float]:
 
 
 def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float) -> Velocity:
-    """Give what may be sent ``elapsed`` seconds after ``last``.
+    """Return what may be sent ``elapsed`` seconds after ``last``.
 
     Speeding up is ramped at the settings' accelerations, slowing down is not. A number that is not
     finite becomes a stop: NaN in a velocity setpoint aborts an ArduPilot SITL.
@@ -85,7 +85,7 @@ def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float)
 
 
 def safe_braking(driving: Driving, speed: float, distance: float) -> float:
-    """Give the deceleration to plan for where a stop from ``speed`` took ``distance``.
+    """Return the deceleration to plan for where a stop from ``speed`` took ``distance``.
 
     The settings', or less if it took more room than is planned for; all of it counts as braking
     then, for a lag at low speed says little of a higher one. It makes more careful, never less.

@@ -139,7 +139,7 @@ def _direction(path: Path) -> float:
 
 
 def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Iterator[float]:
-    """Give for each piece its place nearest to a pose."""
+    """Yield for each piece its place nearest to a pose."""
     start, begins, ahead = anchor, 0.0, _direction(path)
     yield min(0.0, ahead * _forward_of(anchor, pose))
     for bend in path:
@@ -179,7 +179,7 @@ CHORD = pi / 15
 
 
 def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pose]:
-    """Give the corners of a way along a path; ``outside`` m further out in its bends."""
+    """Yield the corners of a way along a path; ``outside`` m further out in its bends."""
     start = anchor
     for bend in path:
         turn = abs(bend.curvature * bend.length)

@@ -137,7 +137,7 @@ def _ways_to(pose: Pose, place: LocalPlace, steering: Steering) -> Iterator[Path
 
 
 def _beginnings(radius: float, *, reverses: bool) -> Iterator[Path]:
-    """Give what may be driven before the turn towards a place."""
+    """Yield what may be driven before the turn towards a place."""
     yield ()
     bends = (0.0, 1 / radius, -1 / radius)
     directions = (1.0, -1.0) if reverses else (1.0,)
@@ -150,7 +150,7 @@ def _beginnings(radius: float, *, reverses: bool) -> Iterator[Path]:
 
 
 def _turns_to(pose: Pose, place: LocalPlace, radius: float) -> Iterator[Path]:
-    """Give an arc and a straight to a place, for each side on which there is such a way."""
+    """Yield an arc and a straight to a place, for each side on which there is such a way."""
     for side in (1.0, -1.0):
         centre = _point(pose) + side * radius * 1j * rect(1.0, pose.yaw)
         to_place = complex(place.north, place.east) - centre
@@ -163,7 +163,7 @@ def _turns_to(pose: Pose, place: LocalPlace, radius: float) -> Iterator[Path]:
 
 
 def _dubins(pose: Pose, goal: Pose, radius: float) -> Iterator[Path]:
-    """Give an arc, a straight and an arc, for each pair of sides for which there is such a way."""
+    """Yield an arc, a straight and an arc, for each pair of sides for which there is such a way."""
     for first, last in product((1.0, -1.0), repeat=2):
         start = _point(pose) + first * radius * 1j * rect(1.0, pose.yaw)
         end = _point(goal) + last * radius * 1j * rect(1.0, goal.yaw)

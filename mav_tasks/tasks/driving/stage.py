@@ -5,14 +5,14 @@ from math import inf, radians
 
 from mav_tasks.settings import Driving, Turning
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.follow import bend_speed
 from mav_tasks.tasks.driving.guidance import Motion, corner_speed, wrap
-from mav_tasks.tasks.driving.itinerary import begun, goes_on_to_a_place, present_goal
 from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, bearing, begun_from, distance
+from mav_tasks.tasks.driving.mission_sequencer import goes_on_to_a_place, present_goal, started
 from mav_tasks.tasks.driving.path import path_length, pose_on
+from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
-from mav_tasks.tasks.driving.way_back import resumed
+from mav_tasks.tasks.driving.recovery_path import resumed
 from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, LocalPlace, Near, Perform, Plan, SetSpeed
 from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
@@ -33,7 +33,7 @@ class OnTheWay:
 
 
 def steering_of(seen: VehicleView, bounds: Bounds) -> Steering | None:
-    """Give what ways of a car are made of; None for a vehicle that turns on the spot."""
+    """Return what ways of a car are made of; None for a vehicle that turns on the spot."""
     if seen.turning is not Turning.STEERED:
         return None
     return Steering(seen.turning_radius, seen.honours_yaw_rate, bounds.local(seen.origin))
@@ -47,12 +47,12 @@ def set_out(
     *,
     steering: Steering | None = None,
 ) -> Progress | None:
-    """Give the progress with which a task goes on, or begins, here; None: its place is unknown.
+    """Return the progress with which a task goes on, or begins, here; None: its place is unknown.
 
     ``steering`` of a vehicle that steers as a car.
     """
     if isinstance(goal, Plan) and progress.step < 0:
-        progress = begun(goal, progress)
+        progress = started(goal, progress)
     single = present_goal(goal, progress)
     turns_first = seen.honours_yaw_rate and steering is None
     if progress.anchor is not None:
@@ -102,11 +102,11 @@ def course_of(
     *,
     driving: Driving,
     steering: Steering | None = None,
-) -> Course:
-    """Give the course of the present stage, which may lead on to the next place."""
+) -> PathFollower:
+    """Return the course of the present stage, which may lead on to the next place."""
     single = present_goal(goal, progress)
     by_course = not seen.honours_yaw_rate
-    stopping = Course(single, progress, by_course=by_course, steering=steering)
+    stopping = PathFollower(single, progress, by_course=by_course, steering=steering)
     if not (isinstance(goal, Plan) and isinstance(single, GoTo) and single.passes):
         return stopping
     target, anchor = progress.target, progress.anchor
@@ -122,7 +122,7 @@ def course_of(
     speed = corner_speed(turn, lead=within)
     if steering is not None:
         speed = _speed_of_bend(turn, steering, driving)
-    return Course(
+    return PathFollower(
         single,
         progress,
         passing=min(driving.max_speed, speed),
@@ -133,7 +133,7 @@ def course_of(
 
 
 def _speed_of_bend(turn: float, steering: Steering, driving: Driving) -> float:
-    """Give the speed in m/s at which a car begins its turn to the next place; 0: it stops."""
+    """Return the speed in m/s at which a car begins its turn to the next place; 0: it stops."""
     return bend_speed(1 / steering.planned_radius, driving) if abs(turn) <= ROLLING_TURN else 0.0
 
 

@@ -6,9 +6,9 @@ nearer to, standing still while a velocity is asked for.
 
 from math import hypot, inf, pi, radians
 
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import Motion, Velocity, is_far_off, wrap
 from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.task import Pose
 from mav_tasks.tasks.view import VehicleView
@@ -86,7 +86,9 @@ class StuckWatch:
         self._last = (abs(velocity.forward) * seconds, abs(velocity.yaw_rate) * seconds)
         self._course = velocity.course
 
-    def is_stuck(self, course: Course, seen: VehicleView, *, limit: float, now: float) -> bool:
+    def is_stuck(
+        self, course: PathFollower, seen: VehicleView, *, limit: float, now: float
+    ) -> bool:
         """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
         leg = course.leg
         forward, turned = self._last

@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Give the command line."""
+    """Return the command line."""
     parser = argparse.ArgumentParser(
         prog="rover_sim.check_vehicle",
         description="Check what a task server and its clients expect of a MAVLink rover. Nothing"

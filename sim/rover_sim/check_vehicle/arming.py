@@ -1,9 +1,9 @@
 """Arming and disarming, in HOLD; with ``arm`` only."""
 
 from rover_sim.check_vehicle.context import Context
+from rover_sim.check_vehicle.drive_controller import ARM_DISARM, bring_to_rest
 from rover_sim.check_vehicle.modes import SHOWN_WITHIN, ask_mode, shows
 from rover_sim.check_vehicle.probe import ARMED, HEARTBEAT, Answer
-from rover_sim.check_vehicle.wheel import ARM_DISARM, bring_to_rest
 
 EXTENDED_SYS_STATE, IN_AIR = 245, 2
 PATIENCE = 15.0  # s in which a vehicle that has just started may still refuse

@@ -115,5 +115,5 @@ WAYS = {way.name: way for way in (ARDUPILOT_WAY, PX4_WAY, GENERIC_WAY)}
 
 
 def way_of(autopilot: int) -> Conventions:
-    """Give the make of a MAV_AUTOPILOT."""
+    """Return the make of a MAV_AUTOPILOT."""
     return {ARDUPILOTMEGA: ARDUPILOT_WAY, PX4: PX4_WAY}.get(autopilot, GENERIC_WAY)

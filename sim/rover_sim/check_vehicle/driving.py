@@ -5,6 +5,15 @@ from typing import Any
 
 from rover_sim.check_vehicle.arming import arm, shows_armed
 from rover_sim.check_vehicle.context import Context
+from rover_sim.check_vehicle.drive_controller import (
+    ARM_DISARM,
+    BODY_NED,
+    LOCAL_NED,
+    STANDING,
+    DriveController,
+    Interference,
+    bring_to_rest,
+)
 from rover_sim.check_vehicle.modes import ask_mode, enter_control, send_zeros, shows
 from rover_sim.check_vehicle.rates import SET_MESSAGE_INTERVAL
 from rover_sim.check_vehicle.telemetry import (
@@ -12,15 +21,6 @@ from rover_sim.check_vehicle.telemetry import (
     GLOBAL_POSITION_INT,
     LOCAL_POSITION_NED,
     METRES_A_DEGREE,
-)
-from rover_sim.check_vehicle.wheel import (
-    ARM_DISARM,
-    BODY_NED,
-    LOCAL_NED,
-    STANDING,
-    Interference,
-    Wheel,
-    bring_to_rest,
 )
 
 SPEED = 0.6  # m/s
@@ -93,7 +93,7 @@ def _shows_with_zeros(context: Context) -> bool:
 
 
 def _drive(context: Context) -> None:
-    wheel = Wheel(context)
+    wheel = DriveController(context)
     _check_velocity(context, wheel, LOCAL_NED)
     _check_velocity(context, wheel, BODY_NED)
     _check_yaw_rate(context, wheel)
@@ -102,7 +102,7 @@ def _drive(context: Context) -> None:
     _check_disarm(context, wheel)
 
 
-def _check_velocity(context: Context, wheel: Wheel, frame: int) -> None:
+def _check_velocity(context: Context, wheel: DriveController, frame: int) -> None:
     report, name = context.report, "LOCAL_NED" if frame == LOCAL_NED else "BODY_NED"
     before = wheel.position
     both_before = _both_positions(context)
@@ -154,7 +154,7 @@ def _both_positions(context: Context) -> tuple[Any, Any]:
     return probe.last(LOCAL_POSITION_NED), probe.last(GLOBAL_POSITION_INT)
 
 
-def _check_yaw_rate(context: Context, wheel: Wheel) -> None:
+def _check_yaw_rate(context: Context, wheel: DriveController) -> None:
     """A curve and backwards, where yaw rates count; on the spot, where the rover can."""
     if not context.way.honours_yaw_rate:
         turned, _ = _turn(wheel, 0.0, TURN_RATE)
@@ -184,7 +184,7 @@ def _check_yaw_rate(context: Context, wheel: Wheel) -> None:
         context.report.ok("on the spot", seen)
 
 
-def _turn(wheel: Wheel, speed: float, rate: float) -> tuple[float, float]:
+def _turn(wheel: DriveController, speed: float, rate: float) -> tuple[float, float]:
     """Drive for a leg; gives the turn (rad, clockwise) and the way ahead (m)."""
     before = wheel.position
     wheel.velocity(speed, 0.0, LEG, frame=BODY_NED, yaw_rate=rate)
@@ -194,7 +194,7 @@ def _turn(wheel: Wheel, speed: float, rate: float) -> tuple[float, float]:
     return turned, after.ahead_of(before)
 
 
-def _check_place(context: Context, wheel: Wheel) -> None:
+def _check_place(context: Context, wheel: DriveController) -> None:
     before = wheel.position
     north, east = AHEAD * math.cos(before.yaw), AHEAD * math.sin(before.yaw)
     wheel.go_to(before.x + north, before.y + east, 5.0)
@@ -208,7 +208,7 @@ def _check_place(context: Context, wheel: Wheel) -> None:
     wheel.wait_standing(STOP_LIMIT)
 
 
-def _check_time_out(context: Context, wheel: Wheel) -> None:
+def _check_time_out(context: Context, wheel: DriveController) -> None:
     before = wheel.position
     wheel.velocity(SPEED, 0.0, LEG, frame=BODY_NED)
     if wheel.position.speed < 0.5 * SPEED:
@@ -226,7 +226,7 @@ def _check_time_out(context: Context, wheel: Wheel) -> None:
     )
 
 
-def _check_disarm(context: Context, wheel: Wheel) -> None:
+def _check_disarm(context: Context, wheel: DriveController) -> None:
     if not _enter(context):
         return
     wheel.velocity(SPEED, 0.0, LEG, frame=BODY_NED)

@@ -95,7 +95,7 @@ def _check_upload(context: Context, mission_type: int, name: str) -> None:
 
 
 def _download(context: Context, mission_type: int) -> list[Any] | str:
-    """Give the items, or what went wrong."""
+    """Return the items, or what went wrong."""
     probe, target = context.probe, (context.probe.system_id, AUTOPILOT)
 
     def of_type(message: Any) -> bool:

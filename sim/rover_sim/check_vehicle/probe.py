@@ -149,11 +149,11 @@ class Probe:
             self.pump(min(left, PATIENCE))
 
     def mark(self) -> int:
-        """Give a place in the log, for ``since`` and ``wait``."""
+        """Return a place in the log, for ``since`` and ``wait``."""
         return len(self.log)
 
     def since(self, mark: int, message_id: int) -> list[Heard]:
-        """Give what was heard of a kind, from the autopilot, since then."""
+        """Return what was heard of a kind, from the autopilot, since then."""
         return [
             heard
             for heard in self.log[mark:]
@@ -161,12 +161,12 @@ class Probe:
         ]
 
     def last(self, message_id: int) -> Any:
-        """Give the last message of a kind from the autopilot, or None."""
+        """Return the last message of a kind from the autopilot, or None."""
         heard = self._last(message_id)
         return None if heard is None else heard.message
 
     def silence(self, message_id: int) -> float:
-        """Give the seconds since the last message of a kind from the autopilot."""
+        """Return the seconds since the last message of a kind from the autopilot."""
         heard = self._last(message_id)
         return math.inf if heard is None else self.now - heard.at
 
@@ -208,7 +208,7 @@ class Probe:
         )
 
     def texts(self, mark: int) -> str:
-        """Give what the vehicle said in words since then, to be added to a line."""
+        """Return what the vehicle said in words since then, to be added to a line."""
         said = [heard.message.text for heard in self.log[mark:] if _is_text(heard)]
         return f' (it says: "{"; ".join(said[-3:])}")' if said else ""
 

@@ -76,7 +76,7 @@ class Report:
         )
 
     def as_json(self) -> list[dict[str, str]]:
-        """Give the lines for a machine."""
+        """Return the lines for a machine."""
         return [asdict(line) | {"outcome": line.outcome.value} for line in self.lines]
 
     def _add(self, name: str, outcome: Outcome, said: str) -> None:

@@ -19,7 +19,7 @@ class Wire(Protocol):
     """Where bytes come from and go to, and the clock that goes with it."""
 
     def now(self) -> float:
-        """Give the time of the vehicle's world, s."""
+        """Return the time of the vehicle's world, s."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -27,7 +27,7 @@ class Wire(Protocol):
         ...
 
     def receive(self, within: float) -> bytes:
-        """Give the next bytes; none if there are none within so many seconds."""
+        """Return the next bytes; none if there are none within so many seconds."""
         ...
 
 
@@ -79,7 +79,7 @@ class MavutilWire:
         return f"MavutilWire({self._link})"
 
     def now(self) -> float:
-        """Give the monotonic clock, as fast as the vehicle's."""
+        """Return the monotonic clock, as fast as the vehicle's."""
         return time.monotonic() * self._speed
 
     def send(self, data: bytes) -> None:
@@ -87,7 +87,7 @@ class MavutilWire:
         self._link.write(data)
 
     def receive(self, within: float) -> bytes:
-        """Give the next bytes; none if there are none in time."""
+        """Return the next bytes; none if there are none in time."""
         if self._link.select(max(0.0, within / self._speed)):
             return bytes(self._link.recv(READ_SIZE) or b"")
         return b""

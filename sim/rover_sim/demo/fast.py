@@ -4,7 +4,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.links.memory import MemoryLink, MemoryNet
-from mav_tasks.recording import witnesses
+from mav_tasks.recording import observers
 from mav_tasks.settings import Recording, Settings
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
@@ -28,14 +28,14 @@ def drive(
     ``record`` is the folder for a record of the server's decisions, "" for none.
     """
     settings = Settings()
-    recorders = witnesses(Recording(decisions=record), settings, None, now=0.0)
+    recorders = observers(Recording(decisions=record), settings, None, now=0.0)
     net = MemoryNet()
     realism = EXACT if noise == "off" else None
     vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0, realism=realism, seed=seed)
     world = VirtualWorld(net)
     member = _Member(net.link("third party"), vehicle, screen)
     rover = RoverParty(vehicle, net.link("rover"))
-    server = InMemoryServer(net, vehicles=("rover",), settings=settings, witnesses=recorders)
+    server = InMemoryServer(net, vehicles=("rover",), settings=settings, observers=recorders)
     world.join(rover, server, member)
     track: list[Place] = []
 
@@ -70,7 +70,7 @@ class _Member:
         self._link.send(CLIENT_LINK, bytes(data))
 
     def truth(self) -> Place:
-        """Give where the rover really is."""
+        """Return where the rover really is."""
         state = self._vehicle.truth
         return Place(state.north, state.east, state.yaw)
 

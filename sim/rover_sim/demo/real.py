@@ -111,14 +111,14 @@ def process(command: list[str], log: Path) -> Iterator[Callable[[], None]]:
 
 
 def read_track(truth_file: Path) -> list[Place]:
-    """Give the true poses that the rover has written so far; a last half line is left out."""
+    """Return the true poses that the rover has written so far; a last half line is left out."""
     text = truth_file.read_text(encoding="ascii") if truth_file.exists() else ""
     rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
     return [Place(float(r["north"]), float(r["east"]), float(r["yaw"])) for r in rows]
 
 
 def free_ports(count: int) -> list[int]:
-    """Give UDP ports of the loopback that nobody uses at this moment."""
+    """Return UDP ports of the loopback that nobody uses at this moment."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for each in sockets:

@@ -13,7 +13,7 @@ TURN_TOLERANCE = 1.0  # deg
 
 
 def measured(task: Seen) -> float:
-    """Give the metres driven along the first heading, or the degrees turned; NaN if unknown."""
+    """Return the metres driven along the first heading, or the degrees turned; NaN if unknown."""
     began, ended = task.began, task.ended
     if began is None or ended is None:
         return math.nan
@@ -25,7 +25,7 @@ def measured(task: Seen) -> float:
 
 
 def problems(party: ThirdParty) -> list[str]:
-    """Give everything that is not as it should be, in words."""
+    """Return everything that is not as it should be, in words."""
     found = []
     ids = [task.task_id for task in party.tasks]
     if any(task.result != ACCEPTED for task in party.tasks):

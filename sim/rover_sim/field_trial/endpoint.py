@@ -59,7 +59,7 @@ class Endpoint:
         beat_at = 0.0
         while True:
             if isinstance(self._link, StreamLink):
-                self._link.tend()
+                self._link.poll()
                 self._take_changes(self._link)
             now = self._loop.time()
             if now >= beat_at:

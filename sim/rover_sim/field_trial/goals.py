@@ -29,7 +29,7 @@ class Where:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class TrialTask:
     """One task: its words, its goals, and the end that it promises as the rover tells places."""
 
     words: str
@@ -39,16 +39,16 @@ class Asked:
     is_relative: bool = False  # to where the rover is when it begins: a move
 
 
-Maker = Callable[[Where], Asked]
+Maker = Callable[[Where], TrialTask]
 
 
 def move(distance: float) -> Maker:
     """Return a move along the heading."""
 
-    def make(where: Where) -> Asked:
+    def make(where: Where) -> TrialTask:
         yaw = where.now.yaw
         end = where.now.moved(distance * cos(yaw), distance * sin(yaw))
-        return Asked(f"move {distance:g} m", (Move(distance),), end, is_relative=True)
+        return TrialTask(f"move {distance:g} m", (Move(distance),), end, is_relative=True)
 
     return make
 
@@ -56,8 +56,8 @@ def move(distance: float) -> Maker:
 def turn(angle: float) -> Maker:
     """Return a turn on the spot, deg."""
 
-    def make(_where: Where) -> Asked:
-        return Asked(f"turn {angle:g} deg", (Rotate(radians(angle)),), turn=radians(angle))
+    def make(_where: Where) -> TrialTask:
+        return TrialTask(f"turn {angle:g} deg", (Rotate(radians(angle)),), turn=radians(angle))
 
     return make
 
@@ -65,10 +65,10 @@ def turn(angle: float) -> Maker:
 def go(forward: float, right: float) -> Maker:
     """Return a way to a place, by the trial's beginning."""
 
-    def make(where: Where) -> Asked:
+    def make(where: Where) -> TrialTask:
         place = where.ahead(forward, right)
         end = Place(0.0, place.north, place.east, 0.0)
-        return Asked(f"go to {forward:g}, {right:g} m", (GoTo(place),), end)
+        return TrialTask(f"go to {forward:g}, {right:g} m", (GoTo(place),), end)
 
     return make
 
@@ -76,15 +76,15 @@ def go(forward: float, right: float) -> Maker:
 def near(distance: float) -> Maker:
     """Return a way to a place so far ahead of where the rover is."""
 
-    def make(where: Where) -> Asked:
+    def make(where: Where) -> TrialTask:
         yaw = where.now.yaw
         end = where.now.moved(distance * cos(yaw), distance * sin(yaw))
-        return Asked(f"go {distance:g} m ahead", (GoTo(LocalPlace(end.north, end.east)),), end)
+        return TrialTask(f"go {distance:g} m ahead", (GoTo(LocalPlace(end.north, end.east)),), end)
 
     return make
 
 
-def mission(where: Where) -> Asked:
+def mission(where: Where) -> TrialTask:
     """Return five places, 6 m apart in a wide arc that suits a car as well."""
     bearings = (0.0, pi / 4, pi / 2, 3 * pi / 4, pi)
     forward, right, places = 4.0, 0.0, []
@@ -94,13 +94,13 @@ def mission(where: Where) -> Asked:
         places.append(where.ahead(forward, right))
     last = places[-1]
     goals = tuple(GoTo(place) for place in places)
-    return Asked("mission of 5", goals, Place(0.0, last.north, last.east, 0.0))
+    return TrialTask("mission of 5", goals, Place(0.0, last.north, last.east, 0.0))
 
 
-def home(where: Where) -> Asked:
+def home(where: Where) -> TrialTask:
     """Return the way home: where it was first armed, which the trial need not know."""
     del where
-    return Asked("return", (GoTo(None),))
+    return TrialTask("return", (GoTo(None),))
 
 
 def plan() -> Sequence[Maker]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import degrees, hypot, remainder, tau
 from statistics import fmean
 
-from rover_sim.field_trial.goals import Asked, Maker, Where, further, plan
+from rover_sim.field_trial.goals import Maker, TrialTask, Where, further, plan
 from rover_sim.field_trial.rows import Row, judged, quantile
 from rover_sim.field_trial.session import End, Session
 from rover_sim.field_trial.track import Place
@@ -20,7 +20,7 @@ UNABLE = ("not turn", "not reverse", "cannot turn")  # in refusals of what the r
 class Driven:
     """One task that was driven to its end, as it truly was and as the rover told it."""
 
-    asked: Asked
+    asked: TrialTask
     before: Place
     after: Place
     told: Place  # before
@@ -31,8 +31,8 @@ class Driven:
 class Tally:
     """What came of the tasks so far."""
 
-    ends: list[tuple[Asked, End]] = field(default_factory=list)
-    refused: list[Asked] = field(default_factory=list)
+    ends: list[tuple[TrialTask, End]] = field(default_factory=list)
+    refused: list[TrialTask] = field(default_factory=list)
     driven: list[Driven] = field(default_factory=list)
     shifts: list[tuple[float, float]] = field(default_factory=list)
 

@@ -54,7 +54,7 @@ class LossyNet(MemoryNet):
         self._of_end = dict(of_end)
 
     def conditions_between(self, source: str, target: str) -> Conditions:
-        """Give how bad a way is; one end of each is the server's."""
+        """Return how bad a way is; one end of each is the server's."""
         for end in (source, target):
             if end in self._of_end:
                 return self._of_end[end]

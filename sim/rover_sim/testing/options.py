@@ -67,7 +67,7 @@ def read_markers(markers: Iterable[tuple[tuple[Any, ...], Mapping[str, Any]]]) -
 
 
 def seed_of(node_id: str) -> int:
-    """Give a seed that a test has for as long as it and its file keep their names."""
+    """Return a seed that a test has for as long as it and its file keep their names."""
     path, _, name = node_id.partition("::")
     return crc32(f"{path.rpartition('/')[2]}::{name}".encode())
 

@@ -81,7 +81,7 @@ def pytest_runtest_makereport(
 
 @pytest.fixture
 def task_server_settings() -> Settings:
-    """Give the task server's settings: override this fixture, or parametrize it, for others."""
+    """Return the task server's settings: override this fixture, or parametrize it, for others."""
     from mav_tasks.settings import Settings  # noqa: PLC0415
 
     return Settings()
@@ -91,7 +91,7 @@ def task_server_settings() -> Settings:
 def rover_world(
     request: pytest.FixtureRequest, task_server_settings: Settings
 ) -> Iterator[RoverWorld]:
-    """Give the test's world: ``run`` a coroutine in its time, ``sleep``, ``until``, ``client``."""
+    """Return the test's world, with ``run`` for a coroutine, ``sleep``, ``until``, ``client``."""
     from rover_sim.errors import MissingExtra  # noqa: PLC0415
     from rover_sim.testing.rover_world import RoverWorld  # noqa: PLC0415
 
@@ -108,19 +108,19 @@ def rover_world(
 
 @pytest.fixture
 def rover(rover_world: RoverWorld) -> SimulatedRover:
-    """Give the first simulated rover: where it truly is, and what one can do to it."""
+    """Return the first simulated rover: where it truly is, and what one can do to it."""
     return rover_world.rovers[0]
 
 
 @pytest.fixture
 def rovers(rover_world: RoverWorld) -> tuple[SimulatedRover, ...]:
-    """Give every simulated rover; the marker's ``count`` says how many."""
+    """Return every simulated rover; the marker's ``count`` says how many."""
     return rover_world.rovers
 
 
 @pytest.fixture
 def task_server(rover_world: RoverWorld) -> TaskServer:
-    """Give the task server, running, with every rover found."""
+    """Return the task server, running, with every rover found."""
     rover_world.server.start()
     rover_world.until(lambda: rover_world.server.is_ready)
     return rover_world.server
@@ -131,14 +131,14 @@ def task_client(
     rover_world: RoverWorld,
     task_server: TaskServer,  # noqa: ARG001 (it runs)
 ) -> Iterator[SyncClient]:
-    """Give a client of the task server; each of its calls lets time pass until it is answered."""
+    """Return a client of the task server; each of its calls lets time pass until it is answered."""
     with rover_world.sync_client() as client:
         yield client
 
 
 @pytest.fixture
 def lossy_link(rover_world: RoverWorld) -> LossyLink:
-    """Give a way to make links bad: ``lossy_link(loss=0.3)``, for a while with ``with``."""
+    """Return a way to make links bad: ``lossy_link(loss=0.3)``, for a while with ``with``."""
     return rover_world.lossy_link
 
 
@@ -156,18 +156,18 @@ def _real_time(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[RealT
 
 @pytest.fixture
 def rover_url(_real_time: RealTime) -> str:
-    """Give the URL of simulated rovers in a process, in real time: ``udpout:127.0.0.1:port``."""
+    """Return the URL of simulated rovers in a process, in real time: ``udpout:127.0.0.1:port``."""
     return _real_time.start_rovers()
 
 
 @pytest.fixture
 def server_url(_real_time: RealTime, rover_url: str) -> str:
-    """Give the URL of a task server in a process, in real time, with every rover found."""
+    """Return the URL of a task server in a process, in real time, with every rover found."""
     return _real_time.start_server(rover_url)
 
 
 def _options_of(request: pytest.FixtureRequest) -> tuple[RoverOptions, int]:
-    """Give what the markers ask for, and the seed; a marker that asks wrongly fails the test."""
+    """Return what the markers ask for, and the seed; a marker that asks wrongly fails the test."""
     from rover_sim.testing.options import MarkerError, read_markers, seed_of  # noqa: PLC0415
 
     node = request.node

@@ -82,7 +82,7 @@ class RealTime:
         self._processes: list[OwnProcess] = []
 
     def start_rovers(self) -> str:
-        """Give the URL at which the rovers listen."""
+        """Return the URL at which the rovers listen."""
         options = self._options
         what = ["--body", options.body, "--persona", options.persona]
         what += ["--noise", options.noise, "--frame", options.make.frame.value]
@@ -92,7 +92,7 @@ class RealTime:
         return f"udpout:127.0.0.1:{port}"
 
     def start_server(self, rover_url: str) -> str:
-        """Give the URL at which the server listens, once it has found every rover."""
+        """Return the URL at which the server listens, once it has found every rover."""
         port = _free_udp_port()
         links = ["--client", f"udpin:127.0.0.1:{port}", "--no-push", "--vehicle", rover_url]
         server = self._start(
@@ -112,7 +112,7 @@ class RealTime:
         return f"udpout:127.0.0.1:{port}"
 
     def describe(self) -> str:
-        """Give what the processes said last, for a failing test."""
+        """Return what the processes said last, for a failing test."""
         lines = [f"seed {self._seed} (the same again: --rover-seed {self._seed})"]
         for process in self._processes:
             lines += [f"{process.name}:", *process.text.splitlines()[-LAST_LINES:]]
@@ -129,7 +129,7 @@ class RealTime:
 
 
 def _free_udp_port() -> int:
-    """Give a port of the loopback that nobody uses at this moment."""
+    """Return a port of the loopback that nobody uses at this moment."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -9,7 +9,7 @@ LAST_TASKS, LAST_EVENTS, LAST_TEXTS = 8, 12, 8
 
 
 def describe_world(world: RoverWorld) -> str:
-    """Give the state of affairs in lines."""
+    """Return the state of affairs in lines."""
     options = world.options
     kind = f"{options.persona}, {options.body} body"
     lines = [

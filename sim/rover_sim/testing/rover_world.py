@@ -18,9 +18,9 @@ from mav_tasks.links.memory import MemoryLink
 from mav_tasks.settings import Settings
 from rover_sim.body import Body, Pose
 from rover_sim.bullet import BulletBody
-from rover_sim.by_hand import BodyByHand
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.manual_control import BodyByHand
 from rover_sim.realism import EXACT
 from rover_sim.testing.lossy import LossyLink, LossyNet, Text
 from rover_sim.testing.options import RoverOptions
@@ -124,15 +124,15 @@ class RoverWorld:
             self.sleep(LOOK)
 
     def link(self) -> MemoryLink:
-        """Give a new link to the server's clients' side, for one client."""
+        """Return a new link to the server's clients' side, for one client."""
         return self._net.link(f"client{next(self._numbers)}", peers=(CLIENT_LINK,))
 
     def client(self) -> Client:
-        """Give another client for ``async with``, inside of what ``run`` runs."""
+        """Return another client for ``async with``, inside of what ``run`` runs."""
         return Client(self.link())
 
     def sync_client(self) -> SyncClient:
-        """Give another client for ``with``; each call of it lets time pass until it is answered."""
+        """Return another client for ``with``; each of its calls lets time pass until the answer."""
         return SyncClient(self.link(), portal=self)
 
     def close(self) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 from rover_sim.actuators import output_of, wheels_of
 from rover_sim.body import Pose
-from rover_sim.by_hand import BodyByHand, turned
 from rover_sim.faults import Faults
+from rover_sim.manual_control import BodyByHand, turned
 from rover_sim.modes import Mode
 from rover_sim.personas import Persona
 from rover_sim.vehicle import Vehicle

@@ -69,7 +69,7 @@ class TaskServer:
         return self._earlier + self._store.events
 
     def task(self, task_id: int) -> Task:
-        """Give a task by its id; KeyError."""
+        """Return a task by its id; KeyError."""
         return {int(task.id): task for task in self.tasks}[task_id]
 
     def start(self) -> None:
@@ -125,7 +125,7 @@ class TaskServer:
 
 
 def stored(events: list[Event]) -> Restored:
-    """Give what the real store makes of events when a server starts on it."""
+    """Return what the real store makes of events when a server starts on it."""
     with TemporaryDirectory(prefix="rover-sim-") as folder:
         path = Path(folder) / "tasks.sqlite3"
         first = SqliteStore(path, wall_offset=_no_offset, retention=FOR_EVER)

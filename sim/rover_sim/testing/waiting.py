@@ -12,7 +12,7 @@ OURS = Path(__file__).parent  # what wraps the test's own coroutines is not told
 
 
 def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
-    """Give a line for each coroutine in which a task of the loop waits, the task's own first."""
+    """Return a line for each coroutine in which a task of the loop waits, the task's own first."""
     tasks = sorted(asyncio.all_tasks(loop), key=lambda task: task.get_name())
     lines: list[str] = []
     for task in tasks[:MOST_TASKS]:
@@ -28,7 +28,7 @@ def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
 
 
 def _frames(awaitable: Any) -> Iterator[FrameType]:
-    """Give the frame of a coroutine, of the one that it awaits, and so on."""
+    """Yield the frame of a coroutine, of the one that it awaits, and so on."""
     while awaitable is not None:
         for frame_name, next_name in (
             ("cr_frame", "cr_await"),

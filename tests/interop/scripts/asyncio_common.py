@@ -14,7 +14,7 @@ from tests.interop.scripts.facts import HOLD
 
 @asynccontextmanager
 async def connected() -> AsyncIterator[tuple[Circumstances, Any, Any, Any]]:
-    """Give the circumstances, the system, its telemetry and its home, once it is healthy."""
+    """Return the circumstances, the system, its telemetry and its home, once it is healthy."""
     circumstances = Circumstances.from_arguments(MavsdkError)
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
     async with Mavsdk(configuration) as mavsdk:

@@ -29,7 +29,7 @@ async def wait_for(
 async def first(
     stream: AsyncGenerator[T, None], what: str, matching: Callable[[T], object] = lambda _: True
 ) -> T:
-    """Give the first of a stream that matches, and end the subscription."""
+    """Return the first of a stream that matches, and end the subscription."""
     try:
         async with asyncio.timeout(PATIENCE), aclosing(stream):
             async for value in stream:

@@ -35,7 +35,7 @@ def wait_for_motion(telemetry: Any, *, moves: bool) -> None:
 
 @contextmanager
 def system_at(url: str, *, within: float = PATIENCE) -> Iterator[Any]:
-    """Give the system that is found there."""
+    """Return the system that is found there."""
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
     with Mavsdk(configuration) as mavsdk:
         mavsdk.add_any_connection(url)
@@ -46,7 +46,7 @@ def system_at(url: str, *, within: float = PATIENCE) -> Iterator[Any]:
 
 @contextmanager
 def connected() -> Iterator[tuple[Circumstances, Any, Any, Any]]:
-    """Give the circumstances, the system, its telemetry and its home, once it is healthy."""
+    """Return the circumstances, the system, its telemetry and its home, once it is healthy."""
     circumstances = Circumstances.from_arguments(MavsdkError)
     with system_at(circumstances.address) as system:
         telemetry = Telemetry(system)

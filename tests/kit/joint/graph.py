@@ -60,7 +60,7 @@ def can_happen(event: Event, state: State) -> bool:
 
 
 def variants(event: Event, state: State) -> Iterator[State]:
-    """Give a state with all that an event's rows ask for beside it."""
+    """Yield a state with all that an event's rows ask for beside it."""
     names = ASKED[event]
     for values in product((False, True), repeat=len(names)):
         asked: dict[str, Any] = dict(zip(names, values, strict=True))
@@ -78,7 +78,7 @@ def after(event: Event, state: State) -> set[State]:
 
 
 def plain(state: State) -> Iterator[State]:
-    """Give a state without what the graph leaves open, and with one thing at a time that waits.
+    """Yield a state without what the graph leaves open, and with one thing at a time that waits.
 
     Of several each is taken off, and comes true, whatever becomes of the others.
     """

@@ -23,9 +23,9 @@ class State(NamedTuple):
     mode: str
     armed: bool
     may_arm: bool
-    begun: str  # state and reason of the task that has the vehicle
+    active: str  # state and reason of the task that has the vehicle
     waiting: int  # tasks, at most 1
-    urgent: bool
+    immediate: bool
     grants: bool
     marked: bool  # its mission begins when it is armed
     heard: bool
@@ -95,7 +95,7 @@ class Judge:
         """Return what the present state is."""
         world, vehicle = self.scene.world, self._vehicle
         tasks, autopilot = vehicle.tasks, world.rover.autopilot
-        begun = tasks.begun
+        active = tasks.active
         client = self.scene.client.name
         granted = [key for key in vehicle.parts.authority._granted if client in str(key)]
         return State(
@@ -104,9 +104,9 @@ class Judge:
             mode=autopilot.mode.name,
             armed=autopilot.armed,
             may_arm=vehicle.parts.authority.may_arm,
-            begun="" if begun is None else f"{begun.state.name} {begun.reason.name}",
+            active="" if active is None else f"{active.state.name} {active.reason.name}",
             waiting=min(len(tasks.waiting), 1),
-            urgent=tasks.urgent is not None,
+            immediate=tasks.immediate is not None,
             grants=bool(granted),
             marked=vehicle.start_mark.is_put(now=world.now),
             heard=vehicle.is_heard(now=world.now),
@@ -118,7 +118,7 @@ class Judge:
     def _let_go(self, deed: Deed, sent: Sent | None) -> None:
         """Take off what a word has lifted that was newer."""
         runs = self.scene.world.paused() is TaskReason.NONE
-        is_to_run = self._vehicle.tasks.urgent is not None
+        is_to_run = self._vehicle.tasks.immediate is not None
         is_accepted = sent is not None and sent.result == ACCEPTED
         match deed.kind:
             case Kind.CONTINUE if is_accepted:

@@ -183,7 +183,7 @@ def _stepped(state: State) -> Iterator[State]:
 
 
 def passes(state: State) -> Iterator[State]:
-    """Give what may come of time alone: no word, nobody at the vehicle, nothing that fails us."""
+    """Yield what may come of time alone: no word, nobody at the vehicle, nothing that fails us."""
     work, grip = state.work, state.grip
     can_take = state.armed or state.may_arm
     if state.queue is Queue.STOPPED:
@@ -236,7 +236,7 @@ def client_moves(state: State) -> bool:
 
 
 def others_do(state: State) -> Iterator[State]:
-    """Give what people do that no event tells of: a task is submitted, the vehicle armed."""
+    """Yield what people do that no event tells of: a task is submitted, the vehicle armed."""
     if state.work is Work.NONE:
         yield state._replace(work=Work.WAITS)
     if state.is_led:  # HOLD is set by somebody, who did not drive
@@ -277,10 +277,12 @@ def _run_now(state: State) -> Iterator[State]:
     if not is_free(state):
         yield state  # refused
         return
-    urgent = state._replace(is_urgent=True)
-    paused = urgent if urgent.queue is not Queue.RUNS else urgent._replace(queue=Queue.PAUSED)
+    immediate = state._replace(is_urgent=True)
+    paused = (
+        immediate if immediate.queue is not Queue.RUNS else immediate._replace(queue=Queue.PAUSED)
+    )
     for work in (Work.WAITS, Work.RUNS, *([Work.ENDS] if state.work is Work.RUNS else [])):
-        yield urgent._replace(work=work)
+        yield immediate._replace(work=work)
         yield paused._replace(work=work)
     yield paused
 
@@ -313,9 +315,9 @@ def _skipped(state: State) -> Iterator[State]:
 
 
 def _restarted(state: State) -> Iterator[State]:
-    begun = () if state.work in NO_TASK else (Work.STANDS, Work.RUNS)
+    active = () if state.work in NO_TASK else (Work.STANDS, Work.RUNS)
     for may_arm in {False, state.may_arm}:
-        for work in {state.work, *begun}:  # it begins again if nothing of it was driven
+        for work in {state.work, *active}:  # it begins again if nothing of it was driven
             each = state._replace(may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE)
             yield each
             if work not in NO_TASK and each.queue in (Queue.RUNS, Queue.TAKEN):

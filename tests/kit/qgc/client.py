@@ -41,7 +41,7 @@ class Qgc:
             self._take(heard)
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         return self._timers.next_deadline()
 
     def handle_deadline(self, *, now: float) -> None:

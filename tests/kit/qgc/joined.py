@@ -35,18 +35,18 @@ def join(world: World, profile: Profile, name: str = "qgc") -> QgcParty:
 
 
 def place(north: float, east: float) -> tuple[int, int]:
-    """Give a place in degE7, from metres."""
+    """Return a place in degE7, from metres."""
     return DEFAULT_ORIGIN.to_global(north, east)
 
 
 def degrees(north: float, east: float) -> tuple[float, float]:
-    """Give a place in degrees, from metres."""
+    """Return a place in degrees, from metres."""
     x, y = place(north, east)
     return x / 1e7, y / 1e7
 
 
 def slowest_ack(party: QgcParty) -> float:
-    """Give how long the slowest ack took, s; inf if one never came."""
+    """Return how long the slowest ack took, s; inf if one never came."""
     return max(
         (inf if sent.acked_at is None else sent.took for sent in party.vehicle.commands.sent),
         default=0.0,

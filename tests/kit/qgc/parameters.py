@@ -92,7 +92,7 @@ class Parameters:
             self._ask_list()
 
     def value(self, name: str, component: int = AUTOPILOT) -> float | None:
-        """Give a parameter, None if there is none of that name."""
+        """Return a parameter, None if there is none of that name."""
         known = self.components.get(component)
         return None if known is None else known.values.get(name)
 

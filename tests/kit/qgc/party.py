@@ -66,7 +66,7 @@ class QgcParty:
         assert self.qgc.wire.bad == 0, f"{self.name}: {self.qgc.wire.bad} times no packet"
 
     def next_deadline(self) -> float | None:
-        """Give when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` has something to do, unless something arrives before."""
         return self._net.now if self.qgc.has_packets else self.qgc.next_deadline()
 
     def turn(self, *, now: float) -> None:

@@ -26,7 +26,7 @@ class Plan(NamedTuple):
     speed: float | None = None  # m/s, from the start
 
     def mission(self, firmware: str) -> list[Item]:
-        """Give the items: ArduPilot's begin with home, the others' do not [3.4], [11.3], [11.8]."""
+        """Return the items; only ArduPilot's begin with home [3.4], [11.3], [11.8]."""
         items = [Item(WAYPOINT, x, y) for x, y in self.waypoints]
         if self.speed is not None:  # [3.6]: airspeed, also of a rover
             items.insert(0, Item(178, 0, 0, 0.0, NO_FRAME, 0.0, self.speed, -1.0, 0.0))
@@ -36,12 +36,12 @@ class Plan(NamedTuple):
         return items
 
     def fence_items(self) -> list[Item]:
-        """Give the corners [3.6]."""
+        """Return the corners [3.6]."""
         count = float(len(self.fence))
         return [Item(VERTEX_INSIDE, x, y, 0.0, GLOBAL, count, param4=0.0) for x, y in self.fence]
 
     def rally_items(self) -> list[Item]:
-        """Give the rally points."""
+        """Return the rally points."""
         return [Item(RALLY_POINT, x, y, 0.0, RELATIVE, param4=0.0) for x, y in self.rally]
 
 

@@ -81,7 +81,7 @@ class Stub:
     # Party
 
     def next_deadline(self) -> float | None:
-        """Give when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` has something to do, unless something arrives before."""
         return self._timers.next_deadline()
 
     def turn(self, *, now: float) -> None:

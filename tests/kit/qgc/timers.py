@@ -37,7 +37,7 @@ class Timers:
             self.after(seconds, lambda: self.live(doing))
 
     def next_deadline(self) -> float | None:
-        """Give when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` has something to do."""
         while self._due and self._due[0][2].call is None:
             heapq.heappop(self._due)
         return self._due[0][0] if self._due else None

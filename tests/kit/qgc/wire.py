@@ -40,7 +40,7 @@ class Wire:
         self._last_seq: dict[Source, int] = {}
 
     def pack(self, message: Message) -> bytes:
-        """Give a message's bytes in the version that is spoken now."""
+        """Return a message's bytes in the version that is spoken now."""
         raw: bytes = message.pack(self._packer, force_mavlink1=self.sends_mavlink1)
         self._packer.seq = (self._packer.seq + 1) % 256
         return raw
@@ -50,7 +50,7 @@ class Wire:
         self.sends_mavlink1, self.may_send_mavlink2 = True, False
 
     def unpack(self, data: bytes) -> list[Heard]:
-        """Give the packets of a datagram that this version takes."""
+        """Return the packets of a datagram that this version takes."""
         heard = []
         for message in self._parser.parse_buffer(data) or ():
             if message.get_type() == "BAD_DATA":

@@ -43,7 +43,7 @@ class Attacks:
         self._auto = px4.MISSION if self._ways.sub_modes else AUTO
 
     def deeds(self) -> list[Deed]:
-        """Give them; the more often one is named, the more often it happens."""
+        """Return them; the more often one is named, the more often it happens."""
         return [
             *[self.copy] * 6,
             *[self.late_copy_of_a_go] * 3,

@@ -50,7 +50,11 @@ STEP = 0.02  # s, between two bursts
 BEAT = 0.5  # s, between two signs of life of the rovers and of the station
 WALK = 10_000  # packets, between two walks through all that the engine remembers
 SETPOINTS = (82, 84, 86)
-TASKS = ("_book", "_fleet", "_recollection")  # where tasks are kept, which are bounded by number
+TASKS = (
+    "_registry",
+    "_fleet",
+    "_deduplicator",
+)  # where tasks are kept, which are bounded by number
 
 
 class Battered:
@@ -118,7 +122,7 @@ class Battered:
         self._raise_if_too_large()
 
     def entries(self) -> int:
-        """Give how many entries all containers hold that are not there for tasks."""
+        """Return how many entries all containers hold that are not there for tasks."""
         return sum(
             len(container)
             for path, container in containers(self.engine)
@@ -154,7 +158,7 @@ class Battered:
             self._raise_if_too_large()
 
     def _end(self) -> tuple[str, Hashable]:
-        """Give where the next packet comes from; now and then from somebody new."""
+        """Return where the next packet comes from; now and then from somebody new."""
         if self._random.random() < 0.8:
             return self._random.choice(ENDS)
         return self._random.choice((CLIENTS, ROVERS)), self._random.randrange(STRANGERS)

@@ -20,7 +20,7 @@ CONTAINERS = (list, dict, set, frozenset, deque, tuple)
 
 
 def too_large(root: object) -> Iterator[str]:
-    """Give the containers that hold more than they may, by the way to them."""
+    """Yield the containers that hold more than they may, by the way to them."""
     for path, container in containers(root):
         name = path.rpartition(".")[2]
         if len(container) > LARGER.get(name, MOST):
@@ -28,12 +28,12 @@ def too_large(root: object) -> Iterator[str]:
 
 
 def containers(root: object) -> Iterator[tuple[str, Sized]]:
-    """Give every container that can be reached from an object of ours, and where it is."""
+    """Return every container that can be reached from an object of ours, and where it is."""
     return ((path, each) for path, each in reachable(root) if isinstance(each, CONTAINERS))
 
 
 def reachable(root: object) -> Iterator[tuple[str, Any]]:
-    """Give everything that objects of ours and containers in them hold, each once, and where."""
+    """Yield everything that objects of ours and containers in them hold, each once, and where."""
     seen: set[int] = set()
     waiting: list[tuple[str, Any]] = [(type(root).__name__, root)]
     while waiting:

@@ -60,11 +60,11 @@ class Stage:
     note: Callable[[str], None] = lambda _: None
 
     def client(self) -> FakeClient:
-        """Give one of the clients."""
+        """Return one of the clients."""
         return self.random.choice(self.clients)
 
     def rover(self) -> int:
-        """Give the system id of one of the rovers."""
+        """Return the system id of one of the rovers."""
         count = len(self.world.rovers)
         return 1 if count == 1 else self.random.randint(1, count)
 
@@ -77,12 +77,12 @@ class Stage:
         self.world.rovers[number - 1].autopilot.operator_arm(armed, now=self.world.now)
 
     def place(self) -> dict[str, Any]:
-        """Give a place within a few metres of where the first rover began."""
+        """Return a place within a few metres of where the first rover began."""
         return at(self.random.uniform(-3, 3), self.random.uniform(-3, 3))
 
 
 def deeds(stage: Stage) -> list[Deed]:
-    """Give what can happen to a rover of ArduPilot's kind, and to any other."""
+    """Return what can happen to a rover of ArduPilot's kind, and to any other."""
     random, client, rover = stage.random, stage.client, stage.rover
 
     def submit() -> None:
@@ -113,7 +113,7 @@ def deeds(stage: Stage) -> list[Deed]:
 
 
 def at_the_rover(stage: Stage) -> list[Deed]:
-    """Give what a person at a rover does."""
+    """Return what a person at a rover does."""
     random = stage.random
 
     def turn_switch() -> None:
@@ -128,7 +128,7 @@ def at_the_rover(stage: Stage) -> list[Deed]:
 
 
 def breaks(stage: Stage) -> list[Deed]:
-    """Give what goes wrong by itself: rover, server's machine, disk."""
+    """Return what goes wrong by itself: rover, server's machine, disk."""
     world, random = stage.world, stage.random
 
     def break_rover() -> None:
@@ -156,7 +156,7 @@ def breaks(stage: Stage) -> list[Deed]:
 
 
 def px4_deeds(stage: Stage) -> list[Deed]:
-    """Give the same and more for a rover that speaks as PX4 does."""
+    """Return the same and more for a rover that speaks as PX4 does."""
     world, random, client, rover = stage.world, stage.random, stage.client, stage.rover
     other = world.net.link("other station")
 

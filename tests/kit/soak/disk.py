@@ -49,7 +49,7 @@ class Disk:
             pass
 
     def load(self, *, ended_well: bool, idle: float) -> Restored:
-        """Give what the next server finds."""
+        """Return what the next server finds."""
         return read_restored(self.path, offset=self.wall_offset, ended_well=ended_well, idle=idle)
 
     def close(self) -> None:
@@ -72,7 +72,7 @@ class UncertainStore(LateStore):
         self._says_so = True
 
     def take_outcomes(self) -> list[Outcome]:
-        """Give what became of events; while it is broken, that once."""
+        """Return what became of events; while it is broken, that once."""
         if self.clock() < self.broken_until:
             said, self._says_so = self._says_so, False
             return [NotKept("the disk is full")] if said else []
@@ -81,7 +81,7 @@ class UncertainStore(LateStore):
         return outcomes
 
     def committed(self) -> list[Event]:
-        """Give what would survive if the machine stopped now: perhaps more than was told.
+        """Return what would survive if the machine stopped now: perhaps more than was told.
 
         Halts have a record of their own, which takes them on a full disk, too.
         """

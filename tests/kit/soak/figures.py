@@ -36,7 +36,7 @@ class Figures:
             getattr(self, name).update(getattr(other, name))
 
     def lines(self) -> list[str]:
-        """Give them in words, one line each."""
+        """Return them in words, one line each."""
         return [
             f"lives        {self.lives}",
             f"virtual      {self.virtual:.0f} s",

@@ -20,12 +20,12 @@ LONGEST = 2_000  # bytes
 
 
 def corpus_of(name: str) -> list[bytes]:
-    """Give the files of a target, by their names."""
+    """Return the files of a target, by their names."""
     return [path.read_bytes() for path in sorted((CORPUS / name).iterdir())]
 
 
 def inputs(samples: list[bytes]) -> st.SearchStrategy[bytes]:
-    """Give what to try: bytes, and samples of which pieces are cut, doubled, moved or replaced."""
+    """Return what to try: bytes, and samples with pieces cut, doubled, moved or replaced."""
     pieces = st.one_of(
         st.binary(max_size=12),
         st.text(max_size=8).map(lambda text: text.encode("utf-8", "replace")),

@@ -56,7 +56,7 @@ class Drain:
         self._count += len(events)
 
     def take_outcomes(self) -> list[Outcome]:
-        """Give how many are durable, if there are new ones."""
+        """Return how many are durable, if there are new ones."""
         if self._told == self._count:
             return []
         self._told = self._count
@@ -87,7 +87,7 @@ class Hour:
             disk = Disk(Path(folder) / "tasks.sqlite3", wall_offset=UTC)
             stack.callback(disk.close)
             kept = self._settings.kept
-            stack.enter_context(mock.patch("mav_tasks.tasks.book.KEPT_FINISHED", kept))
+            stack.enter_context(mock.patch("mav_tasks.tasks.registry.KEPT_FINISHED", kept))
             world, clients = self._world(disk)
             quarter = self._settings.seconds / 4
             sizes: list[int] = []
@@ -165,7 +165,7 @@ class GrainyWorld(World):
     """What is due within a grain is done together."""
 
     def next_due(self) -> float | None:
-        """Give when the next thing is due, in whole grains."""
+        """Return when the next thing is due, in whole grains."""
         due = super().next_due()
         return None if due is None else max(due, -(-due // GRAIN) * GRAIN)
 
@@ -182,5 +182,5 @@ def forget(world: World, clients: list[FakeClient]) -> None:
 
 
 def held_by(server: object) -> int:
-    """Give the bytes of all that a server's objects hold, and of these."""
+    """Return the bytes of all that a server's objects hold, and of these."""
     return sum(sys.getsizeof(value) for _, value in reachable(server))

@@ -37,7 +37,7 @@ class Ledger:
     told: dict[tuple[str, int], tuple[int, TaskState]] = field(default_factory=dict)
     withdrawn: set[int] = field(default_factory=set)
     #: ids of tasks that have been begun
-    begun: set[int] = field(default_factory=set)
+    active: set[int] = field(default_factory=set)
     taken_back: int = 0  # ends that were told and lost with the server that told them
     _of_mark: dict[Mark, int] = field(default_factory=dict)
     _ended_at: dict[int, float] = field(default_factory=dict)
@@ -123,7 +123,7 @@ class Ledger:
         for (_, _, vehicle, command, _), task_id in list(self._of_mark.items()):
             actor, at = self._asked[task_id]
             is_it = (vehicle, command, actor) == (event.vehicle, event.command, event.actor)
-            is_over = self.states.get(task_id) in TERMINAL and task_id not in self.begun
+            is_over = self.states.get(task_id) in TERMINAL and task_id not in self.active
             if is_it and is_over and event.at - at <= NOT_STORED and task_id not in self.accepted:
                 self._forget_mark(task_id)
 
@@ -137,7 +137,7 @@ class Ledger:
             yield f"task {task_id} goes from {old.name} to {new.name}"
         self.states[task_id] = new
         if new is TaskState.STARTING:
-            self.begun.add(task_id)
+            self.active.add(task_id)
 
     def _forget_what_was_lost(self, found: dict[int, TaskState], killed_at: float) -> Iterator[str]:
         """What a client was told and the disk did not have yet is not true any more.

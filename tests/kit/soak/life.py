@@ -102,7 +102,7 @@ class Life:
         self._end()
 
     def figures(self) -> Figures:
-        """Give what it was made of; the processor's time is not known here."""
+        """Return what it was made of; the processor's time is not known here."""
         world = self.world
         return Figures(
             lives=1,

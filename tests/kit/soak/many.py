@@ -23,7 +23,7 @@ class Ended:
 
 
 def printed(figures: Figures) -> str:
-    """Give figures as one line for whoever started this process."""
+    """Return figures as one line for whoever started this process."""
     return json.dumps(vars(figures))
 
 
@@ -36,7 +36,7 @@ def many_lives(command: Sequence[str], seeds: range, *, jobs: int) -> Iterator[E
 
 
 def python(script: str) -> list[str]:
-    """Give how this interpreter runs a script."""
+    """Return how this interpreter runs a script."""
     return [sys.executable, script]
 
 

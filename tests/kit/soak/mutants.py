@@ -43,14 +43,14 @@ class Mutant(NamedTuple):
 
 
 def badly_signed(packet: bytes, random: Random) -> bytes:
-    """Give a packet of MAVLink 2 with the flag, a good CRC and a signature of nobody's key."""
+    """Return a packet of MAVLink 2 with the flag, a good CRC and a signature of nobody's key."""
     flagged = bytearray(packet)
     flagged[2] |= SIGNED
     return mended(bytes(flagged)) + random.randbytes(SIGNATURE)
 
 
 def mended(packet: bytes) -> bytes:
-    """Give a packet of MAVLink 2 with the CRC that its bytes ask for."""
+    """Return a packet of MAVLink 2 with the CRC that its bytes ask for."""
     end = HEADER + packet[1]
     extra = CRC_EXTRA[int.from_bytes(packet[7:10], "little")]
     crc = mcrf4xx(packet[1:end] + bytes((extra,)))
@@ -68,7 +68,7 @@ class Mutants:
         self._mav = common.MAVLink(None, 255, 190)
 
     def good(self) -> bytes:
-        """Give a packet as it should be."""
+        """Return a packet as it should be."""
         random = self._random
         self._mav.srcSystem = random.choice(SYSTEMS)
         self._mav.srcComponent = random.choice(COMPONENTS)
@@ -77,7 +77,7 @@ class Mutants:
         return packet
 
     def any(self) -> Mutant:
-        """Give a packet that something was done to; whole or not."""
+        """Return a packet that something was done to; whole or not."""
         random = self._random
         if random.random() < 0.8:
             return self.broken()
@@ -88,7 +88,7 @@ class Mutants:
         return self.absurd()
 
     def broken(self) -> Mutant:
-        """Give one whose CRC, length or end is wrong; one of 65,536 is whole by chance."""
+        """Return one whose CRC, length or end is wrong; one of 65,536 is whole by chance."""
         random, packet = self._random, bytearray(self.good())
         match random.randrange(7):
             case 0:
@@ -117,7 +117,7 @@ class Mutants:
                 return Mutant("noise", random.randbytes(random.randrange(1, 300)))
 
     def absurd(self) -> Mutant:
-        """Give a whole packet with fields that hold what no sender means."""
+        """Return a whole packet with fields that hold what no sender means."""
         random, packet = self._random, bytearray(self.good())
         size = len(packet) - HEADER - 2
         for _ in range(random.randrange(1, 5)):
@@ -219,7 +219,7 @@ class _Raw:
         self._payload = payload
 
     def pack(self, mav: Any) -> bytes:
-        """Give its packet, as pymavlink's own messages do."""
+        """Return its packet, as pymavlink's own messages do."""
         payload = self._payload.rstrip(b"\0") or self._payload[:1]
         number = self._kind.id
         head = struct.pack(

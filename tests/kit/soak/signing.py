@@ -25,7 +25,7 @@ class Signatures:
         self._latest: dict[Stream, int] = {}
 
     def sign(self, packet: bytes, random: Random) -> bytes:
-        """Give a packet signed well, late, or with nobody's key."""
+        """Return a packet signed well, late, or with nobody's key."""
         chance = random.random()
         if chance < 0.3:
             return badly_signed(packet, random)
@@ -61,6 +61,6 @@ class Signatures:
 
 
 def signed_only(seed: int) -> Battered:
-    """Give an engine that hears of clients only what is signed, and packets of all sorts for it."""
+    """Return an engine that accepts signed packets only, and packets of all sorts for it."""
     signatures = Signatures()
     return Battered(seed, sign=signatures.sign, is_valid=signatures.is_valid, key=KEY)

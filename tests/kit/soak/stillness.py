@@ -30,7 +30,7 @@ class Stillness:
         self._stood_at = -1e9
 
     def look(self, now: float) -> Iterator[str]:
-        """Give what is wrong now."""
+        """Yield what is wrong now."""
         autopilot = self.vehicle.autopilot
         if autopilot.armed and autopilot.mode in BY_ITSELF:
             self._by_itself_at = now

@@ -135,7 +135,7 @@ class WordLog:
             del self._first[next(iter(self._first))]
 
     def word(self, peer: str, data: bytes) -> Word | None:
-        """Give what reaches the server; None if it is no word of a known client."""
+        """Return what reaches the server; None if it is no word of a known client."""
         first = self._first.get((peer, data))
         if first is None:
             return None

@@ -110,7 +110,7 @@ class SoakWorld(World):
         self.watch(self._judge)
 
     def next_due(self) -> float | None:
-        """Give when the next thing is due, in whole grains."""
+        """Return when the next thing is due, in whole grains."""
         due = super().next_due()
         return None if due is None else max(due, ceil(due / GRAIN - 1e-6) * GRAIN)
 
@@ -306,9 +306,9 @@ class SoakWorld(World):
         seen = {v.system_id: v for v in self.server.engine.snapshot(now=self.now).vehicles}
         for halts in self.halts:
             vehicle = seen.get(halts.system_id)
-            begun = None if vehicle is None else vehicle.begun
-            running = None if begun is None else int(begun.id)
-            has_tasks = begun is not None or (vehicle is not None and bool(vehicle.waiting))
+            active = None if vehicle is None else vehicle.active
+            running = None if active is None else int(active.id)
+            has_tasks = active is not None or (vehicle is not None and bool(vehicle.waiting))
             halts.read(word, running=running, has_tasks=has_tasks, now=self.now)
 
     def _server_answers(self, peer: str, data: bytes) -> None:

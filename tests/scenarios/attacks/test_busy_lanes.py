@@ -27,7 +27,7 @@ def request_of(message_id: int) -> common.MAVLink_command_long_message:
 
 
 def flooded(make_world: MakeWorld, messages: tuple[int, ...]) -> World:
-    """Give a world in which an observer asks for messages 150 times a second."""
+    """Return a world in which an observer asks for messages 150 times a second."""
     settings = Settings(roles=Roles(addresses=ADDRESSES))
     world = make_world(settings=settings, conditions=RADIO)
     flooder = world.add_client("flooder", system_id=OBSERVER)

@@ -89,5 +89,5 @@ def test_what_is_delivered_again_late_interrupts_nothing(
 
 
 def setpoints(world: World) -> list[tuple[float, float]]:
-    """Give when set-points left, and the speed that they asked for."""
+    """Return when set-points left, and the speed that they asked for."""
     return [(at, m.vx) for at, m in world.observer.driven if hasattr(m, "vx")]

@@ -10,11 +10,11 @@ import pytest
 
 from mav_tasks.client import submissions
 from mav_tasks.store import MemoryStore
-from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.deduplicator import SubmissionDeduplicator
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.recollection import Recollection
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Draft, Marks, Submitter, TaskId
 from tests.kit.world import World
@@ -76,8 +76,8 @@ def test_of_100000_equal_submissions_none_is_taken_for_an_old_one(
     """Each from a process of its own, all of one address: the worst case of the draw."""
     random = Random(17)
     monkeypatch.setattr(submissions, "SystemRandom", lambda: random)
-    book = TaskBook()
-    memory = Recollection(book)
+    registry = TaskRegistry()
+    memory = SubmissionDeduplicator(registry)
     somebody = Submitter("udp", "127.0.0.1:1", 244, 190)
     driving: list[tuple[float, TaskId]] = []
     swallowed = 0
@@ -86,14 +86,14 @@ def test_of_100000_equal_submissions_none_is_taken_for_an_old_one(
         while driving and driving[0][0] <= now:
             ended, task_id = driving.pop(0)
             why = TaskReason.CANCELLED
-            book.change(task_id, S.CANCELLED, reason=why, actor="", now=ended)
-            book.take_events()
+            registry.change(task_id, S.CANCELLED, reason=why, actor="", now=ended)
+            registry.take_events()
         marks = Marks(submissions.Submissions().nonce(), "equal", "")
         draft = Draft(1, 54000, Move(1.0), somebody, marks=marks)
         if memory.known(draft, confirmation=0, origin=None, now=now) is not None:
             swallowed += 1
             continue
-        task = book.submit(draft, now=now)
+        task = registry.submit(draft, now=now)
         memory.remember(task, at=now, now=now)
         driving.append((now + DRIVES, task.id))
     assert swallowed == 0

@@ -77,7 +77,7 @@ def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
 
 
 def of_source(world: World, source: tuple[int, int]) -> list[object]:
-    """Give what has reached the rover from an address, but for what the server itself sends."""
+    """Return what has reached the rover from an address, but for what the server itself sends."""
     if source == (250, 191):
         return []  # the server sends heartbeats and requests as such; arming and mode tell enough
     return [packet for packet in world.observer.reached if packet.source == source]

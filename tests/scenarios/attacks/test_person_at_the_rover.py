@@ -406,5 +406,5 @@ def test_who_takes_it_while_the_answer_to_our_mode_is_lost_keeps_it(
 
 
 def answered(data: bytes) -> int:
-    """Give which command an answer of MAVLink 2 is to."""
+    """Return which command an answer of MAVLink 2 is to."""
     return int.from_bytes(data[10:12], "little")

@@ -36,7 +36,7 @@ def set_clock(world: World, utc_offset: float) -> None:
 
 
 def held_back(world: World, client: FakeClient) -> bytes:
-    """Give a TASK_MOVE that leaves the client now, and arrives when somebody wants it to."""
+    """Return a TASK_MOVE that leaves the client now, and arrives when somebody wants it to."""
     client.heartbeats = False
     return client.packed(command_long(MOVE, 1.0, 0, 0, 0, 0, 0, 5))
 

@@ -67,7 +67,7 @@ def operator(world: World) -> FakeClient:
 
 @pytest.fixture
 def with_operator(make_world: MakeWorld) -> World:
-    """Give a world in which 12/190 is an operator, and the usual client in charge of safety."""
+    """Return a world in which 12/190 is an operator, and the usual client in charge of safety."""
     roles = Roles(unsigned="safety", addresses={"12/190": "operator"})
     return make_world(settings=Settings(roles=roles))
 

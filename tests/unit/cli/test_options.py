@@ -6,7 +6,7 @@ import pytest
 
 from mav_tasks.cli import options
 from mav_tasks.cli.command import command
-from mav_tasks.cli.options import Common, Start, Terms, seconds_of, start_of
+from mav_tasks.cli.options import Common, Start, TaskOptions, seconds_of, start_of
 from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN
 from mav_tasks.errors import UsageError
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
@@ -14,14 +14,14 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 def test_defaults_are_those_of_the_library() -> None:
     assert options.DEFAULT_SERVER == Common().server == DEFAULT_LINK
-    assert options.PRIORITY == Terms().priority == DEFAULT_PRIORITY
+    assert options.PRIORITY == TaskOptions().priority == DEFAULT_PRIORITY
     assert Common().timeout == FIND_WITHIN
 
 
 def test_a_group_stands_for_its_options() -> None:
     seen: list[object] = []
 
-    async def body(number: int, terms: Terms, common: Common) -> None:
+    async def body(number: int, terms: TaskOptions, common: Common) -> None:
         """Say it."""
         seen.extend((number, terms, common))
 
@@ -36,7 +36,7 @@ def test_a_group_stands_for_its_options() -> None:
         if each.default is not inspect.Parameter.empty
     }
     made(**defaults | {"number": 3, "priority": 9, "vehicle": 2})
-    assert seen == [3, Terms(priority=9), Common(vehicle=2)]
+    assert seen == [3, TaskOptions(priority=9), Common(vehicle=2)]
 
 
 def test_a_start_is_a_delay_or_a_time_or_neither() -> None:

@@ -36,7 +36,7 @@ RUNNING = TaskStatus(
     submitter="244/190",
     version=3,
 )
-HELD = replace(RUNNING, state=TaskState.HELD, reason=TaskReason.OFF_LINE)
+HELD = replace(RUNNING, state=TaskState.HELD, reason=TaskReason.OFF_TRACK)
 WAITING = replace(
     RUNNING,
     id=13,

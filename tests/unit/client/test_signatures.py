@@ -32,7 +32,7 @@ class Server:
             self.mav.signing.timestamp = timestamp_at(utc)
 
     def says(self, *, radio: bool = False) -> Packet:
-        """Give a packet of its."""
+        """Return a packet of its."""
         message: Any = common.MAVLink_heartbeat_message(10, 3, 0, 0, 4, 3)
         if radio:
             message = common.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7)

@@ -17,7 +17,7 @@ SOON = 5.0  # s on a very busy machine
 
 @pytest.fixture
 def client() -> Iterator[SyncClient]:
-    """Give an open client that nobody answers."""
+    """Return an open client that nobody answers."""
     client = SyncClient("udpout:127.0.0.1:9", timeout=60.0)
     client.open()
     yield client

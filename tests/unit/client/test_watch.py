@@ -33,7 +33,7 @@ QUEUED = TaskStatus(
 
 
 def asked(watch: Watch, until: float) -> list[float]:
-    """Give when a silent task is asked about; each question is given up at once."""
+    """Return when a silent task is asked about; each question is given up at once."""
     times = []
     while (due := watch.next_deadline()) is not None and due <= until:
         for followed in watch.to_ask(now=due):

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mav_tasks.client import wire
-from mav_tasks.client.wire import Goal, WishedTerms
+from mav_tasks.client.wire import Goal, TaskOptions
 from mav_tasks.engine.commands import goals as engine_goals
 from mav_tasks.engine.commands.ability import Ability
-from mav_tasks.engine.missions.plan_items import Manner, plan_of, steps_of
+from mav_tasks.engine.missions.plan_items import MissionParseOptions, plan_of, steps_of
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.enums import MavCmd
@@ -35,7 +35,7 @@ from mav_tasks.tasks.goal import (
 
 FEW = settings(max_examples=40, deadline=None)
 DRIVING = Driving()
-MANNER = Manner(has_home=False, ability=Ability(), driving=DRIVING)
+MANNER = MissionParseOptions(has_home=False, ability=Ability(), driving=DRIVING)
 HERE = Address(244, 190)
 THERE = Address(1, 191)
 
@@ -56,7 +56,7 @@ faces = st.builds(Face, headings, st.sampled_from((-1, 0, 1)), rates)
 
 
 def over_the_wire(message: object) -> object:
-    """Give a message as it arrives: numbers as float32."""
+    """Return a message as it arrives: numbers as float32."""
     (packet,) = split_datagram(Encoder(HERE).encode(message))  # type: ignore[arg-type]
     return Decoder().decode(packet)
 
@@ -81,9 +81,9 @@ def close(one: Goal, other: object) -> bool:
 def test_a_goal_of_our_own_arrives_with_its_terms(
     goal: Move | Rotate | Drive, priority: int, after: int, delay: float
 ) -> None:
-    terms = WishedTerms(priority=priority, after=after, delay=delay)
+    terms = TaskOptions(priority=priority, after=after, delay=delay)
     message = over_the_wire(wire.command_of(goal, terms, target=THERE, nonce=77))
-    wish = engine_goals.wish_of(command_of(message), b"", DRIVING, now=100.0)  # type: ignore[arg-type]
+    wish = engine_goals.parse_command(command_of(message), b"", DRIVING, now=100.0)  # type: ignore[arg-type]
     assert close(goal, wish.goal)
     assert (wish.terms.priority, wish.terms.after, wish.marks.nonce) == (priority, after, 77)
     started = 0.0 if wish.terms.start_at is None else wish.terms.start_at - 100.0
@@ -91,7 +91,7 @@ def test_a_goal_of_our_own_arrives_with_its_terms(
 
 
 def arrived(items: tuple[Item, ...]) -> tuple[Item, ...]:
-    """Give items as they arrive."""
+    """Return items as they arrive."""
     found = []
     for seq, item in enumerate(items):
         back = item_of(over_the_wire(message_of(item, seq, 0, to=THERE)))  # type: ignore[arg-type]
@@ -134,7 +134,7 @@ def test_a_speed_holds_for_one_way_only() -> None:
 
 
 def test_the_options_of_a_plan_are_its_terms_and_make_it_unlike_any_other() -> None:
-    terms = WishedTerms(priority=8, after=3, delay=5.0, deadline=60.0)
+    terms = TaskOptions(priority=8, after=3, delay=5.0, deadline=60.0)
     items = wire.items_of_goals([Wait(1.0)])
     plans = [(*items, wire.options_of(terms, nonce=nonce)) for nonce in (1, 2)]
     wanted = [
@@ -158,12 +158,12 @@ def test_a_jump_goes_one_further_behind_a_home() -> None:
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        (lambda: WishedTerms(priority=11), "priority 11"),
-        (lambda: WishedTerms(priority=True), "priority True"),
-        (lambda: WishedTerms(priority=5.0), "priority 5.0"),  # type: ignore[arg-type]
-        (lambda: WishedTerms(after=2**30), "after 1073741824"),
-        (lambda: WishedTerms(delay=-1.0), "delay -1.0"),
-        (lambda: WishedTerms(deadline=nan), "deadline nan"),
+        (lambda: TaskOptions(priority=11), "priority 11"),
+        (lambda: TaskOptions(priority=True), "priority True"),
+        (lambda: TaskOptions(priority=5.0), "priority 5.0"),  # type: ignore[arg-type]
+        (lambda: TaskOptions(after=2**30), "after 1073741824"),
+        (lambda: TaskOptions(delay=-1.0), "delay -1.0"),
+        (lambda: TaskOptions(deadline=nan), "deadline nan"),
         (lambda: wire.items_of_goals([Move(nan)]), "distance"),
         (lambda: wire.items_of_goals([Move("2")]), "distance is no number"),  # type: ignore[arg-type]
         (lambda: wire.items_of_goals(["move"]), "'move': expected a goal"),  # type: ignore[list-item]

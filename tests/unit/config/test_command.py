@@ -23,7 +23,7 @@ Run = Callable[..., Result]
 def run(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Iterator[Run]:
-    """Give what runs a command line; gives exit code, standard output and error."""
+    """Return what runs a command line; gives exit code, standard output and error."""
     hangup = signal.getsignal(signal.SIGHUP)
 
     def command(*arguments: str, environment: dict[str, str] | None = None) -> Result:

@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.timers import Timers
-from mav_tasks.tasks.book import TaskBook
+from mav_tasks.tasks.registry import TaskRegistry
 
 WITHIN = 0.4  # s
 
@@ -19,13 +19,13 @@ class Rig:
 
     def __init__(self) -> None:
         self.timers = Timers()
-        self.book = TaskBook()
-        self.gate = CommitGate(self.book, self.timers, within=WITHIN)
+        self.registry = TaskRegistry()
+        self.gate = CommitGate(self.registry, self.timers, within=WITHIN)
         self.gate.knows(Ack, self.accept, self.give_up)
         self.log: list[tuple[str, str, float]] = []
 
     def hold(self, name: str, number: int, *, now: float = 0.0) -> None:
-        self.book.recorded = number
+        self.registry.recorded = number
         self.gate.hold(Ack(name), now=now)
 
     def handle_deadline(self, *, now: float) -> None:
@@ -51,7 +51,7 @@ def test_a_value_waits_for_its_event() -> None:
 
 def test_what_waits_for_nothing_is_carried_out_at_once() -> None:
     rig = Rig()
-    rig.book.durable = 3
+    rig.registry.durable = 3
     rig.hold("ack 1", 3, now=0.1)
     assert rig.log == [("ack 1", "released", 0.1)]
 

@@ -10,8 +10,8 @@ from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from tests.unit.tasks.samples import draft
 
@@ -22,9 +22,9 @@ ROVER, CLIENT = ("10.0.0.1", 1), ("10.0.0.2", 2)
 def test_is_latched_answered_and_sent_first_when_it_is_heard(
     target: tuple[int, int], source: tuple[int, int]
 ) -> None:
-    book, packer, decoder = TaskBook(), Packer(), Decoder()
-    book.submit(draft(), now=0.0)
-    restored = Restored(tasks=book.all(), next_id=2)
+    registry, packer, decoder = TaskRegistry(), Packer(), Decoder()
+    registry.submit(draft(), now=0.0)
+    restored = Restored(tasks=registry.all(), next_id=2)
     engine = Engine(Settings(), now=0.0, restored=restored)
     engine.handle(LinkChanged("v", LinkSide.VEHICLES, up=True, is_local=True), now=0.0)
     engine.handle(LinkChanged("c", LinkSide.CLIENTS, up=True), now=0.0)
@@ -45,7 +45,7 @@ def test_is_latched_answered_and_sent_first_when_it_is_heard(
     kinds = [data[7] for data in sent if data[7] in (m.CommandLong.id, 84)]
     assert kinds[:2] == [m.CommandLong.id, 84], "HOLD, and zero with it"
     vehicle = engine.snapshot(now=2.0).vehicles[0]
-    assert (vehicle.paused, vehicle.begun) == (TaskReason.STOPPED, None)
+    assert (vehicle.paused, vehicle.active) == (TaskReason.STOPPED, None)
 
 
 def test_of_a_system_that_nobody_knows_is_for_somebody_else() -> None:

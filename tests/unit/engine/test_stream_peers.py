@@ -13,7 +13,7 @@ from mav_tasks.engine.inputs import (
     Packets,
     PeerChanged,
 )
-from mav_tasks.engine.intake import MAX_STREAMS, Intake
+from mav_tasks.engine.packet_reader import MAX_STREAMS, PacketReader
 from mav_tasks.engine.vehicles.vehicle_links import MAX_PEERS
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -293,7 +293,7 @@ def test_congestion_of_who_is_not_there_means_nothing(rig: Rig) -> None:
 
 
 def test_unfinished_packets_are_bounded() -> None:
-    intake = Intake()
+    intake = PacketReader()
     intake.change_link(LinkChanged("c", LinkSide.CLIENTS, up=True, is_stream=True))
     pieces = [(number, b"\xfd\xff") for number in range(3 * MAX_STREAMS)]
     assert list(intake.packets(Packets("c", pieces), DecodeCounts(), now=0.0)) == []
@@ -301,7 +301,7 @@ def test_unfinished_packets_are_bounded() -> None:
 
 
 def test_what_is_no_packet_of_a_stream_is_counted() -> None:
-    intake, counts = Intake(), DecodeCounts()
+    intake, counts = PacketReader(), DecodeCounts()
     intake.change_link(LinkChanged("c", LinkSide.CLIENTS, up=True, is_stream=True))
     list(intake.packets(Packets("c", [(1, b"junk"), (1, b"more")]), counts, now=0.0))
     assert counts.noise == 8

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mav_tasks.errors import InsecureLinkError, UsageError
-from mav_tasks.links.asked import faults_of, links_of
+from mav_tasks.links.config_check import faults_of, links_of
 from mav_tasks.links.policy import LinkPolicy, Side, policy_of
 from mav_tasks.links.url import parse_url
 from mav_tasks.settings import Links

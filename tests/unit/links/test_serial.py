@@ -13,11 +13,11 @@ from mav_tasks.errors import LinkOpenError
 from mav_tasks.links import serial
 from mav_tasks.links.attempts import RETRY
 from mav_tasks.links.base import PeerChange, PeerState, StreamLink
+from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.links.memory import MemoryNet
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.serial import LEAD, USED, SerialLink
 from mav_tasks.links.url import SerialUrl
-from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.runner import link_changed
 from tests.kit.lines import Device, device, read_from
 
@@ -50,7 +50,7 @@ def line(tmp_path: Path) -> Iterator[Device]:
 
 @pytest.fixture
 def link(line: Device, clock: Clock) -> Iterator[SerialLink]:
-    made = SerialLink(SerialUrl(str(line.path), BAUD), way=TO_VEHICLES)
+    made = SerialLink(SerialUrl(str(line.path), BAUD), limits=TO_VEHICLES)
     yield made
     made.close()
 
@@ -87,7 +87,7 @@ def test_bytes_pass_both_ways_as_they_are(link: SerialLink, line: Device) -> Non
 
 def test_a_device_is_nobody_elses(link: SerialLink, line: Device) -> None:
     with pytest.raises(LinkOpenError, match=r"it is in use$"):
-        SerialLink(SerialUrl(str(line.path), BAUD), way=TO_CLIENTS)
+        SerialLink(SerialUrl(str(line.path), BAUD), limits=TO_CLIENTS)
 
 
 def test_no_more_is_written_ahead_than_the_line_takes_in_a_moment(
@@ -101,7 +101,7 @@ def test_no_more_is_written_ahead_than_the_line_takes_in_a_moment(
     assert len(read_from(line.far, 100 * ahead)) == 100 * ahead
     assert not select.select([line.far], [], [], 0.0)[0]
     clock.now += 0.1
-    link.tend()
+    link.poll()
     assert len(read_from(line.far, 100 * (10 - ahead))) == 100 * (10 - ahead)
 
 
@@ -115,7 +115,7 @@ def test_what_goes_first_does_not_wait_behind_all_that_clients_send(
         if number % 20 == 10:
             link.send(str(line.path), b"H" * 45, first=True)
         clock.now += 0.025
-        link.tend()
+        link.poll()
         while select.select([line.far], [], [], 0.0)[0]:
             arrived += os.read(line.far, 4096)
         written_after.append(arrived.count(b"H" * 45))
@@ -130,7 +130,7 @@ def test_on_a_line_that_is_too_slow_the_newest_is_sent_and_whole(
     for number in range(400):  # twice what the line takes
         link.send(str(line.path), number.to_bytes(2, "big") + bytes(574))
         clock.now += 0.05
-        link.tend()
+        link.poll()
         while select.select([line.far], [], [], 0.0)[0]:
             arrived += os.read(line.far, 4096)
         if len(arrived) >= 576:
@@ -151,7 +151,7 @@ def test_congestion_is_told_and_its_end(link: SerialLink, line: Device, clock: C
         for _ in range(5 if step < 8 else 0):
             link.send(str(line.path), bytes(280))
         clock.now += 0.05
-        link.tend()
+        link.poll()
         states += [(step, change.state) for change in link.take_changes()]
     assert [state for _, state in states] == [PeerState.CONGESTED, PeerState.CLEAR]
     assert states[0][0] <= 4
@@ -169,16 +169,16 @@ def test_a_line_that_takes_nothing_holds_nobody_up(
 
 def test_a_device_that_is_not_there_is_waited_for(tmp_path: Path, clock: Clock) -> None:
     path = tmp_path / "ttyLater"
-    link = SerialLink(SerialUrl(str(path), BAUD), way=TO_VEHICLES)
+    link = SerialLink(SerialUrl(str(path), BAUD), limits=TO_VEHICLES)
     link.send(str(path), b"lost")
     for _ in range(5):
         clock.now += RETRY
-        link.tend()
+        link.poll()
     words = "is not there yet: No such file or directory; trying again every second"
     assert link.take_changes() == [PeerChange(str(path), PeerState.DOWN, words)]
     with device(path) as line:
         clock.now += RETRY
-        link.tend()
+        link.poll()
         assert link.take_changes() == [PeerChange(str(path), PeerState.UP, "is up")]
         link.send(str(path), b"hello")
         assert read_from(line.far, 5) == b"hello"
@@ -204,7 +204,7 @@ def test_a_device_that_is_unplugged_is_opened_again(
         assert not select.select([link.fileno()], [], [], 0.0)[0]
         line.plug()
         clock.now += RETRY
-        link.tend()
+        link.poll()
         assert link.take_changes() == [PeerChange(str(line.path), PeerState.UP, "is back")]
         link.send(str(line.path), b"hello")
         assert read_from(line.far, 5) == b"hello"
@@ -225,11 +225,11 @@ def test_it_is_unplugged_while_something_is_sent(
 )
 def test_what_is_no_serial_device_is_one_clear_error(path: str, words: str) -> None:
     with pytest.raises(LinkOpenError, match=rf"^link serial:{path}:{BAUD} cannot be .*{words}"):
-        open_link(SerialUrl(path, BAUD), way=TO_VEHICLES)
+        open_link(SerialUrl(path, BAUD), limits=TO_VEHICLES)
 
 
 def test_a_plain_file_is_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"")
     with pytest.raises(LinkOpenError, match="no serial device"):
-        open_link(SerialUrl(str(path), BAUD), way=TO_VEHICLES)
+        open_link(SerialUrl(str(path), BAUD), limits=TO_VEHICLES)

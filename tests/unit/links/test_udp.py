@@ -10,11 +10,11 @@ import pytest
 
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Link, Peer
+from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.links.local_port import COUNT, FIRST, port_for
 from mav_tasks.links.opening import open_link
 from mav_tasks.links.udp import UdpLink
 from mav_tasks.links.url import LinkUrl
-from mav_tasks.links.way_out import TO_CLIENTS, TO_VEHICLES
 
 HOST = "127.0.0.1"
 
@@ -170,7 +170,7 @@ def test_one_that_speaks_to_others_too_hears_them() -> None:
 
 
 def dialling(port: int, *, local: int | None = None) -> UdpLink:
-    link = open_link(LinkUrl("udpout", HOST, port, local=local), way=TO_VEHICLES)
+    link = open_link(LinkUrl("udpout", HOST, port, local=local), limits=TO_VEHICLES)
     assert isinstance(link, UdpLink)
     return link
 
@@ -220,7 +220,7 @@ def test_a_port_that_the_url_names_is_the_one_or_none(other: socket.socket) -> N
 
 def test_clients_dial_from_any_port(other: socket.socket) -> None:
     url = LinkUrl("udpout", HOST, other.getsockname()[1])
-    several = [open_link(url, way=TO_CLIENTS) for _ in range(3)]
+    several = [open_link(url, limits=TO_CLIENTS) for _ in range(3)]
     assert len({address_of(cast(UdpLink, link)) for link in several}) == 3
     for link in several:
         link.close()

@@ -14,12 +14,12 @@ def test_who_is_heard_is_told_once_and_counts_now_and_then(
     notes = FieldNotes(lambda: "many")
     a, b = ("127.0.0.1", 5000), "/dev/ttyUSB0"
     with caplog.at_level(logging.DEBUG, "mav_tasks"):
-        notes.took_in(LinkChanged("x", LinkSide.VEHICLES, up=True), now=0.0)
+        notes.on_input(LinkChanged("x", LinkSide.VEHICLES, up=True), now=0.0)
         for tick in range(100):
-            notes.took_in(Packets("x", [(a, b"?"), (b, b"?")]), now=tick * PERIOD / 50)
-        notes.took_in(Congestion("x", b, is_congested=True), now=PERIOD * 2 - 0.1)
-        notes.took_in(PeerChanged("x", b, up=True), now=PERIOD * 2 - 0.1)
-        notes.took_in(Packets("x", [(b, b"?")]), now=PERIOD * 2 - 0.1)
+            notes.on_input(Packets("x", [(a, b"?"), (b, b"?")]), now=tick * PERIOD / 50)
+        notes.on_input(Congestion("x", b, is_congested=True), now=PERIOD * 2 - 0.1)
+        notes.on_input(PeerChanged("x", b, up=True), now=PERIOD * 2 - 0.1)
+        notes.on_input(Packets("x", [(b, b"?")]), now=PERIOD * 2 - 0.1)
         notes.close()
     assert [record.getMessage() for record in caplog.records] == [
         "link x for vehicles",
@@ -35,5 +35,5 @@ def test_who_is_heard_is_told_once_and_counts_now_and_then(
 def test_no_more_are_remembered_than_fit() -> None:
     notes = FieldNotes(lambda: "")
     for port in range(3 * MOST_PEERS):
-        notes.took_in(Packets("x", [(("127.0.0.1", port), b"?")]), now=0.0)
+        notes.on_input(Packets("x", [(("127.0.0.1", port), b"?")]), now=0.0)
     assert repr(notes) == f"FieldNotes({MOST_PEERS} heard)"

@@ -20,9 +20,9 @@ PEER = ("127.0.0.1", 14580)
 @pytest.fixture
 def texts(caplog: pytest.LogCaptureFixture) -> Iterator[VehicleTexts]:
     it = VehicleTexts()
-    it.took_in(LinkChanged("rovers", LinkSide.VEHICLES, up=True), now=0.0)
-    it.took_in(LinkChanged("line", LinkSide.VEHICLES, up=True, is_stream=True), now=0.0)
-    it.took_in(LinkChanged("clients", LinkSide.CLIENTS, up=True), now=0.0)
+    it.on_input(LinkChanged("rovers", LinkSide.VEHICLES, up=True), now=0.0)
+    it.on_input(LinkChanged("line", LinkSide.VEHICLES, up=True, is_stream=True), now=0.0)
+    it.on_input(LinkChanged("clients", LinkSide.CLIENTS, up=True), now=0.0)
     with caplog.at_level(logging.DEBUG, "mav_tasks"):
         yield it
 
@@ -42,7 +42,7 @@ def test_a_text_is_said_with_its_severity(
 ) -> None:
     levels = []
     for severity in range(8):
-        texts.took_in(Packets("rovers", [(PEER, packet("PreArm: x", severity))]), now=1.0)
+        texts.on_input(Packets("rovers", [(PEER, packet("PreArm: x", severity))]), now=1.0)
         (line,) = said(caplog)
         level, _, words = line.partition(" ")
         assert words == "rover 1 says: PreArm: x"
@@ -54,8 +54,8 @@ def test_other_components_are_named_and_clients_are_not_heard(
     texts: VehicleTexts, caplog: pytest.LogCaptureFixture
 ) -> None:
     gimbal = Encoder(Address(1, 154))
-    texts.took_in(Packets("clients", [(PEER, packet("no"))]), now=1.0)
-    texts.took_in(Packets("rovers", [(PEER, packet("hot", encoder=gimbal))]), now=1.0)
+    texts.on_input(Packets("clients", [(PEER, packet("no"))]), now=1.0)
+    texts.on_input(Packets("rovers", [(PEER, packet("hot", encoder=gimbal))]), now=1.0)
     assert said(caplog) == ["WARNING rover 1, component 154, says: hot"]
 
 
@@ -68,8 +68,8 @@ def test_texts_are_found_beside_other_packets_and_in_mavlink_1(
 
     old += mcrf4xx(old[1:] + bytes((83,))).to_bytes(2, "little")
     broken = packet("broken")[:-1] + b"?"
-    texts.took_in(Packets("rovers", [(PEER, beat + packet("new") + beat)]), now=1.0)
-    texts.took_in(Packets("rovers", [(PEER, old), (PEER, broken), (PEER, b"\xfd\0\0")]), now=1.0)
+    texts.on_input(Packets("rovers", [(PEER, beat + packet("new") + beat)]), now=1.0)
+    texts.on_input(Packets("rovers", [(PEER, old), (PEER, broken), (PEER, b"\xfd\0\0")]), now=1.0)
     assert said(caplog) == ["WARNING rover 1 says: new", "ERROR rover 1 says: old"]
 
 
@@ -79,9 +79,9 @@ def test_on_a_stream_a_text_may_be_cut_anywhere(
     data = packet("one") + packet("two")
     for at in range(len(data)):
         now = float(at)
-        texts.took_in(PeerChanged("line", PEER, up=True), now=now)
-        texts.took_in(Packets("line", [(PEER, data[:at])]), now=now)
-        texts.took_in(Packets("line", [(PEER, data[at:])]), now=now + 0.1)
+        texts.on_input(PeerChanged("line", PEER, up=True), now=now)
+        texts.on_input(Packets("line", [(PEER, data[:at])]), now=now)
+        texts.on_input(Packets("line", [(PEER, data[at:])]), now=now + 0.1)
         assert said(caplog) == ["WARNING rover 1 says: one", "WARNING rover 1 says: two"]
 
 
@@ -89,14 +89,14 @@ def test_a_long_text_is_one_line_and_a_part_is_said_when_the_rest_does_not_come(
     texts: VehicleTexts, caplog: pytest.LogCaptureFixture
 ) -> None:
     parts = [ROVER.encode(each) for each in chunks(MavSeverity.ERROR, "a" * 80, text_id=5)]
-    texts.took_in(Packets("rovers", [(PEER, part) for part in parts]), now=1.0)
+    texts.on_input(Packets("rovers", [(PEER, part) for part in parts]), now=1.0)
     assert said(caplog) == [f"ERROR rover 1 says: {'a' * 80}"]
-    texts.took_in(Packets("rovers", [(PEER, parts[0])]), now=2.0)
-    texts.took_in(None, now=3.0)
+    texts.on_input(Packets("rovers", [(PEER, parts[0])]), now=2.0)
+    texts.on_input(None, now=3.0)
     assert said(caplog) == []
-    texts.took_in(None, now=10.0)
+    texts.on_input(None, now=10.0)
     assert said(caplog) == [f"ERROR rover 1 says: {'a' * 50}[…]"]
-    texts.took_in(Packets("rovers", [(PEER, parts[0])]), now=11.0)
+    texts.on_input(Packets("rovers", [(PEER, parts[0])]), now=11.0)
     texts.close()
     assert said(caplog) == [f"ERROR rover 1 says: {'a' * 50}[…]"]
 
@@ -105,7 +105,7 @@ def test_a_text_gives_no_orders_to_a_terminal(
     texts: VehicleTexts, caplog: pytest.LogCaptureFixture
 ) -> None:
     words = "a\x1b[2J\nERROR forged\r\x07"
-    texts.took_in(Packets("rovers", [(PEER, packet(words)), (PEER, packet(" \n"))]), now=1.0)
+    texts.on_input(Packets("rovers", [(PEER, packet(words)), (PEER, packet(" \n"))]), now=1.0)
     assert said(caplog) == ["WARNING rover 1 says: a[2J ERROR forged"]
 
 
@@ -114,13 +114,13 @@ def test_a_thousand_texts_a_second_are_counted(
 ) -> None:
     for number in range(10_000):
         data = packet(f"number {number}")
-        texts.took_in(Packets("rovers", [(PEER, data)]), now=1.0 + number / 1000)
+        texts.on_input(Packets("rovers", [(PEER, data)]), now=1.0 + number / 1000)
     shown = len(said(caplog))
     assert shown <= BURST + RATE * 10 + 1
     other = Encoder(Address(2, 1))
-    texts.took_in(Packets("rovers", [(PEER, packet("me", encoder=other))]), now=11.0)
+    texts.on_input(Packets("rovers", [(PEER, packet("me", encoder=other))]), now=11.0)
     assert said(caplog) == ["WARNING rover 2 says: me"]
-    texts.took_in(None, now=2.0 + TELL)
+    texts.on_input(None, now=2.0 + TELL)
     assert said(caplog) == [f"WARNING rover 1 says too much: {10_000 - shown} texts left out"]
-    texts.took_in(None, now=100.0)
+    texts.on_input(None, now=100.0)
     assert said(caplog) == []

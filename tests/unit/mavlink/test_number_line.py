@@ -4,7 +4,7 @@ from mav_tasks.mavlink.number_line import NumberLine
 
 
 def line_of(*arrivals: tuple[int, float]) -> NumberLine:
-    """Give a line that has taken in these numbers at these times."""
+    """Return a line that has taken in these numbers at these times."""
     line = NumberLine()
     for seq, at in arrivals:
         line.place(seq, now=at)

@@ -2,11 +2,11 @@ from math import pi
 
 import pytest
 
-from mav_tasks.probe.box import Box
+from mav_tasks.probe.driving_area import DrivingArea
 from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.task import Pose
 
-EAST = Box(Pose(10.0, 20.0, pi / 2))  # ahead is east, right is south
+EAST = DrivingArea(Pose(10.0, 20.0, pi / 2))  # ahead is east, right is south
 
 
 def moving(north: float, east: float, *, yaw: float = 0.0, forward: float = 0.0) -> Motion:

@@ -315,7 +315,7 @@ class TestInterrupt:
     def test_the_last_words_stop_it_where_nothing_else_can_be_done(self, persona: Persona) -> None:
         world = ProbeWorld(drive=True, persona=persona)
         world.until_moving()
-        words = world.probe.last_words()
+        words = world.probe.emergency_stop_packets()
         world.leave(world.party)
         link = world.net.link("last", peers=("rover1",))
         for data in words:
@@ -326,9 +326,9 @@ class TestInterrupt:
     def test_there_are_none_before_it_drives_and_after(self) -> None:
         world = ProbeWorld(drive=True)
         world.run(5.0)
-        assert world.probe.last_words() == []
+        assert world.probe.emergency_stop_packets() == []
         world.finish()
-        assert world.probe.last_words() == []
+        assert world.probe.emergency_stop_packets() == []
 
 
 class TestCar:

@@ -44,7 +44,7 @@ def recorded(folder: Path, *, seconds: float = 2.5, **options: Any) -> Path:
     world = VirtualWorld(net)
     body = KinematicBody(start=Pose(), slip=0.0, seed=None)
     rover = make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
-    server = InMemoryServer(net, vehicles=("rover",), witnesses=[decisions])
+    server = InMemoryServer(net, vehicles=("rover",), observers=[decisions])
     server.pump.handle(WallClock(UTC), now=0.0)
     world.join(RoverParty(rover, net.link("rover")), server)
     world.run(seconds)
@@ -377,8 +377,8 @@ def test_a_peer_that_no_link_has_ends_the_record(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     decisions = Decisions(tmp_path, Settings(), Restored(), now=0.0, size=10**6)
-    decisions.took_in(WallClock(1.0), now=1.0)
-    decisions.took_in(Packets(CLIENT_LINK, [(object(), b"x")]), now=1.5)
+    decisions.on_input(WallClock(1.0), now=1.0)
+    decisions.on_input(Packets(CLIENT_LINK, [(object(), b"x")]), now=1.5)
     decisions.close()
     record = read(decisions.path)
     assert (record.why_it_ends or "").startswith("a peer of another kind than links have: <object")

@@ -64,7 +64,7 @@ def started(folder: Path, **options: Any) -> Tlog:
     options = {"size": 10**6, "count": 10, "component_id": 191, **options}
     tlog = Tlog(folder, **options)
     for item in LINKS:
-        tlog.took_in(item, now=0.0)
+        tlog.on_input(item, now=0.0)
     return tlog
 
 
@@ -92,21 +92,21 @@ def told(folder: Path) -> list[tuple[float, str, tuple[int, int], int]]:
 def test_each_packet_stands_there_once_at_its_time(tmp_path: Path) -> None:
     tlog = started(tmp_path)
     came = [packet(heartbeat(), ROVER, 7), packet(attitude(1), ROVER, 8)]
-    tlog.took_in(Packets("rovers", [("rover", data) for data in came]), now=1.25)
+    tlog.on_input(Packets("rovers", [("rover", data) for data in came]), now=1.25)
     passed_on = [to_client(packet(attitude(1), ROVER, 30), peer) for peer in ("gcs", "script")]
     shown = to_client(packet(heartbeat(mode=15), ROVER, 31))  # another mode than its own
-    tlog.gave_out([*passed_on, shown], [], now=1.25)
+    tlog.on_output([*passed_on, shown], [], now=1.25)
     asked = packet(m.CommandLong(1, 191, 54000, 0, 1.0, 0, 0, 0, 0, 0, 5), GCS, 3)
-    tlog.took_in(Packets("clients", [("gcs", asked)]), now=1.5)
+    tlog.on_input(Packets("clients", [("gcs", asked)]), now=1.5)
     own = [
         to_client(packet(ack(54000), SERVER, 1)),
         to_client(packet(ack(400), ROVER, 32)),  # in the autopilot's name
         *(to_client(packet(heartbeat(), SERVER, 2), peer) for peer in ("gcs", "script")),
     ]
     setpoint = packet(heartbeat(), OUR_OWN, 9)
-    tlog.gave_out([*own, Outgoing("rovers", "rover", setpoint, True)], [], now=1.5)
-    tlog.took_in(None, now=2.0)
-    tlog.gave_out([to_client(packet(attitude(1), ROVER, 33))], [], now=2.0)  # of our own accord
+    tlog.on_output([*own, Outgoing("rovers", "rover", setpoint, True)], [], now=1.5)
+    tlog.on_input(None, now=2.0)
+    tlog.on_output([to_client(packet(attitude(1), ROVER, 33))], [], now=2.0)  # of our own accord
     tlog.close()
     assert told(tmp_path) == [
         (1.25, "HEARTBEAT", ROVER, 7),
@@ -123,7 +123,7 @@ def test_each_packet_stands_there_once_at_its_time(tmp_path: Path) -> None:
 def test_an_answer_that_says_the_same_to_two_is_no_copy(tmp_path: Path) -> None:
     tlog = started(tmp_path)
     own = [to_client(packet(ack(54000), SERVER), peer) for peer in ("one", "other")]
-    tlog.gave_out(own, [], now=1.0)
+    tlog.on_output(own, [], now=1.0)
     tlog.close()
     assert len(told(tmp_path)) == 2
 
@@ -131,14 +131,14 @@ def test_an_answer_that_says_the_same_to_two_is_no_copy(tmp_path: Path) -> None:
 @pytest.mark.parametrize("cut", [1, 5, 17, 300])
 def test_a_stream_may_be_cut_anywhere(tmp_path: Path, cut: int) -> None:
     tlog = started(tmp_path)
-    tlog.took_in(LinkChanged("tcp", LinkSide.VEHICLES, up=True, is_stream=True), now=0.0)
-    tlog.took_in(PeerChanged("tcp", "rover", up=True), now=0.0)
+    tlog.on_input(LinkChanged("tcp", LinkSide.VEHICLES, up=True, is_stream=True), now=0.0)
+    tlog.on_input(PeerChanged("tcp", "rover", up=True), now=0.0)
     stream = b"".join(packet(attitude(number), ROVER, number) for number in range(1, 11))
-    tlog.took_in(Packets("tcp", [("rover", stream[:3])]), now=0.5)
-    tlog.took_in(PeerChanged("tcp", "rover", up=False), now=0.5)  # the torn packet is no more
+    tlog.on_input(Packets("tcp", [("rover", stream[:3])]), now=0.5)
+    tlog.on_input(PeerChanged("tcp", "rover", up=False), now=0.5)  # the torn packet is no more
     for number, start in enumerate(range(0, len(stream), cut)):
         piece = Packets("tcp", [("rover", stream[start : start + cut])])
-        tlog.took_in(piece, now=1.0 + number / 1000)
+        tlog.on_input(piece, now=1.0 + number / 1000)
     tlog.close()
     assert [(kind, seq) for _, kind, _, seq in told(tmp_path)] == [
         ("ATTITUDE", number) for number in range(1, 11)
@@ -149,7 +149,7 @@ def test_noise_is_not_logged(tmp_path: Path) -> None:
     tlog = started(tmp_path)
     good = packet(heartbeat(), ROVER, 7)
     bad = good[:-1] + bytes([good[-1] ^ 1])
-    tlog.took_in(Packets("rovers", [("x", b"\xfd\x01"), ("x", bad), ("x", b"?" + good)]), now=1.0)
+    tlog.on_input(Packets("rovers", [("x", b"\xfd\x01"), ("x", bad), ("x", b"?" + good)]), now=1.0)
     tlog.close()
     assert told(tmp_path) == [(1.0, "HEARTBEAT", ROVER, 7)]
 
@@ -158,7 +158,7 @@ def test_the_log_goes_on_in_the_next_file(tmp_path: Path) -> None:
     tlog = started(tmp_path, size=2_000, count=3)
     for number in range(400):
         data = packet(attitude(number), ROVER, number % 256)
-        tlog.took_in(Packets("rovers", [("rover", data)]), now=1.0 + number)
+        tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0 + number)
     tlog.close()
     there = told(tmp_path)
     assert [when for when, *_ in there] == [1.0 + n for n in range(400 - len(there), 400)]
@@ -203,11 +203,11 @@ def test_a_full_disk_loses_packets_and_is_told_of_twice(
     for number in range(3):
         before = disk.tries
         data = packet(attitude(number), ROVER, number)
-        tlog.took_in(Packets("rovers", [("rover", data)]), now=1.0)
+        tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0)
         wait_for_another_try(disk, before)
     until(lambda: caplog.messages)
     disk.is_full = False
-    tlog.took_in(Packets("rovers", [("rover", packet(attitude(3), ROVER, 3))]), now=2.0)
+    tlog.on_input(Packets("rovers", [("rover", packet(attitude(3), ROVER, 3))]), now=2.0)
     tlog.close()
     name = f"telemetry log in {tmp_path}"
     assert caplog.messages == [
@@ -225,10 +225,10 @@ def test_a_disk_that_does_not_answer_keeps_nobody_waiting(
     tlog = started(tmp_path, write=disk.write, most_waiting=10_000)
     disk.goes_on.clear()
     one = Packets("rovers", [("rover", packet(heartbeat(), ROVER))])
-    tlog.took_in(one, now=1.0)
+    tlog.on_input(one, now=1.0)
     until(lambda: disk.tries)
     for number in range(100):
-        tlog.took_in(one, now=2.0 + number)
+        tlog.on_input(one, now=2.0 + number)
     tlog.close()  # in bounded time
     disk.goes_on.set()
     until(lambda: "recorder" not in {thread.name for thread in threading.enumerate()})
@@ -250,9 +250,9 @@ def test_what_fails_in_the_thread_is_told_and_nothing_else_happens(
 
     tlog = started(tmp_path, write=write, most_waiting=5_000)
     one = Packets("rovers", [("rover", packet(heartbeat(), ROVER))])
-    tlog.took_in(one, now=1.0)
+    tlog.on_input(one, now=1.0)
     until(lambda: caplog.messages)
     for _ in range(100):
-        tlog.took_in(one, now=2.0)
+        tlog.on_input(one, now=2.0)
     tlog.close()
     assert "internal error" in caplog.messages[0]

@@ -137,7 +137,7 @@ class Rig:
         assert self.arm() == MavResult.ACCEPTED
 
     def take(self, kind: type[M]) -> list[M]:
-        """Give what was heard of a kind, and forget everything heard."""
+        """Return what was heard of a kind, and forget everything heard."""
         taken = [message for message in self.heard if isinstance(message, kind)]
         self.heard.clear()
         return taken

@@ -7,7 +7,6 @@ import pytest
 
 from rover_sim.actuators import Actuator
 from rover_sim.body import Pose
-from rover_sim.by_hand import BodyByHand
 from rover_sim.fault_plan import (
     ACTIONS,
     EXAMPLE,
@@ -24,6 +23,7 @@ from rover_sim.fault_player import FaultPlayer, HandledRover
 from rover_sim.faults import Faults
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
+from rover_sim.manual_control import BodyByHand
 from rover_sim.realism import EXACT
 from rover_sim.vehicle import make_vehicle
 

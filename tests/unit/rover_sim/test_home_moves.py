@@ -8,7 +8,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from rover_sim.actuators import SIDES
 from rover_sim.body import Pose
-from rover_sim.by_hand import BodyByHand
+from rover_sim.manual_control import BodyByHand
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from tests.unit.rover_sim.real_rig import RealRig
 from tests.unit.rover_sim.rig import HOLD

@@ -57,8 +57,8 @@ class Rig:
             self.take(due)
             assert self.sender.next_deadline() != due, "a deadline handled must be over"
 
-    def request(self, message: CommandLong, now: float, *, urgent: bool = False) -> None:
-        self.sender.request(message, now=now, give_up_after=1.0, urgent=urgent)
+    def request(self, message: CommandLong, now: float, *, immediate: bool = False) -> None:
+        self.sender.request(message, now=now, give_up_after=1.0, immediate=immediate)
         self.take(now)
 
     def relay(
@@ -70,7 +70,7 @@ class Rig:
         what: int = ARM,
         param1: float = 1.0,
         rank: float = 0,
-        urgent: bool = False,
+        immediate: bool = False,
     ) -> None:
         self.sender.relay(
             packet(number),
@@ -81,7 +81,7 @@ class Rig:
             standing=Standing(origin, rank),
             now=now,
             give_up_after=0.4,
-            urgent=urgent,
+            immediate=immediate,
         )
         self.take(now)
 
@@ -224,7 +224,7 @@ def test_commands_of_other_ids_and_components_do_not_wait() -> None:
 def test_an_urgent_command_does_not_wait_and_gets_its_own_answer() -> None:
     rig = Rig()
     rig.relay(1, "alice", 0.0)
-    rig.relay(2, "bob", 0.1, urgent=True)
+    rig.relay(2, "bob", 0.1, immediate=True)
     assert rig.sent == [(0.0, packet(1)), (0.1, packet(2))]
     assert rig.results == [(0.1, "alice", None)]
     rig.receive(ack(result=MavResult.FAILED), 0.2)  # the vehicle's answer to alice
@@ -235,8 +235,8 @@ def test_an_urgent_command_does_not_wait_and_gets_its_own_answer() -> None:
 
 def test_two_clients_that_ask_for_the_same_urgent_thing_share_its_answer() -> None:
     rig = Rig()
-    rig.relay(1, "alice", 0.0, urgent=True)
-    rig.relay(2, "bob", 0.1, urgent=True)
+    rig.relay(1, "alice", 0.0, immediate=True)
+    rig.relay(2, "bob", 0.1, immediate=True)
     assert (rig.times, rig.results) == ([0.0, 0.1], [])
     rig.receive(ack(), 0.2)
     assert rig.results == [
@@ -247,8 +247,8 @@ def test_two_clients_that_ask_for_the_same_urgent_thing_share_its_answer() -> No
 
 def test_what_is_urgent_and_another_wish_has_an_answer_of_its_own() -> None:
     rig = Rig()
-    rig.relay(1, "alice", 0.0, urgent=True)
-    rig.relay(2, "bob", 0.1, param1=21196.0, urgent=True)
+    rig.relay(1, "alice", 0.0, immediate=True)
+    rig.relay(2, "bob", 0.1, param1=21196.0, immediate=True)
     rig.receive(ack(result=MavResult.FAILED), 0.2)
     rig.receive(ack(), 0.3)
     assert rig.results == [(0.1, "alice", None), (0.3, "bob", MavResult.ACCEPTED)]
@@ -256,9 +256,9 @@ def test_what_is_urgent_and_another_wish_has_an_answer_of_its_own() -> None:
 
 def test_each_of_them_is_given_up_in_its_own_time() -> None:
     rig = Rig()
-    rig.relay(1, "alice", 0.0, urgent=True)
-    rig.relay(2, "bob", 0.1, urgent=True)
-    rig.relay(3, "carol", 0.2, urgent=True)
+    rig.relay(1, "alice", 0.0, immediate=True)
+    rig.relay(2, "bob", 0.1, immediate=True)
+    rig.relay(3, "carol", 0.2, immediate=True)
     rig.run(0.45)
     assert rig.results == [(0.4, "alice", None)]
     rig.receive(ack(), 0.46)
@@ -268,7 +268,7 @@ def test_each_of_them_is_given_up_in_its_own_time() -> None:
 def test_an_answer_owed_for_long_is_not_waited_for() -> None:
     rig = Rig()
     rig.request(command(MODE), 0.0)
-    rig.request(command(MODE), 0.1, urgent=True)
+    rig.request(command(MODE), 0.1, immediate=True)
     rig.receive(ack(MODE), 0.1 + LATE)
     assert rig.results == [(0.1, None, None), (0.1 + LATE, None, MavResult.ACCEPTED)]
 

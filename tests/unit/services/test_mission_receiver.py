@@ -49,7 +49,7 @@ class Rig:
         return Result.UNSUPPORTED if item.command == self.refused else None
 
     def said(self) -> list[tuple[str, str, int]]:
-        """Give whom what was told: requests with their number, acks with their result."""
+        """Return whom what was told: requests with their number, acks with their result."""
         outgoing, uploads = self.receiver.take()
         self.uploads += uploads
         words = []

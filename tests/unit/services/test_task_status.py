@@ -4,7 +4,7 @@ from mav_tasks.services.task_status import BURST, TaskStatusSender
 
 
 def sender_of(rate: float, woken: list[float] | None = None) -> TaskStatusSender:
-    """Give a sender that writes down when it is to be called."""
+    """Return a sender that writes down when it is to be called."""
     return TaskStatusSender(rate=rate, wake=([] if woken is None else woken).append, now=0.0)
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, NotKept, Outcome
 from mav_tasks.store.sqlite import SqliteStore
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import TaskSubmitted
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Marks, Task, TaskId, Terms
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE
 
@@ -22,7 +22,7 @@ PATIENCE = 20.0  # s
 
 
 def submitted(number: int, *, at: float = 100.0) -> TaskSubmitted:
-    """Give the event of a submission; times are exact in binary."""
+    """Return the event of a submission; times are exact in binary."""
     task = Task(
         id=TaskId(number),
         vehicle=1,
@@ -36,9 +36,9 @@ def submitted(number: int, *, at: float = 100.0) -> TaskSubmitted:
     return TaskSubmitted(task, at)
 
 
-def finish(book: TaskBook, number: int, *, now: float) -> None:
+def finish(registry: TaskRegistry, number: int, *, now: float) -> None:
     """Let a waiting task be cancelled."""
-    book.change(
+    registry.change(
         TaskId(number), TaskState.CANCELLED, reason=TaskReason.CANCELLED, actor="client", now=now
     )
 
@@ -47,7 +47,7 @@ def finish(book: TaskBook, number: int, *, now: float) -> None:
 def opened(
     path: Path, *, offset: float = OFFSET, retention: Retention = FOR_EVER
 ) -> Iterator[SqliteStore]:
-    """Give a store; it is closed after the block."""
+    """Return a store; it is closed after the block."""
     store = SqliteStore(path, wall_offset=lambda: offset, retention=retention)
     try:
         yield store

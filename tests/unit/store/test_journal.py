@@ -14,8 +14,8 @@ from mav_tasks.store import journal as module
 from mav_tasks.store import schema
 from mav_tasks.store.journal import PAGE, Journal, Which
 from mav_tasks.store.sqlite import SqliteStore
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 from tests.unit.store.samples import OFFSET, finish, opened, submitted, wait_for
 from tests.unit.tasks.samples import draft
@@ -34,11 +34,11 @@ def store(path: Path) -> Iterator[SqliteStore]:
 
 def history(count: int, *, vehicle: int = 1, at: float = 10.0) -> list[Event]:
     """Tasks submitted and cancelled, one after the other."""
-    book = TaskBook()
+    registry = TaskRegistry()
     for number in range(1, count + 1):
-        book.submit(draft(vehicle=vehicle), now=at + number)
-        finish(book, number, now=at + number + 0.5)
-    return list(book.take_events())
+        registry.submit(draft(vehicle=vehicle), now=at + number)
+        finish(registry, number, now=at + number + 0.5)
+    return list(registry.take_events())
 
 
 def keep(store: SqliteStore, events: list[Event], *, through: int | None = None) -> list[Event]:

@@ -10,7 +10,6 @@ from mav_tasks.store import Kept, NotKept
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.database import Database
 from mav_tasks.store.schema import APPLICATION_ID, MIGRATIONS, migrate
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import (
     Event,
     PlanStored,
@@ -25,6 +24,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import MAX_TASK_ID, Frame, Pose, Progress, TaskId, Terms
@@ -61,31 +61,33 @@ def test_events_are_kept_and_the_descriptor_says_so(path: Path) -> None:
 
 
 def test_what_comes_back_is_what_the_book_has(path: Path) -> None:
-    book = TaskBook()
+    registry = TaskRegistry()
     for _ in range(4):
-        book.submit(draft(Move(2.5), priority=3), now=8.0)
-    book.change(TaskId(1), S.STARTING, reason=R.NONE, actor="server", now=9.0)
-    book.withdraw(TaskId(4), now=9.0)
-    events = book.take_events()
+        registry.submit(draft(Move(2.5), priority=3), now=8.0)
+    registry.change(TaskId(1), S.STARTING, reason=R.NONE, actor="server", now=9.0)
+    registry.withdraw(TaskId(4), now=9.0)
+    events = registry.take_events()
     with opened(path) as store:
         store.append(events)
         wait_for(store, len(events))
     progress = Progress(anchor=Pose(1.0, 2.0, 0.5), done=0.25, execution_time=3.0)
-    book.change(TaskId(1), S.EXECUTING, reason=R.NONE, actor="server", now=10.0, progress=progress)
-    book.change(TaskId(1), S.PAUSED, reason=R.OPERATOR, actor="client", now=11.0)
-    finish(book, 2, now=12.0)
-    later = book.take_events()
+    registry.change(
+        TaskId(1), S.EXECUTING, reason=R.NONE, actor="server", now=10.0, progress=progress
+    )
+    registry.change(TaskId(1), S.PAUSED, reason=R.OPERATOR, actor="client", now=11.0)
+    finish(registry, 2, now=12.0)
+    later = registry.take_events()
     with opened(path) as store:
         store.append(later)
         wait_for(store, len(later))
-        assert store.load().tasks == book.all()
+        assert store.load().tasks == registry.all()
         assert [event for _, event in store.journal()] == events + later
         assert [number for number, _ in store.journal()] == list(range(1, 10))
         assert store.load().next_id == 5
 
 
 def test_ids_that_begin_again_take_the_place_of_what_is_over(path: Path) -> None:
-    old, new = TaskBook(), TaskBook(next_id=MAX_TASK_ID)
+    old, new = TaskRegistry(), TaskRegistry(next_id=MAX_TASK_ID)
     old.submit(draft(), now=1.0)
     finish(old, 1, now=2.0)
     for now in (3.0, 4.0):
@@ -103,33 +105,33 @@ def test_ids_that_begin_again_take_the_place_of_what_is_over(path: Path) -> None
 
 
 def test_new_terms_and_a_new_state_both_count(path: Path) -> None:
-    book = TaskBook()
-    task = book.submit(draft(), now=1.0)
+    registry = TaskRegistry()
+    task = registry.submit(draft(), now=1.0)
     terms = Terms(priority=9, start_at=50.0, after=0)
     modified = TaskModified(task.id, 1, 2, terms, "client", 2.0)
     with opened(path) as store:
-        store.append([*book.take_events(), modified])
+        store.append([*registry.take_events(), modified])
         wait_for(store, 2)
         (found,) = store.load().tasks
         assert (found.terms, found.version, found.state) == (terms, 2, S.QUEUED)
 
 
 def test_the_leg_that_was_begun_last_is_kept_with_its_version(path: Path) -> None:
-    book = TaskBook()
-    task = book.submit(draft(), now=1.0)
+    registry = TaskRegistry()
+    task = registry.submit(draft(), now=1.0)
     for state in (S.STARTING, S.EXECUTING):
-        book.change(task.id, state, reason=R.NONE, actor="server", now=2.0)
-    book.advance(task.id, Progress(anchor=Pose(1.0, 2.0, 0.5), done=0.25, leg=1), now=3.0)
-    events = book.take_events()
+        registry.change(task.id, state, reason=R.NONE, actor="server", now=2.0)
+    registry.advance(task.id, Progress(anchor=Pose(1.0, 2.0, 0.5), done=0.25, leg=1), now=3.0)
+    events = registry.take_events()
     with opened(path) as store:
         store.append(events)
         wait_for(store, len(events))
-        assert store.load().tasks == book.all()
-    book.change(task.id, S.PAUSED, reason=R.OPERATOR, actor="client", now=4.0)
+        assert store.load().tasks == registry.all()
+    registry.change(task.id, S.PAUSED, reason=R.OPERATOR, actor="client", now=4.0)
     with opened(path) as store:
-        store.append(book.take_events())
+        store.append(registry.take_events())
     with opened(path) as store:
-        assert store.load().tasks == book.all()
+        assert store.load().tasks == registry.all()
 
 
 def test_a_file_of_the_first_schema_is_read(path: Path) -> None:
@@ -206,28 +208,28 @@ def test_files_are_their_users_alone(path: Path) -> None:
 
 
 def test_ids_are_never_used_again(path: Path) -> None:
-    book = TaskBook()
+    registry = TaskRegistry()
     for _ in range(3):
-        book.submit(draft(), now=1.0)
-    book.withdraw(TaskId(3), now=1.0)
-    finish(book, 2, now=1.0)
+        registry.submit(draft(), now=1.0)
+    registry.withdraw(TaskId(3), now=1.0)
+    finish(registry, 2, now=1.0)
     with opened(path) as store:
-        store.append(book.take_events())
+        store.append(registry.take_events())
     with opened(path, retention=Retention(max_age=None, max_count=0)) as store:
         found = store.load()
         assert ([task.id for task in found.tasks], found.next_id) == ([1], 4)
 
 
 def test_retention_takes_the_oldest_that_are_over_and_their_events(path: Path) -> None:
-    book = TaskBook()
+    registry = TaskRegistry()
     now = time.monotonic()
     for _ in range(600):
-        book.submit(draft(), now=now - 10_000)
+        registry.submit(draft(), now=now - 10_000)
     for number in range(1, 501):
-        finish(book, number, now=now - 6000 + 10 * number)
+        finish(registry, number, now=now - 6000 + 10 * number)
     events: list[Event] = [VehicleSeen(1, "old", now - 7000), VehicleSeen(1, "new", now - 5)]
     with opened(path) as store:
-        store.append([*book.take_events(), *events])
+        store.append([*registry.take_events(), *events])
     with opened(path, retention=Retention(max_age=4005.0, max_count=None)) as store:
         assert [task.id for task in store.load().tasks] == list(range(200, 601))
         texts = [e.text for _, e in store.journal() if isinstance(e, VehicleSeen)]
@@ -240,12 +242,12 @@ def test_retention_takes_the_oldest_that_are_over_and_their_events(path: Path) -
 
 def test_the_trimmer_goes_on_beside_the_writer(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mav_tasks.store.sqlite.TRIM_AT_OPEN", 0.0)
-    book = TaskBook()
+    registry = TaskRegistry()
     for number in range(1, 601):
-        book.submit(draft(), now=1.0)
-        finish(book, number, now=1.0)
+        registry.submit(draft(), now=1.0)
+        finish(registry, number, now=1.0)
     with opened(path) as store:
-        store.append(book.take_events())
+        store.append(registry.take_events())
     with opened(path, retention=Retention(max_age=None, max_count=0)) as store:
         end = time.monotonic() + 10
         while store.load().tasks and time.monotonic() < end:
@@ -344,15 +346,15 @@ def test_a_migration_that_fails_changes_nothing() -> None:
 
 
 def test_how_far_a_driven_task_has_come_is_kept_and_fills_no_journal(path: Path) -> None:
-    book = TaskBook()
-    task = book.submit(draft(goal=Move(4.0)), now=1.0)
+    registry = TaskRegistry()
+    task = registry.submit(draft(goal=Move(4.0)), now=1.0)
     for state in (S.STARTING, S.EXECUTING):
-        book.change(task.id, state, reason=R.NONE, actor="server", now=2.0)
+        registry.change(task.id, state, reason=R.NONE, actor="server", now=2.0)
     for second in range(1, 4):
-        book.note_progress(task.id, Progress(Pose(0.0, 0.0, 0.0), done=0.5 * second))
-        book.keep_progress(task.id, now=2.0 + second)
+        registry.note_progress(task.id, Progress(Pose(0.0, 0.0, 0.0), done=0.5 * second))
+        registry.keep_progress(task.id, now=2.0 + second)
     with opened(path) as store:
-        store.append(book.take_events())
+        store.append(registry.take_events())
         wait_for(store, 6)
     with opened(path) as store:
         (kept,) = store.load().tasks

@@ -5,12 +5,12 @@ from dataclasses import replace
 from math import cos, sin
 
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
 from mav_tasks.tasks.events import Event, TaskChanged
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import GlobalPlace, Goal
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Draft, Frame, Pose, Task, TaskId, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -48,8 +48,8 @@ class Rig:
     def __init__(self, *, settings: Settings = SETTINGS, now: float = 10.0) -> None:
         self.now = now
         self.settings = settings
-        self.book = TaskBook()
-        self.fleet = Fleet(self.book, settings)
+        self.registry = TaskRegistry()
+        self.fleet = Fleet(self.registry, settings)
         self.keeps = True
 
     @property
@@ -74,7 +74,7 @@ class Rig:
 
     def keep(self) -> None:
         if self.keeps:
-            self.book.durable = self.book.recorded
+            self.registry.durable = self.registry.recorded
 
     def pass_time(self, seconds: float) -> None:
         self.now = round(self.now + seconds, 6)
@@ -110,14 +110,14 @@ class Rig:
             self.step(at(length * step / steps))
 
     def task(self, task_id: int) -> Task:
-        return self.book[TaskId(task_id)]
+        return self.registry[TaskId(task_id)]
 
     def state(self, task_id: int) -> TaskState:
         return self.task(task_id).state
 
     def states(self) -> list[TaskState]:
         """The states of all tasks, by their ids."""
-        return [task.state for task in self.book.all()]
+        return [task.state for task in self.registry.all()]
 
     def modify(self, task_id: int, **changes: float | bool | None) -> Task:
         """Change one of a task's terms."""
@@ -135,12 +135,12 @@ class Rig:
 
     def story(self) -> list[tuple[int, TaskState, TaskReason]]:
         """The changes of tasks since the last call."""
-        return story_of(self.book.take_events())
+        return story_of(self.registry.take_events())
 
     def restarted(self, *, paused: dict[int, TaskReason] | None = None, **how: float) -> "Rig":
         """The same tasks in a server begun anew."""
         after = Rig(settings=self.settings, now=self.now)
-        tasks = self.book.all()
+        tasks = self.registry.all()
         last = max((task.id for task in tasks), default=0)
         restored = Restored(
             tasks=tasks,

@@ -6,11 +6,11 @@ import pytest
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.book import TaskBook
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.fleet import LONG_IDLE, Fleet
 from mav_tasks.tasks.goal import Move, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Frame, Pose, Task, TaskId, Terms, same_frame
 from mav_tasks.tasks.view import DemandKind
@@ -23,32 +23,32 @@ LONG = Wait(1000.0)
 
 
 def in_state(state: TaskState, reason: TaskReason = R.NONE) -> Task:
-    task = TaskBook().submit(draft(), now=1.0)
+    task = TaskRegistry().submit(draft(), now=1.0)
     return replace(task, state=state, reason=reason, version=4)
 
 
-def restored(task: Task, **how: object) -> tuple[Fleet, TaskBook]:
-    book = TaskBook()
-    fleet = Fleet(book, Settings())
+def restored(task: Task, **how: object) -> tuple[Fleet, TaskRegistry]:
+    registry = TaskRegistry()
+    fleet = Fleet(registry, Settings())
     made = replace(Restored(tasks=(task,), next_id=2), **how)  # type: ignore[arg-type]
     fleet.restore(made, now=10.0)
-    return fleet, book
+    return fleet, registry
 
 
 class TestWhatHadBegun:
     @pytest.mark.parametrize("state", [S.STARTING, S.EXECUTING, S.CANCELLING])
     def test_and_drove_is_held_until_somebody_decides(self, state: TaskState) -> None:
-        fleet, book = restored(in_state(state))
-        task = book[TaskId(1)]
+        fleet, registry = restored(in_state(state))
+        task = registry[TaskId(1)]
         assert (task.state, task.reason, task.version) == (S.HELD, R.OUTCOME_UNKNOWN, 5)
         assert [fleet.was_driven(1) for _ in range(2)] == [True, False]
-        assert fleet.of(1).begun == task
+        assert fleet.of(1).active == task
 
     @pytest.mark.parametrize("state", [S.PAUSED, S.HELD])
     def test_and_stood_is_as_it_was(self, state: TaskState) -> None:
         task = in_state(state, R.OPERATOR if state is S.PAUSED else R.LATE)
-        fleet, book = restored(task)
-        assert (book.all(), fleet.was_driven(1)) == ((task,), False)
+        fleet, registry = restored(task)
+        assert (registry.all(), fleet.was_driven(1)) == ((task,), False)
         assert fleet.of(1).paused is (R.RESTARTED if state is S.PAUSED else R.NONE)
 
     def test_a_pause_begins_anew_only_when_continued(self) -> None:
@@ -76,9 +76,9 @@ class TestWhatHadBegun:
         rig.submit(LONG, terms=Terms(is_preemptive=True))
         rig.step(in_control)
         after = rig.restarted()
-        begun = after.tasks.begun
-        assert begun is not None
-        assert (begun.id, [task.id for task in after.tasks.aside]) == (2, [1])
+        active = after.tasks.active
+        assert active is not None
+        assert (active.id, [task.id for task in after.tasks.suspended]) == (2, [1])
         assert after.states() == [S.PAUSED, S.HELD]
         assert after.tasks.paused is R.RESTARTED
 
@@ -151,21 +151,21 @@ class TestTheQueue:
     def test_stands_after_an_unclean_end_or_a_long_one(
         self, ended_well: bool, idle_for: float, paused: TaskReason
     ) -> None:
-        fleet, book = restored(in_state(S.QUEUED), ended_well=ended_well, idle=idle_for)
+        fleet, registry = restored(in_state(S.QUEUED), ended_well=ended_well, idle=idle_for)
         assert fleet.of(1).paused is paused
-        events = [e for e in book.take_events() if isinstance(e, QueuePaused)]
+        events = [e for e in registry.take_events() if isinstance(e, QueuePaused)]
         assert [e.reason for e in events] == ([paused] if paused else [])
 
     def test_of_a_vehicle_met_after_an_unclean_end_stands_and_is_remembered(self) -> None:
-        fleet, book = restored(in_state(S.QUEUED), ended_well=False)
-        book.take_events()
+        fleet, registry = restored(in_state(S.QUEUED), ended_well=False)
+        registry.take_events()
         assert fleet.of(7).paused is R.RESTARTED
-        (event,) = [event for event in book.take_events() if isinstance(event, QueuePaused)]
+        (event,) = [event for event in registry.take_events() if isinstance(event, QueuePaused)]
         assert (event.vehicle, event.reason) == (7, R.RESTARTED)
 
     def test_goes_on_by_setting(self) -> None:
-        book = TaskBook()
-        fleet = Fleet(book, Settings(on_restart="continue"))
+        registry = TaskRegistry()
+        fleet = Fleet(registry, Settings(on_restart="continue"))
         fleet.restore(Restored((in_state(S.QUEUED),), 2, ended_well=False), now=10.0)
         assert fleet.of(1).paused is R.NONE
 
@@ -193,7 +193,7 @@ class TestTheQueue:
         assert late.id in rig.tasks.waiting
         after = rig.restarted()
         assert after.tasks.waiting == rig.tasks.waiting
-        assert after.book.all() == rig.book.all()
+        assert after.registry.all() == rig.registry.all()
 
     def test_what_waits_for_a_held_task_still_does(self) -> None:
         rig = Rig().executing(LONG)

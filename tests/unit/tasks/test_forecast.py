@@ -104,7 +104,7 @@ class TestTimeLeft:
 
 
 def times_of(rig: Rig, task: Task) -> tuple[float, float]:
-    forecast = Forecast(rig.tasks, rig.book, now=rig.now)
+    forecast = Forecast(rig.tasks, rig.registry, now=rig.now)
     return estimate(rig.tasks, rig.task(task.id), forecast=forecast, now=rig.now)
 
 

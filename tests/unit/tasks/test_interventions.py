@@ -31,7 +31,7 @@ LONG = Wait(1000.0)
 HERE = Frame(473_977_418, 85_455_938, 0.0)
 
 
-def begun() -> Rig:
+def active() -> Rig:
     return Rig().executing(LONG)
 
 
@@ -48,7 +48,7 @@ def interrupted(*, queueing: Queueing | None = None) -> Rig:
 
 def test_a_task_whose_vehicle_is_not_in_control_again_in_time_fails() -> None:
     """Whatever took it, nobody was told: the task does not stand there for ever."""
-    rig = begun()
+    rig = active()
     lost = SETTINGS.watch.start_timeout - TICK
 
     def out_of_control(now: float) -> VehicleView:
@@ -64,14 +64,14 @@ def test_a_task_whose_vehicle_is_not_in_control_again_in_time_fails() -> None:
 
 class TestCancel:
     def test_what_waits_is_over_at_once_and_what_waits_for_it_fails(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit()
         rig.submit(terms=Terms(after=2), vehicle=2)
         rig.cancel(2)
         assert rig.story() == [(2, S.CANCELLED, R.CANCELLED), (3, S.FAILED, R.DEPENDENCY_FAILED)]
 
     def test_what_runs_is_over_when_it_stands(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit(LONG)
         rig.cancel(1)
         assert rig.step(lambda now: ours(at=now)).kind is K.HOLD
@@ -80,7 +80,7 @@ class TestCancel:
         assert rig.states() == [S.CANCELLED, S.EXECUTING]
 
     def test_what_does_not_stand_in_time_is_held_and_stopped_until_it_does(self) -> None:
-        rig = begun()
+        rig = active()
         rig.cancel(1)
         rig.steps(lambda now: ours(at=now), seconds=SETTINGS.watch.stop_unconfirmed + 2 * TICK)
         assert rig.story() == [(1, S.CANCELLING, R.CANCELLED), (1, S.HELD, R.STOP_UNCONFIRMED)]
@@ -91,10 +91,10 @@ class TestCancel:
         rig = interrupted()
         rig.cancel(1)
         assert rig.story() == [(1, S.CANCELLING, R.CANCELLED), (1, S.CANCELLED, R.CANCELLED)]
-        assert (rig.tasks.aside, rig.state(2)) == ([], S.EXECUTING)
+        assert (rig.tasks.suspended, rig.state(2)) == ([], S.EXECUTING)
 
     def test_a_paused_one_goes_and_the_queue_stands_as_before(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit(LONG)
         rig.tasks.pause(R.OPERATOR, actor=BY, now=rig.now)
         rig.cancel(1)
@@ -102,7 +102,7 @@ class TestCancel:
         assert (rig.states(), rig.tasks.paused) == ([S.CANCELLED, S.QUEUED], R.OPERATOR)
 
     def test_a_failed_dependency_reaches_through_chains_and_vehicles(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit(vehicle=2, terms=Terms(after=1))
         rig.submit(vehicle=3, terms=Terms(after=2))
         rig.cancel(1)
@@ -112,7 +112,7 @@ class TestCancel:
 
 class TestKill:
     def test_nothing_begins_before_the_vehicle_stands(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit(LONG)
         rig.cancel(1, kill=True)
         assert rig.story() == [(1, S.KILLED, R.CANCELLED)]
@@ -131,7 +131,7 @@ class TestKill:
         assert rig.state(2) is S.EXECUTING
 
     def test_a_cancelling_one_can_be_killed(self) -> None:
-        rig = begun()
+        rig = active()
         rig.cancel(1)
         rig.cancel(1, kill=True)
         assert rig.state(1) is S.KILLED
@@ -161,7 +161,7 @@ class TestHeldTasks:
         run_until(rig, rover, lambda: rig.state(1) is S.COMPLETED)
         assert rover.pose.north == pytest.approx(end, abs=0.03)
 
-    @pytest.mark.parametrize("reason", [R.OFF_LINE, R.FRAME_RESET])
+    @pytest.mark.parametrize("reason", [R.OFF_TRACK, R.FRAME_RESET])
     def test_the_remainder_counts_from_here_where_the_line_is_lost(
         self, reason: TaskReason
     ) -> None:
@@ -181,13 +181,13 @@ class TestHeldTasks:
 
     def test_is_not_released_while_it_could_not_take_the_vehicle(self) -> None:
         rig = self.held()
-        before = rig.book.all()
+        before = rig.registry.all()
         seen = replace(in_control(rig.now), mode=ModeKind.OTHER)
         with pytest.raises(Rejection) as refusal:
             rig.tasks.releases.release(
                 rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
             )
-        assert (refusal.value.reason, rig.book.all()) == (R.WRONG_MODE, before)
+        assert (refusal.value.reason, rig.registry.all()) == (R.WRONG_MODE, before)
 
     def test_a_reset_frame_holds_what_was_set_aside_too_and_each_is_released_by_itself(
         self,
@@ -199,7 +199,7 @@ class TestHeldTasks:
         rig.tasks.releases.release(
             rig.task(1), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
         )
-        assert ([t.id for t in rig.tasks.aside], rig.states()) == ([2], [S.STARTING, S.HELD])
+        assert ([t.id for t in rig.tasks.suspended], rig.states()) == ([2], [S.STARTING, S.HELD])
         with pytest.raises(Rejection, match="task 1 is starting"):
             rig.tasks.releases.release(
                 rig.task(2), again=True, may_continue=True, seen=seen, actor=BY, now=rig.now
@@ -219,7 +219,7 @@ class TestHeldTasks:
         rig.steps(at(1.0, still=True), seconds=0.5)
         assert rig.states() == [S.PAUSED, S.EXECUTING]
         rig.step(at(51.0, still=True))
-        assert [(t.state, t.reason) for t in rig.book.all()] == [(S.HELD, R.FRAME_RESET)] * 2
+        assert [(t.state, t.reason) for t in rig.registry.all()] == [(S.HELD, R.FRAME_RESET)] * 2
 
     def test_where_it_was_before_a_reset_is_not_held_against_it(self) -> None:
         rig, rover = self.held(R.FRAME_RESET), Rover(Pose(500.0, 0.0, 0.0))
@@ -256,7 +256,7 @@ class TestHeldTasks:
 
 class TestRunNow:
     def test_what_runs_is_set_aside_and_goes_on_when_continued(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit(LONG)
         rig.tasks.run_now(draft(Wait(1.0)), in_control(rig.now), actor=BY, now=rig.now)
         rig.keep()
@@ -269,7 +269,7 @@ class TestRunNow:
         assert rig.states() == [S.EXECUTING, S.QUEUED, S.COMPLETED]
 
     def test_another_one_replaces_it_whether_begun_or_not(self) -> None:
-        rig = begun()
+        rig = active()
         rig.keeps = False
         rig.tasks.run_now(draft(LONG), in_control(rig.now), actor=BY, now=rig.now)
         rig.tasks.run_now(draft(LONG), in_control(rig.now), actor=BY, now=rig.now)
@@ -283,7 +283,7 @@ class TestRunNow:
         assert rig.states() == [S.PAUSED, S.CANCELLED, S.CANCELLED, S.EXECUTING]
 
     def test_is_refused_under_stop_and_behind_a_held_task_without_a_trace(self) -> None:
-        rig = begun()
+        rig = active()
         rig.tasks.hold(R.LATE, now=rig.now)
         with pytest.raises(Rejection) as refusal:
             rig.tasks.run_now(draft(), in_control(rig.now), actor=BY, now=rig.now)
@@ -294,13 +294,13 @@ class TestRunNow:
         assert (refusal.value.reason, rig.states()) == (R.STOPPED, [S.KILLED])
 
     def test_is_refused_where_it_could_not_run_now(self) -> None:
-        rig = begun()
+        rig = active()
         by_hand = replace(idle(rig.now), mode=ModeKind.MANUAL, armed=True)
-        before = (rig.book.all(), rig.book.recorded)
+        before = (rig.registry.all(), rig.registry.recorded)
         with pytest.raises(Rejection) as refusal:
             rig.tasks.run_now(draft(), by_hand, actor=BY, now=rig.now)
         assert refusal.value.reason == R.WRONG_MODE
-        assert (rig.book.all(), rig.book.recorded) == before
+        assert (rig.registry.all(), rig.registry.recorded) == before
 
     def test_waits_as_any_other_once_the_queue_is_paused(self) -> None:
         rig = Rig()
@@ -329,7 +329,7 @@ class TestClear:
         rig.tasks.clear(begun_too=True, actor=BY, now=rig.now)
         rig.keep()
         rig.steps(in_control, seconds=2 * TICK)
-        assert [(t.state, t.reason) for t in rig.book.all()] == [(S.CANCELLED, R.CLEARED)] * 3
+        assert [(t.state, t.reason) for t in rig.registry.all()] == [(S.CANCELLED, R.CLEARED)] * 3
         assert rig.tasks.is_idle
 
 
@@ -367,7 +367,7 @@ class TestStop:
         assert rig.states() == [S.EXECUTING, S.KILLED]
 
     def test_fails_what_waits_for_what_it_killed(self) -> None:
-        rig = begun()
+        rig = active()
         rig.submit(terms=Terms(after=1))
         rig.tasks.stop(clear=False, actor=BY, now=rig.now)
         assert rig.states() == [S.KILLED, S.FAILED]
@@ -375,19 +375,19 @@ class TestStop:
 
 class TestProceed:
     def test_is_refused_and_changes_nothing_while_the_vehicle_cannot_be_taken(self) -> None:
-        rig = begun()
+        rig = active()
         rig.tasks.pause(R.TAKEOVER, actor="vehicle 1", now=rig.now)
-        before = (rig.book.all(), rig.book.recorded, rig.tasks.paused)
+        before = (rig.registry.all(), rig.registry.recorded, rig.tasks.paused)
         seen = replace(idle(rig.now), mode=ModeKind.MANUAL, armed=True)
         with pytest.raises(Rejection) as refusal:
             rig.tasks.proceed(seen, actor=BY, now=rig.now)
         assert refusal.value.reason == R.WRONG_MODE
-        assert (rig.book.all(), rig.book.recorded, rig.tasks.paused) == before
+        assert (rig.registry.all(), rig.registry.recorded, rig.tasks.paused) == before
 
     def test_without_a_pause_it_is_no_event(self) -> None:
         rig = Rig()
         assert rig.tasks.proceed(idle(rig.now), actor=BY, now=rig.now) is None
-        assert rig.book.take_events() == []
+        assert rig.registry.take_events() == []
 
     def test_what_failed_and_had_moved_is_looked_at_first(self) -> None:
         rig = Rig().executing(Move(2.0))
@@ -400,7 +400,7 @@ class TestProceed:
 
 
 def test_another_vehicle_behind_the_same_id_runs_nothing_unasked() -> None:
-    rig = begun()
+    rig = active()
     rig.tasks.identified("aa", now=rig.now)
     rig.tasks.identified("", now=rig.now)
     assert rig.tasks.paused is R.NONE

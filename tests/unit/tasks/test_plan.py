@@ -47,7 +47,7 @@ class Drive:
         self.track: list[tuple[float, float, float]] = []  # north, east, speed
 
     def look(self) -> None:
-        for event in self.rig.book.take_events():
+        for event in self.rig.registry.take_events():
             if isinstance(event, StepReached):
                 self.reached.append(event.step)
                 self.times.setdefault(event.step, event.at)

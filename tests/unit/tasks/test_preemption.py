@@ -58,7 +58,7 @@ class TestWhoMayInterrupt:
             (2, S.STARTING, R.NONE),
             (2, S.EXECUTING, R.NONE),
         ]
-        assert [task.id for task in rig.tasks.aside] == [1]
+        assert [task.id for task in rig.tasks.suspended] == [1]
 
     def test_who_is_marked_even_behind_others_in_the_queue(self) -> None:
         rig = running(Terms())
@@ -164,8 +164,8 @@ class TestAfterwards:
         assert rig.states()[:3] == [S.PAUSED, S.PAUSED, S.EXECUTING]
         rig.story()
         rig.steps(in_control, seconds=10.0)
-        begun = [task_id for task_id, new, _ in rig.story() if new is S.STARTING]
-        assert begun == [2, 5, 1]
+        active = [task_id for task_id, new, _ in rig.story() if new is S.STARTING]
+        assert active == [2, 5, 1]
         assert rig.states() == [S.EXECUTING, S.COMPLETED, S.COMPLETED, S.QUEUED, S.COMPLETED]
 
     def test_a_wait_is_as_long_as_without(self) -> None:
@@ -184,7 +184,7 @@ class TestAfterwards:
         rig.step(in_control)
         third = rig.submit(LONG)
         rig.task(1)
-        rig.book.change(rig.task(1).id, S.HELD, reason=R.LATE, actor="server", now=rig.now)
+        rig.registry.change(rig.task(1).id, S.HELD, reason=R.LATE, actor="server", now=rig.now)
         rig.cancel(2)
         rig.steps(in_control, seconds=3.0)
         assert rig.states() == [S.HELD, S.CANCELLED, S.QUEUED]

@@ -87,8 +87,8 @@ class TestFromQueueToEnd:
         rig.step(lambda now: idle_vehicle(at=now, pose=turned))
         rig.step(lambda now: ours(at=now, pose=turned, still=True))
         rig.step(lambda now: ours(at=now, pose=replace(turned, east=6.0)))
-        assert rig.book[TaskId(1)].progress.anchor == turned
-        assert rig.book[TaskId(1)].progress.done == pytest.approx(1.0)
+        assert rig.registry[TaskId(1)].progress.anchor == turned
+        assert rig.registry[TaskId(1)].progress.done == pytest.approx(1.0)
 
     def test_a_rotation_of_more_than_a_turn_goes_all_the_way(self) -> None:
         rig = Rig().executing(Rotate(3 * pi))
@@ -105,7 +105,7 @@ class TestFromQueueToEnd:
         rig.steps(in_control, seconds=1.0)
         rig.tasks.pause(R.OPERATOR, actor="somebody", now=rig.now)
         rig.steps(in_control, seconds=5.0)
-        assert rig.book[TaskId(1)].progress.execution_time == pytest.approx(1.0, abs=2 * TICK)
+        assert rig.registry[TaskId(1)].progress.execution_time == pytest.approx(1.0, abs=2 * TICK)
 
 
 class TestWaiting:
@@ -134,7 +134,7 @@ class TestWaiting:
         rig = Rig()
         task = rig.submit()
         rig.tasks.withdraw(task, now=rig.now)
-        assert (rig.tasks.is_idle, rig.book.all()) == (True, ())
+        assert (rig.tasks.is_idle, rig.registry.all()) == (True, ())
 
 
 class TestStarting:
@@ -242,10 +242,10 @@ class TestInterruptions:
         rig = Rig().executing()
         rig.drive(1.0)
         rig.tasks.pause(R.TAKEOVER, actor="vehicle 1", now=rig.now)
-        aside: View = lambda now: ours(at=now, pose=Pose(1.0, 1.5, 0.0), still=True)  # noqa: E731
-        rig.steps(aside, seconds=1.0)
-        rig.tasks.proceed(aside(rig.now), actor="somebody", now=rig.now)
-        assert rig.story()[-1] == (1, S.HELD, R.OFF_LINE)
+        suspended: View = lambda now: ours(at=now, pose=Pose(1.0, 1.5, 0.0), still=True)  # noqa: E731
+        rig.steps(suspended, seconds=1.0)
+        rig.tasks.proceed(suspended(rig.now), actor="somebody", now=rig.now)
+        assert rig.story()[-1] == (1, S.HELD, R.OFF_TRACK)
 
     def test_a_position_that_jumps_holds_the_task(self) -> None:
         rig = Rig().executing()
@@ -315,16 +315,16 @@ class TestStop:
         rig = Rig()
         rig.tasks.stop(clear=False, actor="a", now=rig.now)
         rig.submit()
-        rig.book.take_events()
+        rig.registry.take_events()
         rig.tasks.proceed(idle(rig.now), actor="b", now=rig.now)
-        assert rig.book.take_events() == [QueueContinued(1, "b", rig.now)]
+        assert rig.registry.take_events() == [QueueContinued(1, "b", rig.now)]
         assert rig.step(idle).kind is K.TAKE
 
     def test_is_recorded_once(self) -> None:
         rig = Rig()
         for _ in range(3):
             rig.tasks.stop(clear=False, actor="a", now=rig.now)
-        assert rig.book.take_events() == [
+        assert rig.registry.take_events() == [
             VehicleHalted(1, 2, R.STOPPED, "a", rig.now),
             QueuePaused(1, R.STOPPED, "a", rig.now),
         ]

@@ -45,7 +45,7 @@ OTHERS = {
 
 @pytest.fixture
 def full() -> FloodGate:
-    """Give a gate of which strangers have used up all."""
+    """Return a gate of which strangers have used up all."""
     gate = FloodGate(rate=10.0, is_known=lambda _: False)
     gate.let_in([(number, BEAT) for number in range(int(STRANGERS))], now=0.0)
     return gate

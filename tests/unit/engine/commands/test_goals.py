@@ -4,7 +4,7 @@ from math import inf, nan, pi, radians
 
 import pytest
 
-from mav_tasks.engine.commands.goals import GOALS, Wish, marks_of, wish_of
+from mav_tasks.engine.commands.goals import GOALS, ParsedCommand, marks_of, parse_command
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.enums import MavCmd
@@ -54,8 +54,8 @@ def rotate(*params: float) -> Command:
     return command(C.TASK_ROTATE, *params)
 
 
-def wished(what: Command) -> Wish:
-    return wish_of(what, b"packet", DRIVING, now=NOW)
+def wished(what: Command) -> ParsedCommand:
+    return parse_command(what, b"packet", DRIVING, now=NOW)
 
 
 def refused(what: Command) -> tuple[int, str]:

@@ -43,7 +43,7 @@ def moves(state: State) -> bool:
 
 
 def all_effects(event: Event, state: State) -> Iterator[Effect]:
-    """Give what is done, in one of the ways that it can go."""
+    """Yield what is done, in one of the ways that it can go."""
     yield from flat(effects_of(event, state), state)
 
 

@@ -28,7 +28,7 @@ STANDS = DRIVES._replace(forward=0.0, moves=False)
 def guarded(
     *, forward: float, sideways: float = 0.0, reported: float | None = None, told: Told = STANDS
 ) -> tuple[MotionGuard, float]:
-    """Give a guard that has seen a second of such motion, north as it points, after a drive."""
+    """Return a guard that has seen a second of such motion, north as it points, after a drive."""
     monitor = MotionMonitor(Watch())
     guard = MotionGuard(monitor, Watch())
     guard.look(DRIVES, now=0.0)

@@ -8,7 +8,7 @@ TICK = 0.05  # s
 
 
 def seen_after(asked: float, speed: float, *, seconds: float = 5.0) -> float | None:
-    """Give the seconds until it is seen, None if it is not."""
+    """Return the seconds until it is seen, None if it is not."""
     watch = Overspeed()
     for tick in range(round(seconds / TICK)):
         if watch.look(asked, speed, now=tick * TICK) is not None:

@@ -17,7 +17,7 @@ def attitude(ms: int) -> Attitude:
 
 
 def drives(*, up: int, until: float = 60.0) -> SenderClock:
-    """Give the clock of a vehicle that was up for so many ms at 0 s, and is heard at 20 Hz."""
+    """Return the clock of a vehicle that was up for so many ms at 0 s, and is heard at 20 Hz."""
     clock = SenderClock()
     for number in range(round(until * 20) + 1):
         assert clock.hear(position(up + 50 * number), now=number / 20) is Heard.NEWS

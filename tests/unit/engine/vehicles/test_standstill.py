@@ -16,7 +16,7 @@ PERIOD = 0.05  # s
 
 
 def wandering(random: Random, *, sigma: float, seconds: float) -> Iterator[float]:
-    """Give an offset that wanders: sigma its spread, seconds its correlation time."""
+    """Yield an offset that wanders: sigma its spread, seconds its correlation time."""
     keep = exp(-PERIOD / seconds)
     value = random.gauss(0.0, sigma)
     while True:

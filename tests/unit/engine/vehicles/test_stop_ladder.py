@@ -14,7 +14,7 @@ def climbed(
     holds_at: float | None = None,
     disarm_after: float = 2.0,
 ) -> list[tuple[float, Step]]:
-    """Give the steps of a rover whose speed is a function of the time since it was told."""
+    """Return the steps of a rover whose speed is a function of the time since it was told."""
     ladder, steps = StopLadder(), []
     ladder.begin(now=100.0)
     for tick in range(round(seconds / TICK)):

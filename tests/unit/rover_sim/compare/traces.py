@@ -18,7 +18,7 @@ def trace_of(
     yaw_rate: Callable[[float], float] = lambda _: 0.0,
     autopilot: int = ARDUPILOT,
 ) -> Trace:
-    """Give a trace that drives at that speed, straight or turning, up to the last mark."""
+    """Return a trace that drives at that speed, straight or turning, up to the last mark."""
     trace = Trace(marks=[Mark(at, name) for name, at in marks.items()])
     north = east = yaw = 0.0
     for count in range(round(max(marks.values()) / PERIOD) + 1):
@@ -43,6 +43,6 @@ def send(trace: Trace, name: str, at: float, **fields: object) -> None:
 
 
 def value_of(figures: list[Figure], name: str) -> Value:
-    """Give the value of the only figure of that name."""
+    """Return the value of the only figure of that name."""
     (value,) = [figure.value for figure in figures if figure.name == name]
     return value

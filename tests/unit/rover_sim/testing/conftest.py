@@ -14,7 +14,7 @@ MakeWorld = Callable[..., RoverWorld]
 
 @pytest.fixture
 def make_world() -> Iterator[MakeWorld]:
-    """Give a factory of worlds; its arguments are those of the marker."""
+    """Return a factory of worlds; its arguments are those of the marker."""
     worlds: list[RoverWorld] = []
 
     def make(*, seed: int = 1, settings: Settings | None = None, **options: Any) -> RoverWorld:
@@ -30,5 +30,5 @@ def make_world() -> Iterator[MakeWorld]:
 
 @pytest.fixture
 def world(make_world: MakeWorld) -> RoverWorld:
-    """Give a world with one rover of the default kind."""
+    """Return a world with one rover of the default kind."""
     return make_world()

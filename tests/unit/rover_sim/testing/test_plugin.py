@@ -168,7 +168,7 @@ SHOWS_SEED = """
 
 
 def seeds(result: pytest.RunResult) -> list[int]:
-    """Give the seeds that SHOWS_SEED shows."""
+    """Return the seeds that SHOWS_SEED shows."""
     found = re.findall(r"^seed of the \w+ (\d+)$", result.stdout.str(), flags=re.MULTILINE)
     return [int(seed) for seed in found]
 

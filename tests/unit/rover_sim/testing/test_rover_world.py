@@ -33,7 +33,7 @@ def start(world: RoverWorld) -> RoverWorld:
 
 @pytest.fixture
 def served(world: RoverWorld) -> RoverWorld:
-    """Give a world with a server."""
+    """Return a world with a server."""
     return start(world)
 
 

@@ -5,11 +5,11 @@ from math import cos, hypot, pi, radians, sin
 import pytest
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.astray import WRONG_WAY, AstrayWatch
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import Motion, Velocity
 from mav_tasks.tasks.driving.jump import JumpWatch
-from mav_tasks.tasks.driving.way_back import OFF_LINE
+from mav_tasks.tasks.driving.path_divergence import WRONG_WAY, AstrayWatch
+from mav_tasks.tasks.driving.path_follower import PathFollower
+from mav_tasks.tasks.driving.recovery_path import OFF_TRACK
 from mav_tasks.tasks.goal import Drive, Move, SingleGoal
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN
@@ -23,7 +23,7 @@ class Rig:
 
     def __init__(self, goal: SingleGoal, asked: Velocity = AHEAD) -> None:
         self.now = 100.0
-        self.course = Course(goal, Progress(anchor=ORIGIN))
+        self.course = PathFollower(goal, Progress(anchor=ORIGIN))
         self.watch = AstrayWatch()
         self.watch.commanded(asked)
         self.north = self.east = 0.0
@@ -31,7 +31,7 @@ class Rig:
     def drives(
         self, metres: float, *, north: float = 0.0, east: float = 0.0, yaw: float = 0.0
     ) -> float | None:
-        """Give the metres after which it is found astray, None if it is not within so many."""
+        """Return the metres after which it is found astray, None if it is not within so many."""
         speed = hypot(north, east)
         for step in range(1, round(metres / speed / TICK) + 1):
             self.now += TICK
@@ -118,7 +118,7 @@ def test_who_leaves_its_line_is_found_at_a_metre_more_than_it_began_with() -> No
     rig = Rig(Move(10.0))
     assert not rig.is_moved_to(0.0, 0.6)
     found = rig.drives(5.0, north=0.4, east=0.3, yaw=0.5)
-    assert found == pytest.approx(OFF_LINE / 0.6, abs=0.1)
+    assert found == pytest.approx(OFF_TRACK / 0.6, abs=0.1)
 
 
 def test_a_line_that_is_come_back_to_is_not_left() -> None:

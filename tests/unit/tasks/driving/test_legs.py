@@ -5,7 +5,6 @@ from math import hypot, pi, radians
 import pytest
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import ZERO, Leg, Motion, Velocity, wrap
 from mav_tasks.tasks.driving.legs import (
     FACE,
@@ -18,6 +17,7 @@ from mav_tasks.tasks.driving.legs import (
     leg_of,
     length_of,
 )
+from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import (
     Drive,
     Face,
@@ -138,8 +138,8 @@ class TestLegs:
     def test_what_is_continued_from_here_began_where_its_end_is_right(
         self, goal: SingleGoal, done: float, anchor: Pose
     ) -> None:
-        begun = begun_from(goal, Pose(10.0, 0.0, pi / 2), done)
-        assert (begun.north, begun.east, begun.yaw) == pytest.approx(
+        started = begun_from(goal, Pose(10.0, 0.0, pi / 2), done)
+        assert (started.north, started.east, started.yaw) == pytest.approx(
             (anchor.north, anchor.east, anchor.yaw)
         )
 
@@ -152,7 +152,7 @@ class TestCourse:
         return motion(pose, at=0.0)
 
     def test_looks_advances_and_comes_to_an_end(self) -> None:
-        course = Course(GoTo(EAST_3, wait=1.0), Progress(anchor=ORIGIN, target=EAST_3))
+        course = PathFollower(GoTo(EAST_3, wait=1.0), Progress(anchor=ORIGIN, target=EAST_3))
         course.look(self.moved(Pose(0, 0, 1.0)), elapsed=0.1)
         assert course.remaining == pytest.approx(pi / 2 - 1.0)
         assert course.advance(self.moved(Pose(0, 0, 1.5)))
@@ -166,7 +166,7 @@ class TestCourse:
 
     def test_near_enough_is_the_radius_of_the_place_and_of_nothing_else(self) -> None:
         goal = GoTo(EAST_3, radius=0.5, yaw=0.0)
-        course = Course(goal, Progress(anchor=ORIGIN, target=EAST_3))
+        course = PathFollower(goal, Progress(anchor=ORIGIN, target=EAST_3))
         course.look(self.moved(Pose(0, 0, pi / 2 - 0.4)), elapsed=0.1)
         assert not course.has_arrived(stands=True, driving=DRIVING)
         course.advance(self.moved(Pose(0, 0, pi / 2)))
@@ -175,7 +175,7 @@ class TestCourse:
             assert course.has_arrived(stands=False, driving=DRIVING) is arrived, east
 
     def test_zero_is_asked_for_nearer_to_the_end_than_is_required(self) -> None:
-        course = Course(Move(1.0), Progress(anchor=ORIGIN))
+        course = PathFollower(Move(1.0), Progress(anchor=ORIGIN))
         course.look(self.moved(Pose(0.993, 0, 0)), elapsed=0.1)
         assert not course.has_arrived(stands=False, driving=DRIVING)
         assert course.has_arrived(stands=True, driving=DRIVING)
@@ -183,13 +183,13 @@ class TestCourse:
     def test_a_speed_that_was_set_is_that_of_moves_and_headings(self) -> None:
         here = self.moved(ORIGIN)
         for goal in (Move(9.0, 0.2), Head(0.0, 0.2, 9.0)):
-            course = Course(goal, Progress(anchor=ORIGIN))
+            course = PathFollower(goal, Progress(anchor=ORIGIN))
             assert course.steer(here, driving=DRIVING, speed=1.5).forward == 1.5
             assert course.steer(here, driving=DRIVING, speed=None).forward == 0.2
-        drive = Course(Drive(0.2, 0.1, 9.0), Progress(anchor=ORIGIN))
+        drive = PathFollower(Drive(0.2, 0.1, 9.0), Progress(anchor=ORIGIN))
         assert drive.steer(here, driving=DRIVING, speed=1.5) == Velocity(0.2, 0.1)
         assert (
-            Course(Wait(9.0), Progress(anchor=ORIGIN)).steer(here, driving=DRIVING, speed=1.5)
+            PathFollower(Wait(9.0), Progress(anchor=ORIGIN)).steer(here, driving=DRIVING, speed=1.5)
             == ZERO
         )
 

@@ -4,12 +4,12 @@ import pytest
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.arrival import CORRECTIONS, LEAST_OF_ONE_TRY, Arrival
-from mav_tasks.tasks.driving.astray import WRONG_WAY, WRONG_WAY_OF_ONE_TRY, AstrayWatch
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
+from mav_tasks.tasks.driving.path_divergence import WRONG_WAY, WRONG_WAY_OF_ONE_TRY, AstrayWatch
+from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering
+from mav_tasks.tasks.driving.recovery_path import recovery_path
 from mav_tasks.tasks.driving.stuck import StuckWatch
-from mav_tasks.tasks.driving.way_back import way_back
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN, motion, ours
@@ -19,15 +19,15 @@ CAR = Steering(2.0, reverses=False)
 AHEAD = Velocity(0.5, 0.0)
 
 
-def course(*, one_try: bool, length: float = 10.0) -> Course:
-    """Give a move of a car that is steered by course, or of a rover that turns on the spot."""
+def course(*, one_try: bool, length: float = 10.0) -> PathFollower:
+    """Return a move of a car that is steered by course, or of a rover that turns on the spot."""
     progress = Progress(anchor=ORIGIN)
     if one_try:
-        return Course(Move(length), progress, by_course=True, steering=CAR)
-    return Course(Move(length), progress)
+        return PathFollower(Move(length), progress, by_course=True, steering=CAR)
+    return PathFollower(Move(length), progress)
 
 
-def stand_at(arrival: Arrival, way: Course, north: float) -> bool:
+def stand_at(arrival: Arrival, way: PathFollower, north: float) -> bool:
     """Ask for zero at the end, and stand at a place; whether that is the end of it."""
     seen = Motion(Pose(10.0, 0.0, 0.0), 0.5, 0.0, 0.0, 100.0)
     way.look(seen, elapsed=TICK)
@@ -94,5 +94,5 @@ def test_is_not_stuck_while_its_estimate_goes_anywhere(one_try: bool) -> None:
 def test_goes_on_beside_its_line_rather_than_drive_a_circle(beside: float, goes_on: bool) -> None:
     progress = Progress(anchor=ORIGIN, done=3.0)
     here = motion(Pose(3.0, beside, 0.05), at=100.0)
-    way = way_back(Move(10.0), progress, here, honours_yaw_rate=False, steering=CAR)
+    way = recovery_path(Move(10.0), progress, here, honours_yaw_rate=False, steering=CAR)
     assert (way is None) is goes_on

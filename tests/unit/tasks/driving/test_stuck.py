@@ -4,8 +4,8 @@ from math import pi
 
 import pytest
 
-from mav_tasks.tasks.driving.course import Course
 from mav_tasks.tasks.driving.guidance import Velocity
+from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.stuck import BLIND, StuckWatch
 from mav_tasks.tasks.goal import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.task import Pose, Progress
@@ -20,7 +20,7 @@ class Rig:
 
     def __init__(self, goal: SingleGoal, progress: Progress | None = None) -> None:
         self.now = 100.0
-        self.course = Course(goal, progress or Progress(anchor=ORIGIN))
+        self.course = PathFollower(goal, progress or Progress(anchor=ORIGIN))
         self.watch = StuckWatch()
         self.watch.begin(now=self.now)
 

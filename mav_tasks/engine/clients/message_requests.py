@@ -1,0 +1,247 @@
+"""What a client is shown because it asks: messages on request, and the rates of streams."""
+
+from math import isfinite
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.rights import SUBMITTER
+from mav_tasks.engine.commands import translate
+from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address, address_of
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import Command
+from mav_tasks.tasks.forecast import Forecast
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+
+R = TaskReason
+
+PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
+EVERYBODY = Address(0, 0)
+NO_INTERVAL = -1  # of MESSAGE_INTERVAL: it is not sent
+PAGE = 16  # waiting, or finished, tasks that one request shows
+MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
+
+
+class MessageRequests:
+    """Answers to REQUEST_MESSAGE and to the commands about intervals."""
+
+    def __init__(self, gcs: GcsSide, vehicles: VehicleSide, registry: TaskRegistry) -> None:
+        self._gcs = gcs
+        self._vehicles = vehicles
+        self._registry = registry
+
+    def set_interval(self, asked: CommandRequest, *, now: float) -> None:
+        """SET_MESSAGE_INTERVAL: thin for this client; see ``TelemetryRates`` for what comes."""
+        client, vehicle, command = asked.client, asked.vehicle, asked.command
+        message_id, interval_us = translate.message_id_of(command), command.params[1]
+        if message_id < 0:
+            raise Rejection(R.BAD_PARAMETER, f"param1 message id {command.params[0]:g} is none")
+        if not isfinite(interval_us):
+            raise Rejection(R.BAD_PARAMETER, f"param2 interval {interval_us:g} is not a number")
+        if message_id == m.TaskStatus.id:
+            client.uses_dialect = True
+            interval = interval_us / 1e6 if interval_us > 0 else None
+            client.statuses.set_interval(vehicle.system_id, interval, now=now)
+            return
+        commands = asked.rights.reach(SUBMITTER)
+        client.thinner.set_interval(vehicle.system_id, message_id, interval_us, commands=commands)
+
+    def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
+        """REQUEST_DATA_STREAM: as SET_MESSAGE_INTERVAL for each message of the group."""
+        rate = message.req_message_rate if message.start_stop else 0
+        commands = client.rights.reach(SUBMITTER)
+        for vehicle in self._vehicles.addressed_by(message.target_system):
+            client.thinner.set_group(
+                vehicle.system_id, message.req_stream_id, rate, commands=commands
+            )
+
+    def show_interval(self, asked: CommandRequest) -> None:
+        """GET_MESSAGE_INTERVAL: what this client gets."""
+        message_id = translate.message_id_of(asked.command)
+        if not 0 <= message_id <= MAX_INTERVAL_ID:
+            words = f"param1 message id {asked.command.params[0]:g} not in 0..{MAX_INTERVAL_ID}"
+            raise Rejection(R.BAD_PARAMETER, words)
+        system_id = asked.vehicle.system_id
+        if message_id == m.TaskStatus.id:
+            seconds = asked.client.statuses.interval(system_id)
+            interval = NO_INTERVAL if seconds is None else round(seconds * 1e6)
+        else:
+            interval = asked.client.thinner.interval_us(system_id, message_id)
+        asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
+
+    def show(self, asked: CommandRequest, *, now: float) -> bool:
+        """REQUEST_MESSAGE for what the server itself can show; whether it can."""
+        client, vehicle = asked.client, asked.vehicle
+        match translate.message_id_of(asked.command):
+            case m.TaskStatus.id:
+                client.uses_dialect = True
+                self._show_tasks(asked, now=now)
+            case m.TaskTiming.id:
+                client.uses_dialect = True
+                self._show_timing(asked, now=now)
+            case m.TaskQueueStatus.id:
+                heard_at = vehicle.heard_at
+                self._show_queue(
+                    client, vehicle.tasks, vehicle.server_address, heard_at=heard_at, now=now
+                )
+            case m.ProtocolVersion.id:
+                client.outlet.send(PROTOCOL_VERSION, asked.answering)
+            case _:
+                return False
+        return True
+
+    def show_unheard(
+        self,
+        client: GcsClient,
+        packet: Packet,
+        command: Command,
+        tasks: VehicleTasks,
+        address: Address,
+        *,
+        now: float,
+    ) -> bool:
+        """REQUEST_MESSAGE about a rover that was not heard in this run; whether it is shown."""
+        client.uses_dialect = True
+        match translate.message_id_of(command):
+            case m.TaskQueueStatus.id:
+                self._show_queue(client, tasks, address, heard_at=None, now=now)
+            case m.TaskStatus.id:
+                task_id = translate.task_id_of(command)
+                forecast = Forecast(tasks, self._registry, now=now)
+                for each in (task_id,) if task_id else self._page(tasks, command):
+                    task = self._registry.get(each)
+                    if task is None:
+                        raise Rejection(R.NOT_FOUND, f"no task {each}")
+                    self._send(
+                        client,
+                        task,
+                        tasks,
+                        address,
+                        reader=packet.source,
+                        forecast=forecast,
+                        now=now,
+                    )
+            case m.TaskTiming.id:  # it needs the rate of the rover's setpoints
+                raise Rejection(R.VEHICLE_SILENT, f"rover {tasks.vehicle} was not heard yet")
+            case _:
+                return False
+        return True
+
+    def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
+        """Send a task's TASK_STATUS to a client that listens, without the cost of its position."""
+        task = self._registry.get(task_id)
+        if task is not None:
+            to = task.submitter.system_id, task.submitter.component_id
+            reader = address_of(*to) if client.submitted(task) else EVERYBODY
+            self._send_status(client, task, reader=reader, is_full=False, now=now)
+
+    def _send_status(
+        self,
+        client: GcsClient,
+        task: Task,
+        *,
+        reader: Address,
+        is_full: bool = True,
+        now: float,
+    ) -> None:
+        """Send a task's TASK_STATUS, from the task server of its vehicle.
+
+        ``is_full``: with what is known of its place in the queue, and of its times.
+        """
+        vehicle = self._vehicles.look_at(task.vehicle)
+        if vehicle is not None:
+            forecast = Forecast(vehicle.tasks, self._registry, now=now) if is_full else None
+            address = vehicle.server_address
+            self._send(
+                client, task, vehicle.tasks, address, reader=reader, forecast=forecast, now=now
+            )
+
+    def _send(
+        self,
+        client: GcsClient,
+        task: Task,
+        tasks: VehicleTasks,
+        address: Address,
+        *,
+        reader: Address,
+        forecast: Forecast | None,
+        now: float,
+    ) -> None:
+        status = translate.task_status(
+            task,
+            tasks,
+            reader=reader,
+            link_number=self._gcs.link_numbers.get(task.submitter.link, 0),
+            forecast=forecast,
+            now=now,
+        )
+        client.outlet.send(status, address)
+
+    def _show_queue(
+        self,
+        client: GcsClient,
+        tasks: VehicleTasks,
+        address: Address,
+        *,
+        heard_at: float | None,
+        now: float,
+    ) -> None:
+        client.uses_dialect = True
+        counts = self._registry.counts(tasks.vehicle)
+        version = self._registry.recorded
+        status = translate.queue_status(tasks, counts, heard_at=heard_at, version=version, now=now)
+        client.outlet.send(status, address)
+
+    def _show_tasks(self, asked: CommandRequest, *, now: float) -> None:
+        client, vehicle, reader = asked.client, asked.vehicle, asked.packet.source
+        task_id = translate.task_id_of(asked.command)
+        if task_id == 0:
+            forecast = Forecast(vehicle.tasks, self._registry, now=now)
+            address = vehicle.server_address
+            for each in self._page(vehicle.tasks, asked.command):
+                self._send(
+                    client,
+                    self._registry[each],
+                    vehicle.tasks,
+                    address,
+                    reader=reader,
+                    forecast=forecast,
+                    now=now,
+                )
+            return
+        task = self._registry.get(task_id)
+        if task is None:
+            raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
+        client.follow(task_id)
+        self._send_status(client, task, reader=reader, now=now)
+
+    def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
+        """Return the tasks that a request without a task id is about: what waits, or is over."""
+        first = max(0, translate.first_index_of(command))
+        if translate.is_of_finished(command):
+            return self._registry.finished(tasks.vehicle, first, PAGE)
+        return tasks.page(first, PAGE)
+
+    def _show_timing(self, asked: CommandRequest, *, now: float) -> None:
+        task_id = translate.task_id_of(asked.command)
+        task = self._registry.get(task_id) if task_id else asked.vehicle.tasks.active
+        if task is None:
+            words = f"no task {asked.command.params[1]:g}" if task_id else "no task runs"
+            raise Rejection(R.NOT_FOUND, words)
+        vehicle = self._vehicles.look_at(task.vehicle)
+        if vehicle is None:  # of an earlier run, not heard yet: as for TASK_STATUS
+            return
+        message = translate.task_timing(
+            task,
+            vehicle.tasks.timing_of(task),
+            period=vehicle.setpoint_period,
+            reader=asked.packet.source,
+            now=now,
+        )
+        asked.client.outlet.send(message, vehicle.server_address)

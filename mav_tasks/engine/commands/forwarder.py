@@ -1,0 +1,122 @@
+"""What clients send past the server to vehicles, and what of it ends here.
+
+What the server does not claim goes to the link on which the target was seen, if it may.
+"""
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.refusals import Refusals
+from mav_tasks.engine.clients.rights import SAFETY, SUBMITTER
+from mav_tasks.engine.commands.motion_gate import may_pass, passed, why_not_sent, withheld
+from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.policy import Kind, Row, row_of
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import target_of
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services import file_transfer
+from mav_tasks.tasks.lifecycle import TaskReason
+
+R = TaskReason
+
+EVERYBODY = Address(0, 0)
+
+
+class Forwarder:
+    """Passes clients' packets on."""
+
+    def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
+        self._refusals = refusals
+        self._vehicles = vehicles
+        self._writers = file_transfer.Writers()
+
+    def forward(
+        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
+    ) -> None:
+        """Pass a packet to the vehicles that it is for; what is for us ends here.
+
+        Without a ``message`` its id is unknown and its bytes are unverified: noise may look like
+        it, and is no refusal worth a line.
+        """
+        row = row_of(packet.message_id, message).passed_on
+        target = EVERYBODY if message is None else _target(message)
+        why_not = self._why_not(client, row, message, now=now)
+        if why_not is not None:
+            if message is not None and row.kind is not Kind.TELL:
+                self._refusals.stream(client, target.system_id, packet, why_not, now=now)
+            return
+        is_observers = not client.rights.reach(SUBMITTER)
+        behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
+        for vehicle in self._vehicles.addressed_by(target.system_id):
+            if target != vehicle.server_address:
+                behind.setdefault(vehicle.requests.place, []).append(vehicle)
+            elif isinstance(message, m.FileTransferProtocol):
+                refusal = file_transfer.refusal(message, to=packet.source)
+                if refusal is not None:
+                    client.outlet.send(refusal, vehicle.server_address)
+        for vehicles in behind.values():
+            refusing = [v for v in vehicles if not may_pass(v, client, row, message)]
+            too_much = (
+                self._vehicles.links.why_not_asked(
+                    vehicles[0], client.key, packet, message, now=now
+                )
+                if is_observers and message is not None
+                else None
+            )
+            if too_much is not None:
+                self._refuse_question(client, vehicles[0], packet, too_much, now=now)
+                continue
+            if not refusing:
+                for vehicle in vehicles:
+                    passed(vehicle, client.key, row, message, now=now)
+                vehicles[0].requests.forward(packet)
+                continue
+            for vehicle in vehicles:
+                withheld(vehicle, client.key, row, now=now)
+            if message is None:
+                continue
+            for vehicle in refusing:
+                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client, row))
+                self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
+
+    def _refuse_question(
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, why: str, *, now: float
+    ) -> None:
+        """Refuse an observer's question, in a text as well: MAVLink has no answer for that."""
+        refusal = client.rights.refusal(why, R.RATE_LIMITED)
+        client.tell_refusal(refusal.text, vehicle.server_address, now=now)
+        self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
+
+    def _why_not(
+        self, client: GcsClient, row: Row, message: m.Message | None, *, now: float
+    ) -> Rejection | None:
+        """Return why a packet may go to no rover at all, None if it may."""
+        if not client.rights.reach(row.role):
+            return client.rights.refusal(f"may not send that to a rover, {row.role} may")
+        if isinstance(message, m.FileTransferProtocol):
+            is_safety = client.rights.reach(SAFETY)
+            if not is_safety and self._writers.ends_anothers(message, client.key, now=now):
+                return client.rights.refusal("may not end that: somebody writes a file")
+            self._writers.note(message, client.key, now=now)
+        return None
+
+    def end(self, link: str, peer: Peer, *, now: float) -> None:
+        """A client is gone: whatever it was driving is driven by nobody."""
+        for vehicle in self._vehicles.all:
+            if vehicle.motion_rights.has_granted((link, peer)):
+                self._vehicles.mark_dirty(vehicle)
+                vehicle.joint.client_is_gone((link, peer), now=now)
+
+
+def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
+    """Return in words why a packet that a client may send does not go to a rover now."""
+    return why_not_sent(row, vehicle, client.key) or "not finite, or older than the server's pause"
+
+
+def _target(message: m.Message) -> Address:
+    """Return whom a message is for, 0 for all."""
+    if isinstance(message, m.ManualControl):  # its field has a name of its own
+        return Address(message.target, 0)
+    return target_of(message)

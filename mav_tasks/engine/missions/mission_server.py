@@ -1,0 +1,254 @@
+"""The mission protocol towards clients: which message is for which end, and downloads.
+
+What becomes of uploads is in ``mission_uploads``, clearing in ``mission_clearing``.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from math import inf
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.missions.go_to_items import GoToItems
+from mav_tasks.engine.missions.item_check import ItemCheck
+from mav_tasks.engine.missions.mission_answers import MissionAnswers
+from mav_tasks.engine.missions.mission_clearing import MissionClearing
+from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadSession
+from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored
+from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.policy import GO_TO, row_of
+from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.mission_item import unpacked
+from mav_tasks.services.mission_receiver import RequestForm, Sender
+from mav_tasks.services.mission_sender import MissionSender
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
+
+#: what clients speak the mission protocol with
+MESSAGES = (
+    m.MissionCount,
+    m.MissionItem,
+    m.MissionItemInt,
+    m.MissionRequestList,
+    m.MissionRequest,
+    m.MissionRequestInt,
+    m.MissionAck,
+    m.MissionClearAll,
+    m.MissionSetCurrent,
+    m.MissionRequestPartialList,
+    m.MissionWritePartialList,
+)
+MissionMessage = (
+    m.MissionCount
+    | m.MissionItem
+    | m.MissionItemInt
+    | m.MissionRequestList
+    | m.MissionRequest
+    | m.MissionRequestInt
+    | m.MissionAck
+    | m.MissionClearAll
+    | m.MissionSetCurrent
+    | m.MissionRequestPartialList
+    | m.MissionWritePartialList
+)
+
+
+class _Desk:
+    """Uploads to, and downloads from, one address, of plans of one type."""
+
+    def __init__(
+        self, check: ItemCheck, form: RequestForm, timers: Timers, ask_again: Callable[..., None]
+    ) -> None:
+        """``ask_again`` is called with the desk when an item is to be asked for again."""
+        self.uploads = UploadSession(check, form)
+        self.sender = MissionSender()
+        self._timer = timers.timer(Turn.UPLOADS, partial(ask_again, self))
+
+    def plan(self) -> None:
+        """Have the next item asked for again, or the upload given up, when that is due."""
+        due = self.uploads.receiver.next_deadline()
+        self._timer.set(inf if due is None else due)
+
+
+class MissionServers:
+    """The ends of uploads and downloads at all addresses."""
+
+    def __init__(
+        self,
+        gcs: GcsSide,
+        vehicles: VehicleSide,
+        registry: TaskRegistry,
+        submissions: Submissions,
+        plans: Plans,
+        timers: Timers,
+        settings: Settings,
+    ) -> None:
+        self._vehicles = vehicles
+        self._plans = plans
+        self._timers = timers
+        self._settings = settings
+        self._answers = MissionAnswers(gcs, registry)
+        write_through = WriteThrough(vehicles)
+        self._uploads = MissionUploads(
+            gcs, vehicles, registry, submissions, plans, self._answers, write_through
+        )
+        self._clearing = MissionClearing(
+            vehicles, registry, submissions, plans, self._answers, write_through
+        )
+        self._go_to = GoToItems(submissions, registry)
+        self._desks: dict[tuple[int, int, int], _Desk] = {}
+
+    def apply(self, settings: Settings) -> None:
+        """Take new settings."""
+        self._settings = settings
+        for desk in self._desks.values():
+            desk.uploads.check.apply(settings)
+
+    def receive(
+        self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
+    ) -> bool:
+        """See to a client's message; False: it is not for us."""
+        # an item more does nothing to the vehicle: what does touches it
+        vehicle = self._vehicles.look_at(message.target_system)
+        if vehicle is None:
+            return False
+        component = message.target_component or AUTOPILOT
+        at_server = component == vehicle.server_component
+        if not at_server and (component != AUTOPILOT or not self._settings.claim):
+            return False
+        desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
+        who = (client.key, client.signed_by.name)  # one endpoint may have several keys
+        sender = Sender(who, packet.source, Address(vehicle.system_id, component))
+        if self._is_refused(client, vehicle, sender, packet, message, now=now):
+            return True
+        match message:
+            case m.MissionCount() if message.mission_type not in STORED:
+                self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+                words = f"upload: plans of kind {message.mission_type} are not supported"
+                unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
+                self._uploads.refused(sender, vehicle, unknown, now=now)
+            case m.MissionCount():
+                rank = client.rights.rank
+                desk.uploads.receiver.count(message, sender, rank=rank, now=now)
+            case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
+                self._vehicles.mark_dirty(vehicle)  # never an item of a plan, whatever is under way
+                self._go_to.receive(client, vehicle, packet, message, now=now)
+            case m.MissionItem() | m.MissionItemInt():
+                desk.uploads.receiver.item(message, sender, now=now)
+            case m.MissionAck():
+                desk.uploads.receiver.cancelled(message, sender, now=now)
+                desk.sender.end(sender, message.mission_type)
+            case m.MissionRequestList():
+                self._list(desk, vehicle, sender, message.mission_type, now=now)
+            case m.MissionRequest() | m.MissionRequestInt():
+                kind, seq = message.mission_type, message.seq
+                self._answers.send(
+                    desk.sender.request(
+                        sender,
+                        kind,
+                        seq,
+                        lambda: self._downloadable(vehicle, component, kind).items,
+                        form=type(message),
+                        now=now,
+                    )
+                )
+            case m.MissionClearAll():
+                self._vehicles.mark_dirty(vehicle)
+                is_late = client.is_late
+                kind = message.mission_type
+                self._clearing.clear(vehicle, sender, kind, is_late=is_late, now=now)
+            case m.MissionSetCurrent():
+                self._vehicles.mark_dirty(vehicle)
+                self._set_current(vehicle, client, sender, message.seq, now=now)
+            case m.MissionRequestPartialList() | m.MissionWritePartialList():
+                self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
+        self._uploads.flush(desk.uploads, vehicle, now=now)
+        desk.plan()
+        return True
+
+    def _is_refused(
+        self,
+        client: GcsClient,
+        vehicle: Vehicle,
+        sender: Sender,
+        packet: Packet,
+        message: MissionMessage,
+        *,
+        now: float,
+    ) -> bool:
+        """Whether a client may not write what it writes; it has been told so then."""
+        if isinstance(message, m.MissionSetCurrent) or getattr(message, "current", 0) in GO_TO:
+            return False  # these are answered, and refused, in their own ways
+        kind = getattr(message, "mission_type", MISSION)
+        row = row_of(packet.message_id, message)
+        try:
+            client.rights.require(row.role, f"change {row.about}")
+        except Rejection as refusal:
+            if isinstance(message, m.MissionCount | m.MissionClearAll):
+                self._answers.ack(sender, kind, MavMissionResult.DENIED)
+                is_upload = isinstance(message, m.MissionCount)
+                message_id = 0 if is_upload else type(message).id
+                self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+            return True
+        return False
+
+    def _ask_again(self, vehicle: Vehicle, desk: _Desk, *, now: float) -> None:
+        """Ask again, and give up in the end."""
+        self._vehicles.mark_dirty(vehicle)
+        desk.uploads.receiver.handle_deadline(now=now)
+        self._uploads.flush(desk.uploads, vehicle, now=now)
+        desk.plan()
+
+    def _desk(self, vehicle: Vehicle, component: int, kind: int) -> _Desk:
+        key = vehicle.system_id, component, kind if kind in STORED else MISSION
+        desk = self._desks.get(key)
+        if desk is None:
+            is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
+            form = m.MissionRequest if is_plain else m.MissionRequestInt
+            check = ItemCheck(vehicle, component, self._settings)
+            ask_again = partial(self._ask_again, vehicle)
+            desk = self._desks[key] = _Desk(check, form, self._timers, ask_again)
+        return desk
+
+    def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
+        """What an address has to show: the task server, of missions, the one that is driven."""
+        active = vehicle.tasks.active
+        if kind == MISSION and component != AUTOPILOT and active and isinstance(active.goal, Plan):
+            return Stored(active.id, unpacked(active.goal.source))
+        return self._plans.stored(vehicle.system_id, kind)
+
+    def _list(
+        self, desk: _Desk, vehicle: Vehicle, sender: Sender, kind: int, *, now: float
+    ) -> None:
+        if kind not in STORED:
+            self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
+            return
+        stored = self._downloadable(vehicle, sender.addressed.component_id, kind)
+        count = desk.sender.begin(sender, kind, stored.items, opaque_id=stored.plan_id, now=now)
+        self._answers.send(count)
+
+    def _set_current(
+        self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float
+    ) -> None:
+        """The message MISSION_SET_CURRENT; MAVSDK waits for this very number, for ever."""
+        try:
+            self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
+            if self._plans.go_on_with(vehicle, seq, now=now) is None:
+                words = self._plans.begins_with(vehicle, seq)
+                client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
+        except Rejection as refusal:
+            message_id = m.MissionSetCurrent.id
+            self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+        client.outlet.send(
+            self._plans.current(vehicle, seq=seq), Address(vehicle.system_id, AUTOPILOT)
+        )

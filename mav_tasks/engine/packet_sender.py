@@ -1,0 +1,67 @@
+"""The way out to one endpoint: numbering per source, packing, and the shared queue of packets."""
+
+from math import inf
+
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.inputs import Outgoing, Peer
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Packer
+from mav_tasks.mavlink.messages import Message
+from mav_tasks.mavlink.packet import Packet, with_seq
+from mav_tasks.mavlink.sequence import SequenceKeeper
+
+
+class PacketSender:
+    """Sends to one endpoint of one link, signed where that is due."""
+
+    def __init__(
+        self,
+        link: str,
+        peer: Peer,
+        queue: list[Outgoing],
+        packer: Packer,
+        signatures: Signatures | None = None,
+    ) -> None:
+        self.link = link
+        self.peer = peer
+        self._queue = queue
+        self._packer = packer
+        self._signatures = signatures
+        self._sequence = SequenceKeeper()
+
+    def __repr__(self) -> str:
+        return f"PacketSender({self.link}, {self.peer})"
+
+    def sibling(self, queue: list[Outgoing]) -> "PacketSender":
+        """Return an outlet to the same endpoint that fills another queue, and signs nothing."""
+        return PacketSender(self.link, self.peer, queue, self._packer)
+
+    def send(
+        self, message: Message, source: Address, *, first: bool = False, until: float = inf
+    ) -> None:
+        """Send a message of our own in the name of ``source``; as ``Outgoing`` has it."""
+        raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
+        self._put(raw, first=first, until=until)
+
+    def forward(self, packet: Packet) -> None:
+        """Pass a packet on; a gap in its source's numbers stays one."""
+        seq = self._sequence.forwarded(packet.source, packet.seq)
+        self._put(with_seq(packet, seq))
+
+    def inject(self, packet: Packet) -> None:
+        """Pass a packet on under the next number: where sources from several places meet."""
+        seq = self._sequence.injected(packet.source)
+        self._put(with_seq(packet, seq))
+
+    def withhold(self, source: Address) -> None:
+        """Note that a packet of the source is not passed on, so that no gap shows."""
+        self._sequence.withheld(source)
+
+    def continue_numbers(self, packet: Packet) -> None:
+        """Note that a packet's source counts from 0 again: what was sent goes on with it."""
+        self._sequence.continued(packet.source, packet.seq)
+
+    def _put(self, raw: bytes, *, first: bool = False, until: float = inf) -> None:
+        if self._signatures is not None and self._signatures.may_sign:
+            raw = self._signatures.sealed(self.link, self.peer, raw)
+        self._queue.append(Outgoing(self.link, self.peer, raw, first, until))

@@ -1,0 +1,79 @@
+"""Which vehicles have something to do, and when, without asking every one of them each time.
+
+A vehicle that nothing has touched has nothing new to say: what comes in costs the same whether
+there are two rovers or two hundred.
+"""
+
+from functools import partial
+from math import inf
+
+from mav_tasks.engine.inputs import Outgoing
+from mav_tasks.engine.timers import Timer, Timers, Turn
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+
+
+class DeadlineHeap:
+    """The timers of all vehicles, and which of them have been touched since the last look."""
+
+    def __init__(self, timers: Timers) -> None:
+        self._timers = timers
+        #: those to which something was done since they were settled
+        self.touched: dict[int, Vehicle] = {}
+        self._due: dict[int, Timer] = {}
+        self._awaiting: dict[int, Vehicle] = {}
+        self._words: dict[int, tuple[Outgoing, ...]] = {}
+        #: zero and HOLD for every vehicle that is being driven
+        self.emergency_stop_packets: tuple[Outgoing, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"DeadlineHeap({len(self._due)} vehicles, next at {self.next_deadline()})"
+
+    def mark_dirty(self, vehicle: Vehicle) -> None:
+        """Note that something is being done to a vehicle."""
+        self.touched[vehicle.system_id] = vehicle
+
+    def plan(self) -> None:
+        """Have those that were touched come when they have something to do."""
+        for system_id, vehicle in self.touched.items():
+            timer = self._due.get(system_id)
+            if timer is None:
+                timer = self._due[system_id] = self._timer_of(vehicle)
+            timer.set(vehicle.next_deadline())
+
+    def settle(self) -> list[Vehicle]:
+        """Look at those that were touched; gives them."""
+        self.plan()
+        touched = list(self.touched.values())
+        self.touched.clear()
+        for vehicle in touched:
+            system_id = vehicle.system_id
+            if vehicle.tasks.turns.awaits_commit:
+                self._awaiting[system_id] = vehicle
+            else:
+                self._awaiting.pop(system_id, None)
+            self._note_words(vehicle)
+        return touched
+
+    def awaiting_commit(self) -> list[Vehicle]:
+        """Return the vehicles whose next task waits for nothing but being durable."""
+        return list(self._awaiting.values())
+
+    def next_deadline(self) -> float:
+        """Return when the first vehicle has something to do; inf: none has."""
+        return min((timer.at for timer in self._due.values()), default=inf)
+
+    def _timer_of(self, vehicle: Vehicle) -> Timer:
+        do = partial(self._handle_deadline, vehicle)
+        return self._timers.timer(Turn.VEHICLES, do, number=vehicle.system_id)
+
+    def _handle_deadline(self, vehicle: Vehicle, *, now: float) -> None:
+        self.touched[vehicle.system_id] = vehicle
+        vehicle.handle_deadline(now=now)
+
+    def _note_words(self, vehicle: Vehicle) -> None:
+        words = vehicle.requests.emergency_stop_packets if vehicle.control.is_engaged else ()
+        if words != self._words.get(vehicle.system_id, ()):
+            self._words[vehicle.system_id] = words
+            self.emergency_stop_packets = tuple(
+                word for words in self._words.values() for word in words
+            )

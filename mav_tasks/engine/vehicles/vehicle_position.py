@@ -1,0 +1,98 @@
+"""Where a vehicle is, how it moves, where its frame begins; and what lies about: home, fence."""
+
+from collections.abc import Sequence
+
+from mav_tasks.engine.vehicles.frame_monitor import FrameMonitor
+from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
+from mav_tasks.engine.vehicles.sender_clock import Heard, SenderClock, Stamped
+from mav_tasks.mavlink.messages import GlobalPositionInt
+from mav_tasks.settings import Watch
+from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.frames import local_place, to_global
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
+
+
+class VehiclePosition:
+    """What one vehicle measures of itself, and what follows from it."""
+
+    def __init__(self, watch: Watch, bounds: Bounds) -> None:
+        self.motion = MotionMonitor(watch)
+        self.frame = FrameMonitor()
+        self._bounds = bounds
+
+    def __repr__(self) -> str:
+        return f"VehiclePosition({self.motion.latest()}, origin={self.origin})"
+
+    @property
+    def clock(self) -> SenderClock:
+        """Return the vehicle's own clock."""
+        return self.motion.clock
+
+    def receive(self, message: Stamped, *, now: float, not_after: float) -> Heard:
+        """Take a message in, and return what it is; what is old is dropped.
+
+        What is read late counts as if it had been made at ``not_after`` at the latest.
+        """
+        if isinstance(message, GlobalPositionInt):
+            heard = self.clock.hear(message, now=now)
+        else:
+            heard = self.motion.receive(message, now=now, not_after=not_after)
+        if heard is Heard.NEWS:
+            self.frame.boot(self.clock.booted_at(now=now), now=now)
+            self.frame.receive(message)
+        return heard
+
+    def forget(self) -> None:
+        """It has restarted: nothing of before is true any more."""
+        self.motion.forget()
+        self.frame.forget()
+
+    @property
+    def origin(self) -> GlobalPlace | None:
+        """Where the vehicle's local frame begins on earth, if that is known."""
+        return self.frame.origin
+
+    @property
+    def home(self) -> GlobalPlace | None:
+        """Where the vehicle returns to: the nearest rally point, else its home.
+
+        That is where it was first armed, or what somebody set; the home that it says itself moves
+        with it while it is disarmed (ArduPilot), or at each arming (PX4).
+        """
+        motion = self.motion.latest() if self._bounds.rally else None
+        rally = None if motion is None else self._bounds.refuge(motion.pose, self.frame.origin)
+        return rally or self._bounds.home_in(self.frame.frame()) or self.frame.home
+
+    @property
+    def here(self) -> GlobalPlace | None:
+        """Where the vehicle is on earth, as far as that is known."""
+        motion, origin = self.motion.latest(), self.frame.origin
+        if motion is None or origin is None:
+            return None
+        return to_global(LocalPlace(motion.pose.north, motion.pose.east), origin)
+
+    @property
+    def is_fence_unknown(self) -> bool:
+        """Whether there is a fence, and it cannot be said where it is in the vehicle's frame."""
+        return self._bounds.is_unknown(self.frame.origin)
+
+    def distance_to(self, goal: GoTo) -> float | None:
+        """Return the metres to the place that a goal means, or None while that is not known."""
+        motion, place = self.motion.latest(), self._place_of(goal)
+        return None if motion is None or place is None else distance(motion.pose, place)
+
+    def is_within_fence(self, goal: GoTo) -> bool:
+        """Whether the place that a goal means is one where it may be, as far as that is known."""
+        fence = self._bounds.local(self.frame.origin)
+        if fence is None:
+            return True
+        place = self._place_of(goal)
+        return place is None or fence.allows(place)
+
+    def leg_over_fence(self, steps: Sequence[Step]) -> int | None:
+        """Return a step of a plan whose straight way crosses the fence, or None."""
+        return self._bounds.forbidden_leg(steps, self.frame.origin)
+
+    def _place_of(self, goal: GoTo) -> LocalPlace | None:
+        return local_place(self.home if goal.place is None else goal.place, self.frame.origin)

@@ -1,0 +1,111 @@
+"""Whether the links that are asked for can be opened as far as their words say: all faults.
+
+Whether there are keys is another matter: that is not said here.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
+
+from mav_tasks.errors import UsageError
+from mav_tasks.links.policy import LinkPolicy, Side, check, policy_of, unsigned_beyond
+from mav_tasks.links.url import LinkUrl, SerialUrl, is_loopback, parse_endpoint, parse_url
+
+SIDES: tuple[Side, ...] = ("clients", "vehicles")
+
+
+class LinkSettings(Protocol):
+    """The links of a server in words, as its settings have them."""
+
+    @property
+    def clients(self) -> tuple[str, ...]:
+        """URLs."""
+
+    @property
+    def push(self) -> tuple[str, ...]:
+        """``host:port`` of UDP."""
+
+    @property
+    def vehicles(self) -> tuple[str, ...]:
+        """URLs."""
+
+    @property
+    def insecure(self) -> bool:
+        """Whether other machines may reach a link unsigned."""
+
+    @property
+    def unsigned(self) -> str:
+        """Where unsigned packets are taken: "loopback" or "nowhere"."""
+
+
+class ConfiguredLink(NamedTuple):
+    """One link that is asked for."""
+
+    side: Side
+    url: LinkUrl | SerialUrl
+    policy: LinkPolicy
+    pushes_far: bool = False  # speaks to other machines unasked
+
+
+def links_of(asked: LinkSettings) -> list[ConfiguredLink]:
+    """Return the links that words without faults ask for, clients' first."""
+    pushing = pushing_url(asked)
+    links: list[ConfiguredLink] = []
+    for side in SIDES:
+        for text in getattr(asked, side):
+            url = parse_url(text)
+            is_far = side == "clients" and url == pushing and _pushes_far(asked)
+            links.append(
+                ConfiguredLink(side, url, policy_of(url, side, asked, pushes_far=is_far), is_far)
+            )
+    return links
+
+
+def pushing_url(asked: LinkSettings) -> LinkUrl | SerialUrl | None:
+    """Return the link that speaks to clients unasked: the first of UDP, as its socket is called."""
+    urls = map(parse_url, asked.clients)
+    return next((url for url in urls if isinstance(url, LinkUrl) and url.is_udp), None)
+
+
+def faults_of(asked: LinkSettings) -> list[tuple[str, UsageError]]:
+    """Return what is wrong, each with the name of the field that says it."""
+    faults = list(_faults_of_words(asked))
+    return faults or list(_faults_of_signing(asked))
+
+
+def _faults_of_words(asked: LinkSettings) -> Iterator[tuple[str, UsageError]]:
+    seen: set[LinkUrl | SerialUrl] = set()
+    for side in SIDES:
+        for text in getattr(asked, side):
+            try:
+                url = parse_url(text)
+            except UsageError as error:
+                yield side, error
+                continue
+            if url in seen:
+                yield side, UsageError(f"link {url} is given twice")
+            seen.add(url)
+    for text in asked.push:
+        try:
+            parse_endpoint(text, what=f"push {text!r}")
+        except UsageError as error:
+            yield "push", error
+
+
+def _faults_of_signing(asked: LinkSettings) -> Iterator[tuple[str, UsageError]]:
+    for link in links_of(asked):
+        try:
+            check(link.url, link.side, link.policy, asked)
+        except UsageError as error:
+            yield link.side, error
+            continue
+        if link.pushes_far and link.policy.takes_unsigned and not asked.insecure:
+            far = next(text for text in asked.push if not _is_near(text))
+            yield "push", unsigned_beyond(f"push {far}")
+
+
+def _pushes_far(asked: LinkSettings) -> bool:
+    return not all(map(_is_near, asked.push))
+
+
+def _is_near(text: str) -> bool:
+    return is_loopback(parse_endpoint(text, what=f"push {text!r}")[0])

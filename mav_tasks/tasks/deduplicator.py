@@ -1,0 +1,232 @@
+"""Whether a submission is one that came before: driving twice is the worse mistake.
+
+The rules are those of ``dialects/README.md``, "The same task twice". All that they need is in the
+tasks themselves, so that a restart forgets nothing.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from math import hypot
+from typing import NamedTuple
+
+from mav_tasks.errors import Rejection
+from mav_tasks.tasks.frames import to_local
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
+
+SAME_PACKET = 5.0  # s, the very same packet again (rule 1)
+CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters (rule 3)
+SAME_GOAL = 5.0  # s, equal absolute goals (rule 4)
+NEAR = 1.0  # m between two places that mean the same (rule 4)
+SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
+#: s after the end of its task, in which a nonce means that task. Copies come within half a minute
+#: of the first (a client repeats for 10 s, a net is late by 20 s), and over a restart of the server
+#: within its time; who was not answered tries again by hand within minutes
+NONCE_KEPT = 600.0
+LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
+PACKETS = 1_000  # of each client, for rule 1; while the server runs its receiver has its own
+SPARE = 1_000  # nonces of tasks that are not kept any more
+MANY_CLIENTS = 256  # remembered; beyond, those whose last submission is old are forgotten
+
+
+class Rule(Enum):
+    """Which rule found that a submission came before."""
+
+    SAME_PACKET = auto()
+    NONCE = auto()
+    CONFIRMED = auto()
+    SAME_GOAL = auto()
+    SAME_PAYLOAD = auto()
+
+
+class Known(NamedTuple):
+    """The task that a submission is already, and by which rule."""
+
+    task_id: TaskId
+    rule: Rule
+
+
+@dataclass(slots=True)
+class _Last:
+    """A client's last submission of a kind."""
+
+    task_id: TaskId
+    draft: Draft
+    at: float  # of the last copy
+
+
+@dataclass(slots=True)
+class _Client:
+    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)  # vehicle, command
+    goals: dict[int, _Last] = field(default_factory=dict)  # by vehicle
+    packets: dict[str, _Last] = field(default_factory=dict)
+    at: float = 0.0
+
+
+class SubmissionDeduplicator:
+    """What each client submitted lately, and the nonces of tasks that are not long over."""
+
+    def __init__(self, registry: TaskRegistry) -> None:
+        self._registry = registry
+        self._clients: dict[Submitter, _Client] = {}
+        self._nonces: dict[tuple[str, int, int, int], TaskId] = {}
+
+    def restore(self, tasks: Iterable[Task], *, now: float) -> None:
+        """Remember the tasks of an earlier run, oldest first: all nonces, and what came lately."""
+        for task in tasks:
+            nonce = task.marks.nonce
+            if nonce:
+                self._nonces[_key(task.submitter, nonce)] = task.id
+            of_late = now - task.submitted_at <= LONGEST
+            if of_late and not (nonce and not isinstance(task.goal, GoTo)):
+                self.remember(task, at=task.submitted_at, now=now)
+
+    def known(
+        self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
+    ) -> Known | None:
+        """Return the task that a submission is already, or None if it is new.
+
+        ``origin`` is the vehicle's, to compare places in different frames. Rejection(NONCE_REUSED)
+        when the nonce was used for something else.
+        """
+        if draft.marks.nonce:
+            return self._by_nonce(draft, now=now)
+        client = self._clients.get(draft.submitter)
+        if client is None:
+            return None
+        same = client.packets.get(draft.marks.packet)
+        if same is not None and now - same.at <= SAME_PACKET:
+            return Known(same.task_id, Rule.SAME_PACKET)
+        last = client.of_command.get((draft.vehicle, draft.command))
+        if last is not None and last.draft.marks.payload == draft.marks.payload:
+            if confirmation > 0 and now - last.at <= CONFIRMED:
+                return Known(last.task_id, Rule.CONFIRMED)
+            if now - last.at <= SAME_PAYLOAD:
+                last.at = now
+                return Known(last.task_id, Rule.SAME_PAYLOAD)
+        goal = client.goals.get(draft.vehicle)
+        if (
+            goal is not None
+            and now - goal.at <= SAME_GOAL
+            and _same_place(goal.draft, draft, origin)
+        ):
+            copy = _Last(goal.task_id, draft, now)  # of which copies may follow
+            client.of_command[draft.vehicle, draft.command] = copy
+            return Known(goal.task_id, Rule.SAME_GOAL)
+        return None
+
+    def remember(self, task: Task, *, at: float, now: float) -> None:
+        """Keep a submission that became a task."""
+        submitter, marks = task.submitter, task.marks
+        if marks.nonce:
+            self._nonces[_key(submitter, marks.nonce)] = task.id
+            if len(self._nonces) > SPARE:
+                self._forget_nonces()
+        if now - at > LONGEST:
+            return
+        client = self._clients.get(submitter)
+        if client is None:
+            if len(self._clients) >= MANY_CLIENTS:
+                self._forget_old(now=now)
+            client = self._clients[submitter] = _Client()
+        client.at = at
+        if marks.nonce and not isinstance(task.goal, GoTo):
+            return  # known by its nonce alone
+        draft = Draft(task.vehicle, task.command, task.goal, submitter, task.terms, marks)
+        last = _Last(task.id, draft, at)
+        if isinstance(task.goal, GoTo):
+            client.goals[task.vehicle] = last
+        if marks.nonce:
+            return
+        client.of_command[task.vehicle, task.command] = last
+        if marks.packet:
+            client.packets[marks.packet] = last
+            if len(client.packets) > PACKETS:
+                del client.packets[next(iter(client.packets))]
+
+    def held(self, submitter: Submitter, vehicle: int) -> None:
+        """A client wanted its vehicle to stand: the next return is meant anew (rule 4).
+
+        A "go to" is not: further forms of the one before may still be on their way.
+        """
+        client = self._clients.get(submitter)
+        goal = None if client is None else client.goals.get(vehicle)
+        if client is not None and goal is not None and goal.draft.goal == GoTo(None):
+            del client.goals[vehicle]
+
+    def forget(self, task: Task) -> None:
+        """Forget a submission that was refused in the end: it may be tried again."""
+        if task.marks.nonce:
+            self._nonces.pop(_key(task.submitter, task.marks.nonce), None)
+        client = self._clients.get(task.submitter)
+        if client is None:
+            return
+        last = client.of_command.get((task.vehicle, task.command))
+        if last is not None and last.task_id == task.id:
+            del client.of_command[task.vehicle, task.command]
+        goal = client.goals.get(task.vehicle)
+        if goal is not None and goal.task_id == task.id:
+            del client.goals[task.vehicle]
+        client.packets.pop(task.marks.packet, None)
+
+    def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
+        key = _key(draft.submitter, draft.marks.nonce)
+        task_id = self._nonces.get(key)
+        task = None if task_id is None else self._registry.get(task_id)
+        if task_id is None or task is None or _is_long_over(task, now=now):
+            self._nonces.pop(key, None)
+            return None
+        if task.marks.payload != draft.marks.payload:
+            words = f"nonce {draft.marks.nonce} was used for something else"
+            raise Rejection(TaskReason.NONCE_REUSED, words)
+        return Known(task_id, Rule.NONCE)
+
+    def _forget_nonces(self) -> None:
+        if (
+            len(self._nonces) > 2 * len(self._registry) + SPARE
+        ):  # most are of tasks not kept any more
+            kept = {k: t for k, t in self._nonces.items() if self._registry.get(t) is not None}
+            self._nonces = kept
+
+    def _forget_old(self, *, now: float) -> None:
+        for submitter in [s for s, c in self._clients.items() if now - c.at > LONGEST]:
+            del self._clients[submitter]
+        while len(self._clients) >= MANY_CLIENTS:
+            del self._clients[next(iter(self._clients))]
+
+
+def _is_long_over(task: Task, *, now: float) -> bool:
+    """Whether a nonce of a task that is over may be another submission's by now."""
+    ended_at = task.submitted_at if task.changed_at is None else task.changed_at
+    return task.state in TERMINAL and now - ended_at > NONCE_KEPT
+
+
+def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
+    """A client that comes back from another endpoint is still the same."""
+    return submitter.key, submitter.system_id, submitter.component_id, nonce
+
+
+def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:
+    if not isinstance(one.goal, GoTo) or not isinstance(other.goal, GoTo):
+        return False
+    if (one.goal.yaw, one.goal.wait) != (other.goal.yaw, other.goal.wait):
+        return False  # it is to do something else there
+    places = one.goal.place, other.goal.place
+    if None in places:
+        return places == (None, None)
+    if origin is None and LocalPlace in map(type, places) and GlobalPlace in map(type, places):
+        return False
+    first = _local(places[0], origin or places[0])
+    second = _local(places[1], origin or places[0])
+    return hypot(first.north - second.north, first.east - second.east) <= NEAR
+
+
+def _local(place: Place | None, origin: Place | None) -> LocalPlace:
+    if isinstance(place, GlobalPlace):
+        assert isinstance(origin, GlobalPlace), "a global place is compared in a known frame"
+        return to_local(place, origin)
+    assert isinstance(place, LocalPlace)
+    return place

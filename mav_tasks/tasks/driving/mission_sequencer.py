@@ -1,0 +1,146 @@
+"""The order in which a plan's steps come: which is driven next, what is done on the way. Pure.
+
+Steps that drive come one after the other. Those between two of them (speeds, commands, conditions)
+belong to the way to the second one, as autopilots have it: they are ``pending`` when it begins, and
+done while it is being driven.
+"""
+
+from dataclasses import replace
+
+from mav_tasks.tasks.goal import (
+    Delay,
+    Goal,
+    GoTo,
+    Jump,
+    LocalPlace,
+    Near,
+    Nothing,
+    Perform,
+    Plan,
+    SetSpeed,
+    SingleGoal,
+    Wait,
+)
+from mav_tasks.tasks.task import Progress, Task
+
+ON_THE_WAY = (SetSpeed, Perform, Delay, Near)
+SHORT = 1.0  # s; a loop of shorter waits would only keep everybody busy
+END = Wait(0.0)  # past the last step: what is pending is still done
+
+
+def has_local_place(goal: Goal) -> bool:
+    """Whether a goal names a place in the vehicle's own frame, which means nothing in another."""
+    steps = goal.steps if isinstance(goal, Plan) else (goal,)
+    return any(isinstance(step, GoTo) and isinstance(step.place, LocalPlace) for step in steps)
+
+
+def present_goal(goal: Goal, progress: Progress) -> SingleGoal:
+    """Return what is being driven, or, before the beginning, what will be first."""
+    if not isinstance(goal, Plan):
+        return goal
+    step = progress.step if progress.step >= 0 else started(goal, progress).step
+    return _driven(goal, step) or END
+
+
+def goal_of(task: Task) -> SingleGoal:
+    """Return what a task is driving, or will be first."""
+    return present_goal(task.goal, task.progress)
+
+
+def started(plan: Plan, progress: Progress) -> Progress:
+    """Return the progress of a plan of which nothing has been driven."""
+    return _at(plan, replace(progress, jumps=(), speed=None), plan.first)
+
+
+def following(plan: Plan, progress: Progress) -> Progress | None:
+    """Return the progress with which the next step begins; None: the plan is over."""
+    return None if is_over(plan, progress) else _at(plan, progress, progress.step + 1)
+
+
+def skipped_to(plan: Plan, progress: Progress, step: int) -> Progress:
+    """Return the progress with which a plan goes on with another step."""
+    return _at(plan, progress, step)
+
+
+def is_over(plan: Plan, progress: Progress) -> bool:
+    """Whether nothing is left to be driven to."""
+    return progress.step >= len(plan.steps)
+
+
+def goes_on_to_a_place(plan: Plan, progress: Progress) -> GoTo | None:
+    """Return the place that is driven to after the present one, if that is what comes next."""
+    after = following(plan, progress)
+    goal = None if after is None else _driven(plan, after.step)
+    return goal if isinstance(goal, GoTo) else None
+
+
+def loops_in_vain(plan: Plan) -> int | None:
+    """Return the step of a jump that closes a loop in which nothing is driven; None: there is none.
+
+    As if every jump could be made, or not made, at any time.
+    """
+    done: set[int] = set()
+    for start in range(len(plan.steps)):
+        path: list[int] = []  # from ``start``, each step's way on not looked at in full yet
+        on_path: set[int] = set()
+        waiting = [start]
+        while waiting:
+            step = waiting.pop()
+            if step < 0:  # everything after this one has been looked at
+                on_path.discard(path.pop())
+                done.add(~step)
+            elif step in on_path:
+                return path[-1]
+            elif step not in done and step < len(plan.steps) and _takes_no_time(plan, step):
+                path.append(step)
+                on_path.add(step)
+                waiting += [~step, *_ways_on(plan, step)]
+    return None
+
+
+def _takes_no_time(plan: Plan, step: int) -> bool:
+    goal = _driven(plan, step)
+    return goal is None or (isinstance(goal, Wait) and goal.duration < SHORT)
+
+
+def _ways_on(plan: Plan, step: int) -> list[int]:
+    present = plan.steps[step]
+    return [step + 1, present.to] if isinstance(present, Jump) else [step + 1]
+
+
+def _driven(plan: Plan, step: int) -> SingleGoal | None:
+    goal = plan.steps[step] if 0 <= step < len(plan.steps) else None
+    if goal is None or isinstance(goal, Nothing | SetSpeed | Jump | Perform | Delay | Near):
+        return None
+    return goal
+
+
+def _at(plan: Plan, progress: Progress, step: int) -> Progress:
+    """Walk on to the next step that drives, or past the end."""
+    made = dict(zip(progress.jumps[::2], progress.jumps[1::2], strict=True))
+    pending = dict.fromkeys(progress.pending)  # each once, or a loop would carry ever more of them
+    while 0 <= step < len(plan.steps):  # it ends: a plan that loops in vain is none
+        present = plan.steps[step]
+        if isinstance(present, Jump):
+            count = made.get(step, 0)
+            if present.times < 0 or count < present.times:
+                made[step] = count + 1
+                step = present.to
+                continue
+        elif isinstance(present, ON_THE_WAY):
+            pending[step] = None
+        elif not isinstance(present, Nothing):
+            break
+        step += 1
+    jumps = tuple(number for pair in made.items() for number in pair)
+    return replace(
+        progress,
+        step=step,
+        jumps=jumps,
+        pending=tuple(pending),
+        pending_for=progress.pending_for if progress.pending else 0.0,
+        leg=0,
+        anchor=None,
+        target=None,
+        done=0.0,
+    )

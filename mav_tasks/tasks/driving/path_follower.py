@@ -1,0 +1,221 @@
+"""Drives one goal, leg after leg: where the vehicle is → the velocity to ask for, or the end."""
+
+from dataclasses import replace
+from math import copysign
+
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.driving import guidance
+from mav_tasks.tasks.driving.follow import steer_along
+from mav_tasks.tasks.driving.guidance import USUAL, ZERO, Leg, Motion, Slowest, Velocity
+from mav_tasks.tasks.driving.legs import (
+    FACE,
+    WAY,
+    anchor_of,
+    distance,
+    leg_count,
+    leg_of,
+    length_of,
+)
+from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.planner import Steering, set_out_to
+from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
+from mav_tasks.tasks.task import Progress
+
+BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
+#: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
+BESIDE_OF_LOOP = 0.4
+TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: near enough
+ONE_TRY = 3.0  # times the settling distance, for a car that is steered by course
+MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
+
+
+class PathFollower:
+    """One goal on its way; ``progress`` is all that there is to resume it."""
+
+    def __init__(
+        self,
+        goal: SingleGoal,
+        progress: Progress,
+        *,
+        passing: float = 0.0,
+        within: float = 0.0,
+        by_course: bool = False,
+        steering: Steering | None = None,
+    ) -> None:
+        self.goal = goal
+        #: of a vehicle that steers as a car; None: it turns on the spot
+        self.steering = steering
+        self.progress = progress
+        #: whether the vehicle neither turns on the spot nor reverses
+        self.by_course = by_course
+        #: m/s, of a way that goes on at its end to another place
+        self.passing = passing
+        #: m from that end, where it does
+        self.within = within
+        #: how often a place was driven past beside it, and driven to again
+        self.misses = 0
+
+    def __repr__(self) -> str:
+        return f"PathFollower({self.goal}, {self.progress})"
+
+    @property
+    def leg(self) -> Leg:
+        """The present leg."""
+        return leg_of(self.goal, self.progress)
+
+    @property
+    def remaining(self) -> float:
+        """What is left of the present leg; negative beyond its end."""
+        return length_of(self.leg) - self.progress.done
+
+    @property
+    def has_one_try(self) -> bool:
+        """Whether what is short of the end, or past it, cannot be corrected: a car by course."""
+        return self.by_course and self.steering is not None
+
+    @property
+    def is_passing(self) -> bool:
+        """Whether the present leg ends without standing."""
+        return self.passing > 0.0 and self.progress.leg == WAY
+
+    @property
+    def _near_enough(self) -> float:
+        """Metres from a place, within which it is reached."""
+        radius = self.goal.radius if isinstance(self.goal, GoTo) else None
+        return max(radius or 0.0, BESIDE_OF_LOOP if self.has_one_try else BESIDE)
+
+    def has_passed(self, motion: Motion) -> bool:
+        """Whether the place is near enough to go on to the next."""
+        target = self.progress.target
+        return (
+            self.is_passing
+            and target is not None
+            and (distance(motion.pose, target) <= self.within)
+        )
+
+    def look(self, motion: Motion, *, elapsed: float) -> None:
+        """Take in where the vehicle is, ``elapsed`` seconds after the last look."""
+        anchor = self.progress.anchor
+        assert anchor is not None, "a course has an anchor"
+        before = self.progress.done
+        done = guidance.done_so_far(self.leg, anchor, motion.pose, before=before, elapsed=elapsed)
+        self.progress = replace(self.progress, done=done)
+        if self.is_passing and self.remaining <= 0.0 and not self.has_passed(motion):
+            self.passing = 0.0  # missed: it stops, and tries again from there
+
+    def has_arrived(self, *, stands: bool, driving: Driving, coast: float = 0.0) -> bool:
+        """Whether to stand here: near the end while moving; anywhere within tolerance at rest.
+
+        ``coast`` is how far it will roll on, m or rad.
+        """
+        within = 1.0 if stands else MOVING_TOLERANCE
+        remaining = self.remaining
+        if self.is_passing:
+            return False
+        if self.progress.leg == FACE and isinstance(self.leg, Follow):
+            return remaining <= TURNED_ROUND
+        if isinstance(self.goal, GoTo) and self.progress.leg == WAY:
+            if remaining < -BESIDE:
+                return True  # it stops, and faces the place again from there
+            if self.goal.radius:
+                return abs(remaining) <= self.goal.radius
+        if self.by_course and isinstance(self.leg, Move | Follow):
+            remaining = max(remaining, 0.0)  # what it drove too far it cannot drive back
+        if not stands and 0.0 <= remaining <= coast:
+            return True
+        return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
+
+    def is_settled(self, *, driving: Driving) -> bool:
+        """Whether the end is as near as a rover must come that can come no nearer.
+
+        A car that is steered by course has one try only.
+        """
+        remaining = self.remaining
+        if self.by_course and isinstance(self.leg, Move | Follow):
+            remaining = max(remaining, 0.0)
+        if self.has_one_try:
+            driving = replace(driving, settle_distance=ONE_TRY * driving.settle_distance)
+        return guidance.is_settled(self.leg, remaining, driving=driving)
+
+    def advance(self, motion: Motion) -> bool:
+        """Begin the next leg where the vehicle stands; False: there is none.
+
+        A place that it stands beside, because its position was corrected meanwhile, is faced again.
+        """
+        following = self.progress.leg + 1
+        target = self.progress.target
+        if self.steering is not None and target is not None and following <= WAY + 1:
+            if self._sets_out_again(motion, target, self.steering):
+                return True
+        elif self._has_missed(motion):
+            following = WAY if self.by_course else FACE
+            self.misses += 1
+        if following >= leg_count(self.goal):
+            return False
+        anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
+        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=())
+        return True
+
+    def _has_missed(self, motion: Motion) -> bool:
+        """Whether it stands beside the place that it drove to."""
+        target = self.progress.target
+        if target is None or self.progress.leg != WAY:
+            return False
+        return distance(motion.pose, target) > self._near_enough
+
+    def _sets_out_again(self, motion: Motion, target: LocalPlace, steering: Steering) -> bool:
+        """Begin the next run to a place, unless it is reached."""
+        before = self.progress.leg
+        if before == WAY and not self._has_missed(motion):
+            return False
+        self.progress = set_out_to(self.progress, motion.pose, target, steering)
+        if self.progress.leg <= before:  # a run that should have been the last was not
+            self.misses += 1
+        return True
+
+    def steer(
+        self,
+        motion: Motion,
+        *,
+        driving: Driving,
+        speed: float | None,
+        slowest: Slowest = USUAL,
+    ) -> Velocity:
+        """Return the velocity towards the end of the leg; ``speed`` m/s overrides what it says."""
+        anchor = self.progress.anchor
+        assert anchor is not None, "a course has an anchor"
+        leg = self.leg
+        if speed is not None and isinstance(leg, Move | Follow):
+            leg = replace(leg, speed=speed)
+        elif speed is not None and isinstance(leg, Head):
+            leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)
+        if isinstance(leg, Wait):
+            return ZERO
+        remaining = self.remaining
+        if self.is_passing and remaining > 0:
+            remaining = max(remaining - self.within, 0.0)
+        if isinstance(leg, Follow):
+            assert self.steering is not None, "a path is driven by what steers as a car"
+            return steer_along(
+                leg,
+                anchor,
+                motion,
+                along=self.progress.done,
+                remaining=remaining,
+                driving=driving,
+                radius=self.steering.radius,
+                passing=self.passing if self.is_passing else 0.0,
+                by_course=self.by_course,
+                slowest=slowest,
+            )
+        return guidance.steer(
+            leg,
+            anchor,
+            motion.pose,
+            remaining=remaining,
+            driving=driving,
+            passing=self.passing if self.is_passing else 0.0,
+            by_course=self.by_course,
+            radius=None if self.steering is None else self.steering.radius,
+            slowest=slowest,
+        )

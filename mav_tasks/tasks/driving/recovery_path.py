@@ -1,0 +1,218 @@
+"""How an interrupted task gets back to where it was, so that it ends where it would have ended.
+
+A task that another one pre-empted may find the vehicle anywhere; after a pause or a takeover it is
+near its line. What is cheap to correct on the way is left to steering.
+"""
+
+from dataclasses import replace
+from math import copysign, cos, hypot, inf, radians, sin
+
+from mav_tasks.tasks.driving.guidance import Motion, cross_track, done_so_far, wrap
+from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, distance, leg_of, length_of
+from mav_tasks.tasks.driving.mission_sequencer import goal_of
+from mav_tasks.tasks.driving.path import Follow, nearest, pose_on
+from mav_tasks.tasks.driving.path_follower import PathFollower
+from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
+from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate, SingleGoal
+from mav_tasks.tasks.task import Pose, Progress, Task
+
+ON_SPOT = 0.02  # m from where it was: as good as there
+OFF_TRACK = 1.0  # m, lifecycle: further off its line than this is no resumption after a takeover
+PAST_END = 0.1  # m, the same for the end of the line
+CONVERGES = 6.0  # m of line for each metre beside it, in which steering comes back to it
+PUT_BACK = 0.3  # m against its direction, that no estimate wanders in half a minute
+BESIDE_PATH = 0.5  # m, the same for a car on a path: much more it could not steer back
+ALIGNED = radians(10)  # a heading that differs by less is put right on the way
+TURNED = radians(30)  # a heading that differs by less cannot be mistaken by a whole turn
+
+
+def is_off_line(task: Task, pose: Pose) -> bool:
+    """Whether somebody has taken a vehicle so far from its task that nobody should guess."""
+    progress = task.progress
+    anchor = progress.anchor
+    if anchor is None:
+        return False
+    leg = leg_of(goal_of(task), progress)
+    match leg:
+        case Follow():
+            along = nearest(anchor, leg.path, pose, around=progress.done, window=inf)
+            return _away(pose, pose_on(anchor, leg.path, along)) > OFF_TRACK
+        case Move():
+            along = done_so_far(leg, anchor, pose, before=progress.done)
+            beside = abs(cross_track(anchor, pose))
+            return beside > OFF_TRACK or not -OFF_TRACK <= along <= length_of(leg) + PAST_END
+        case Rotate():
+            return hypot(pose.north - anchor.north, pose.east - anchor.east) > OFF_TRACK
+        case _:
+            return False
+
+
+def was_handled(task: Task, before: Pose, after: Pose) -> bool:
+    """Whether somebody has had a vehicle while nothing was heard of it.
+
+    On a straight line it rolls on by itself; it does not turn, and does not come back. Before it
+    was driven it stays where it is.
+    """
+    if task.progress.anchor is None:
+        away = hypot(after.north - before.north, after.east - before.east)
+        return away > PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
+    leg = leg_of(goal_of(task), task.progress)
+    if not isinstance(leg, Move):
+        return False
+    north, east = after.north - before.north, after.east - before.east
+    ahead = copysign(1.0, leg.distance) * (north * cos(before.yaw) + east * sin(before.yaw))
+    return ahead < -PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
+
+
+def resumed(
+    goal: SingleGoal,
+    progress: Progress,
+    motion: Motion,
+    *,
+    turns_first: bool,
+    steering: Steering | None = None,
+) -> Progress:
+    """Return the progress with which to go on from here.
+
+    A way to a place that was left far behind is simply begun again from here, ``turns_first`` with
+    a turn on the spot.
+    """
+    anchor, pose = progress.anchor, motion.pose
+    if not isinstance(goal, GoTo) or anchor is None or progress.target is None:
+        return progress
+    leg = leg_of(goal, progress)
+    if isinstance(leg, Follow):
+        is_near = steering is not None and _is_on_path(leg, anchor, pose, done=progress.done)
+    elif progress.leg == WAY:
+        along = done_so_far(leg, anchor, pose, before=progress.done)
+        is_near = abs(cross_track(anchor, pose)) <= OFF_TRACK and 0 <= along <= length_of(leg)
+    else:
+        near_enough = max(goal.radius or 0.0, 2 * ON_SPOT)
+        is_near = progress.leg > WAY and distance(pose, progress.target) <= near_enough
+    if is_near:
+        return progress
+    if steering is not None:
+        return set_out_to(progress, pose, progress.target, steering)
+    leg_again = FACE if turns_first else WAY
+    again = anchor_of(goal, leg_again, pose, progress.target)
+    return replace(progress, leg=leg_again, anchor=again, done=0.0, path=())
+
+
+def _is_on_path(leg: Follow, anchor: Pose, pose: Pose, *, done: float) -> bool:
+    """Whether steering comes back to a path by itself, about where it was left."""
+    along = nearest(anchor, leg.path, pose, around=done)
+    there = pose_on(anchor, leg.path, along)
+    is_aligned = abs(wrap(there.yaw - pose.yaw)) <= TURNED
+    return _away(pose, there) <= BESIDE_PATH and is_aligned
+
+
+def _away(pose: Pose, there: Pose) -> float:
+    return hypot(there.north - pose.north, there.east - pose.east)
+
+
+def recovery_path(
+    goal: SingleGoal,
+    progress: Progress,
+    motion: Motion,
+    *,
+    honours_yaw_rate: bool,
+    steering: Steering | None = None,
+) -> PathFollower | None:
+    """Return the way to where the task can go on exactly, or None if that is here.
+
+    One that is steered by course finds its heading while it drives on, unless it steers as a car.
+    """
+    anchor, pose = progress.anchor, motion.pose
+    assert anchor is not None, "what has begun has an anchor"
+    leg = leg_of(goal, progress)
+    match leg:
+        case Move():
+            place = _entry(anchor, pose, leg, progress.done)
+            if steering is not None and not honours_yaw_rate and _is_beside(anchor, pose, leg):
+                return None
+            if steering is not None:
+                return _drive_back(
+                    place,
+                    leg,
+                    progress,
+                    motion,
+                    steering=steering,
+                    by_course=not honours_yaw_rate,
+                )
+            if not honours_yaw_rate:
+                return None if place is None else _course_there(place, pose)
+            if place is None and abs(wrap(anchor.yaw - pose.yaw)) > ALIGNED:
+                place = LocalPlace(pose.north, pose.east)  # turn here, or it would leave the line
+            return None if place is None else _course(place, anchor.yaw, pose)
+        case Rotate(angle=angle):
+            yaw = wrap(anchor.yaw + copysign(progress.done, angle))
+            spot = LocalPlace(anchor.north, anchor.east)
+            if distance(pose, spot) <= ON_SPOT and abs(wrap(yaw - pose.yaw)) <= TURNED:
+                return None
+            return _course(spot, yaw, pose)
+        case _:
+            return None
+
+
+def _entry(anchor: Pose, pose: Pose, leg: Move, done: float) -> LocalPlace | None:
+    """Where on its line a move is to be resumed, unless steering gets there by itself."""
+    length = abs(leg.distance)
+    along = done_so_far(leg, anchor, pose, before=done)
+    beside = abs(cross_track(anchor, pose))
+    on_line = -ON_SPOT <= along <= length + PAST_END
+    if on_line and beside <= OFF_TRACK:
+        if beside <= ON_SPOT or beside * CONVERGES <= length - along:
+            return None
+        at = min(along, length)
+    else:
+        at = min(max(done, 0.0), length)
+    return _on_line(anchor, leg, at)
+
+
+def _is_beside(anchor: Pose, pose: Pose, leg: Move) -> bool:
+    """Whether a car that does not reverse had better go on from here: it would drive a circle."""
+    along = done_so_far(leg, anchor, pose, before=0.0)
+    is_near = abs(cross_track(anchor, pose)) <= OFF_TRACK and -ON_SPOT <= along <= leg.distance
+    return is_near and abs(wrap(anchor.yaw - pose.yaw)) <= TURNED
+
+
+def _on_line(anchor: Pose, leg: Move, along: float) -> LocalPlace:
+    signed = copysign(along, leg.distance)
+    return LocalPlace(
+        anchor.north + signed * cos(anchor.yaw), anchor.east + signed * sin(anchor.yaw)
+    )
+
+
+def _drive_back(
+    place: LocalPlace | None,
+    leg: Move,
+    progress: Progress,
+    motion: Motion,
+    *,
+    steering: Steering,
+    by_course: bool,
+) -> PathFollower | None:
+    """Return the way of a car to its line, on which it arrives with the heading of the line."""
+    anchor, pose = progress.anchor, motion.pose
+    assert anchor is not None, "what has begun has an anchor"
+    if place is None:
+        if abs(wrap(anchor.yaw - pose.yaw)) <= ALIGNED:
+            return None
+        place = _on_line(anchor, leg, min(max(progress.done, 0.0), length_of(leg)))
+    entry = Pose(place.north, place.east, anchor.yaw)
+    everywhere = replace(steering, fence=None)  # what is forbidden is not driven all the same
+    path = way_to_pose(pose, entry, steering) or way_to_pose(pose, entry, everywhere)
+    assert path is not None, "there is a way to every pose"
+    started = Progress(anchor=pose, target=place, leg=WAY, path=path)
+    return PathFollower(GoTo(place), started, by_course=by_course, steering=steering)
+
+
+def _course_there(place: LocalPlace, pose: Pose) -> PathFollower:
+    goal = GoTo(place)
+    started = Progress(anchor=anchor_of(goal, WAY, pose, place), target=place, leg=WAY)
+    return PathFollower(goal, started, by_course=True)
+
+
+def _course(place: LocalPlace, yaw: float, pose: Pose) -> PathFollower:
+    goal = GoTo(place, yaw=yaw)
+    return PathFollower(goal, Progress(anchor=anchor_of(goal, 0, pose, place), target=place))

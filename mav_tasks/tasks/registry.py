@@ -1,0 +1,256 @@
+"""Every task of the server as its events have left it, and the events not yet taken.
+
+All state changes of tasks go through here, so that the journal and the tasks cannot disagree.
+Events are numbered from 1; the store reports back up to which number they are durable.
+"""
+
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import islice
+from typing import cast
+
+from mav_tasks.tasks.events import (
+    Event,
+    StepReached,
+    TaskAdvanced,
+    TaskChanged,
+    TaskModified,
+    TaskProgressed,
+    TaskSubmitted,
+    TaskWithdrawn,
+)
+from mav_tasks.tasks.goal import Plan
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, following
+from mav_tasks.tasks.timing import Timing
+
+STATES = len(TaskState)
+KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
+
+
+class TaskRegistry:
+    """Tasks by id, and the numbered journal of what happens to them."""
+
+    def __init__(self, *, next_id: int = 1) -> None:
+        self._next_id = next_id
+        self._tasks: dict[TaskId, Task] = {}
+        self._last_event: dict[TaskId, int] = {}
+        self._finished: deque[TaskId] = deque()
+        self._live: dict[tuple[Submitter, int, int], dict[TaskId, None]] = {}
+        #: by vehicle, then by state
+        self._counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
+        #: give a task, or None if there is none of that id (any more)
+        self.get: Callable[[int], Task | None] = cast("dict[int, Task]", self._tasks).get
+        self._events: list[Event] = []
+        self.recorded = 0  # number of the last event recorded
+        self.durable = 0  # number of the last event known to be durable
+
+    def __repr__(self) -> str:
+        return (
+            f"TaskRegistry({len(self._tasks)} tasks, event {self.recorded}, durable {self.durable})"
+        )
+
+    def __len__(self) -> int:
+        return len(self._tasks)
+
+    def __getitem__(self, task_id: TaskId) -> Task:
+        return self._tasks[task_id]
+
+    def all(self) -> tuple[Task, ...]:
+        """Return every task that is kept, oldest first."""
+        return tuple(self._tasks.values())
+
+    def counts(self, vehicle: int) -> list[int]:
+        """Return how many tasks of a vehicle are in each state; the index is the TaskState."""
+        return list(self._counts.get(vehicle, [0] * STATES))
+
+    def restore(self, tasks: Sequence[Task], *, next_id: int) -> None:
+        """Take over the tasks of an earlier run, all of them durable."""
+        self._next_id = next_id
+        self._tasks.update((task.id, task) for task in tasks)
+        self._last_event.update(dict.fromkeys(self._tasks, 0))
+        counts = Counter((task.vehicle, task.state) for task in tasks)
+        for (vehicle, state), count in counts.items():
+            self._counts[vehicle][state] += count
+        over = [task for task in tasks if task.state in TERMINAL]
+        over.sort(
+            key=lambda task: task.submitted_at if task.changed_at is None else task.changed_at
+        )
+        self._finished.extend(task.id for task in over)
+        for task in tasks:
+            if task.state not in TERMINAL:
+                self._note_live(task)
+
+    def submit(self, draft: Draft, *, state: TaskState = TaskState.QUEUED, now: float) -> Task:
+        """Turn a draft into a task with an id of its own.
+
+        After MAX_TASK_ID they begin at 1 again: whatever had such an id is long forgotten, and one
+        that is still kept is passed over.
+        """
+        task_id = TaskId(self._next_id)
+        while task_id in self._tasks:
+            task_id = following(task_id)
+        task = Task(
+            id=task_id,
+            vehicle=draft.vehicle,
+            command=draft.command,
+            goal=draft.goal,
+            submitter=draft.submitter,
+            marks=draft.marks,
+            submitted_at=now,
+            terms=draft.terms,
+            state=state,
+        )
+        self._next_id = following(task_id)
+        self._tasks[task.id] = task
+        self._counts[task.vehicle][state] += 1
+        self._note_live(task)
+        self.record(TaskSubmitted(task, now))
+        self._last_event[task.id] = self.recorded
+        return task
+
+    def change(
+        self,
+        task_id: TaskId,
+        new: TaskState,
+        *,
+        reason: TaskReason,
+        actor: str,
+        now: float,
+        progress: Progress | None = None,
+        timing: Timing | None = None,
+    ) -> Task:
+        """Move a task along an edge of the lifecycle table; IllegalTransition if it has none.
+
+        None for progress or timing: as they were.
+        """
+        old = self._tasks[task_id]
+        check_transition(old.state, new)
+        timing = timing or old.timing
+        task = replace(
+            old,
+            state=new,
+            reason=reason,
+            version=old.version + 1,
+            progress=old.progress if progress is None else progress,
+            timing=timing.final if timing and new in TERMINAL else timing,
+            changed_at=now,
+        )
+        self._tasks[task_id] = task
+        counts = self._counts[task.vehicle]
+        counts[old.state] -= 1
+        counts[new] += 1
+        self.record(
+            TaskChanged(
+                task_id=task_id,
+                vehicle=task.vehicle,
+                version=task.version,
+                old=old.state,
+                new=new,
+                reason=reason,
+                actor=actor,
+                at=now,
+                progress=task.progress,
+                timing=task.timing,
+            )
+        )
+        self._last_event[task_id] = self.recorded
+        if new in TERMINAL:
+            self._forget_live(task)
+            self._finish(task_id)
+        return task
+
+    def modify(self, task_id: TaskId, terms: Terms, *, actor: str, now: float) -> Task:
+        """Change the terms of a task that is not over."""
+        old = self._tasks[task_id]
+        task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
+        self.record(TaskModified(task_id, task.vehicle, task.version, terms, actor, now))
+        self._last_event[task_id] = self.recorded
+        return task
+
+    def advance(self, task_id: TaskId, progress: Progress, *, now: float) -> None:
+        """Keep that a task has begun its next leg."""
+        old = self._tasks[task_id]
+        task = replace(old, progress=progress, version=old.version + 1)
+        self._tasks[task_id] = task
+        item = _item_number(task, progress.step)
+        self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now, item))
+
+    def reached(self, task_id: TaskId, step: int, *, performs: bool, now: float) -> None:
+        """Tell of a step of a plan that is done; ``performs``: it is sent to the vehicle."""
+        task = self._tasks[task_id]
+        item = _item_number(task, step)
+        self.record(StepReached(task_id, task.vehicle, step, performs, now, item))
+
+    def note_progress(self, task_id: TaskId, progress: Progress) -> None:
+        """Keep live progress, for status only: no event, no new version."""
+        self._tasks[task_id] = replace(self._tasks[task_id], progress=progress)
+
+    def keep_progress(self, task_id: TaskId, *, now: float) -> None:
+        """Have the live progress stored, for whoever starts after a crash. No new version."""
+        task = self._tasks[task_id]
+        event = TaskProgressed(task_id, task.vehicle, task.version, task.progress, now)
+        self.record(event)
+
+    def withdraw(self, task_id: TaskId, *, now: float) -> None:
+        """Take back a submission that did not become durable in time."""
+        task = self._tasks.pop(task_id)
+        self._counts[task.vehicle][task.state] -= 1
+        self._forget_live(task)
+        del self._last_event[task_id]
+        self.record(TaskWithdrawn(task_id, task.vehicle, now))
+
+    def latest(self, submitter: Submitter, command: int, *, vehicle: int) -> Task | None:
+        """Return a client's latest task of a command that is not over."""
+        live = self._live.get((submitter, command, vehicle))
+        return self._tasks[next(reversed(live))] if live else None
+
+    def finished(self, vehicle: int, first: int, count: int) -> list[TaskId]:
+        """Return up to ``count`` tasks of a vehicle that are over, newest first; skip ``first``."""
+        over = (each for each in reversed(self._finished) if self._tasks[each].vehicle == vehicle)
+        return list(islice(over, first, first + count))
+
+    def is_awaited_at(self, link: str, endpoint: str) -> bool:
+        """Whether a task from a client's endpoint is not over."""
+        return any((s.link, s.endpoint) == (link, endpoint) for s, _, _ in self._live)
+
+    def record(self, event: Event) -> None:
+        """Append an event to the journal."""
+        self.recorded += 1
+        self._events.append(event)
+
+    def is_durable(self, task_id: TaskId) -> bool:
+        """Whether all that happened to the task so far is on the disk."""
+        return self._last_event[task_id] <= self.durable
+
+    def take_events(self) -> list[Event]:
+        """Return the events since the last call, in order of their numbers."""
+        events, self._events = self._events, []
+        return events
+
+    def _finish(self, task_id: TaskId) -> None:
+        self._finished.append(task_id)
+        if len(self._finished) > KEPT_FINISHED:
+            oldest = self._finished.popleft()
+            task = self._tasks.pop(oldest)
+            self._counts[task.vehicle][task.state] -= 1
+            del self._last_event[oldest]
+
+    def _note_live(self, task: Task) -> None:
+        key = task.submitter, task.command, task.vehicle
+        self._live.setdefault(key, {})[task.id] = None
+
+    def _forget_live(self, task: Task) -> None:
+        key = task.submitter, task.command, task.vehicle
+        live = self._live[key]
+        del live[task.id]
+        if not live:
+            del self._live[key]
+
+
+def _item_number(task: Task, step: int) -> int:
+    """Return the number of an item in its file; 0: no item, as past the end or of no plan."""
+    if not isinstance(task.goal, Plan) or not 0 <= step < len(task.goal.steps):
+        return 0
+    return task.goal.item_number(step)
