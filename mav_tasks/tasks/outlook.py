@@ -24,15 +24,20 @@ def estimate(
 ) -> tuple[float, float]:
     """Return the estimated seconds until a task starts, and until it ends; NaN: not known.
 
-    The end of one that is over is negative: so long ago. Without a ``forecast`` only what costs
-    little is told: of a task that runs, and a start time.
+    The end of a finished task is negative: so long ago. Without a ``forecast`` only what costs
+    little is told: the end of a running task, and the times of a scheduled one if it is not kept
+    waiting.
     """
     if task.state in (S.STARTING, S.EXECUTING):
         is_kept = task.state is S.STARTING and tasks.turns.blocker_of(task.id)
         left = time_left(task.goal, task.progress, known_of(tasks)).seconds
         return 0.0, nan if is_kept else left
     if forecast is None:
-        return tasks.start_time(task) - now if task.state is S.SCHEDULED else nan, nan
+        if task.state is not S.SCHEDULED:
+            return nan, nan
+        to_start = tasks.start_time(task) - now
+        there = known_of(tasks)._replace(pose=None)  # where it will be by then is not known
+        return to_start, to_start + time_left(task.goal, task.progress, there).seconds
     if task.state in TERMINAL:
         return nan, nan if task.changed_at is None else min(0.0, task.changed_at - now)
     return forecast.of(task)

@@ -112,7 +112,7 @@ def test_a_refused_upload_is_in_the_log_with_its_reason(
 ) -> None:
     fenced(world, *items)
     (refused,) = world.events(SubmissionRefused)
-    assert str(refused) == f"upload of 255/190 refused: {why}"
+    assert str(refused) == f"rover 1: upload of 255/190 refused: {why}"
     assert world.client.texts().count(why) == 1
 
 

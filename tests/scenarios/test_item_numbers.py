@@ -60,7 +60,7 @@ def test_status_and_log_count_as_the_file_does(
         seen |= {(each.step + 1, each.step_count) for each in world.client.statuses(1)}
     assert seen == {(1, 2), (2, 2)}
     reached = [str(event) for event in world.events(StepReached)]
-    assert reached == ["task 1: item 1 reached", "task 1: item 2 reached"]
+    assert reached == ["rover 1: task 1: item 1 reached", "rover 1: task 1: item 2 reached"]
     advanced = {event.item for event in world.events(TaskAdvanced)}
     assert advanced <= {0, 1, 2}, "0: the end, past the last item"
     assert any("plan of 2 items" in each.text for each in world.client.statuses(1))

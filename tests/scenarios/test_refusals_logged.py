@@ -34,7 +34,7 @@ def test_clearing_a_mission_that_is_driven_is_refused_with_a_line(world: World) 
     world.run(0.2)
     assert acks(world.client)[-1].result == 14  # DENIED
     (line,) = refusals(world)
-    assert line.startswith(f"message {CLEAR} of 255/190")
+    assert line.startswith(f"rover 1: message {CLEAR} of 255/190")
     assert line.endswith("clear: task 1 is being driven: pause or cancel it first")
 
 
@@ -71,7 +71,8 @@ def test_a_command_that_the_server_does_not_know_has_its_line(world: World) -> N
     world.run(0.1)
     assert sent.result == UNSUPPORTED
     assert refusals(world) == [
-        f"command {SERVO} of 255/190@client refused: command {SERVO}: not supported in this version"
+        f"rover 1: command {SERVO} of 255/190@client refused: "
+        f"command {SERVO}: not supported in this version"
     ]
 
 

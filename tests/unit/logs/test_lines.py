@@ -30,7 +30,7 @@ def test_the_same_words_are_said_once() -> None:
         "ERROR store x: disk full",
         None,
         "ERROR store y: disk full",
-        "INFO command 54000 of 255/190@a refused: too many",
+        "INFO rover 1: command 54000 of 255/190@a refused: too many",
         None,
     ]
 

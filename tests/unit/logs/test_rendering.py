@@ -160,7 +160,10 @@ def test_the_table_has_a_row_of_each(event: Event, values: dict[str, object]) ->
 
 
 def test_the_figures_of_a_drive_are_in_its_line_and_in_cells_of_their_own() -> None:
-    words = "task 17 paused: link lost; 136 setpoints at 20 Hz: p50 50.0, p99 51.2, max 150.0 ms, "
+    words = (
+        "rover 1: task 17 paused: link lost; "
+        "136 setpoints at 20 Hz: p50 50.0, p99 51.2, max 150.0 ms, "
+    )
     assert str(DRIVEN) == f"{words}1 late"
     assert text_entry(9, shifted(DRIVEN)) == f"{TIME} {words}1 late\n"
     (row,) = csv.reader(io.StringIO(csv_entry(9, shifted(DRIVEN))))
@@ -198,8 +201,8 @@ def test_times_within_an_event_are_utc() -> None:
 
 def test_what_came_from_the_wire_gives_no_orders_to_a_terminal() -> None:
     event = VehicleNoted(1, "a\x1b[31mb\r\nc\x07\u202ed\x9b é", UTC)
-    assert clean(str(event)) == "vehicle 1: a[31mb  cd é"
-    assert text_entry(1, event) == f"{TIME} vehicle 1: a[31mb  cd é\n"
+    assert clean(str(event)) == "rover 1: a[31mb  cd é"
+    assert text_entry(1, event) == f"{TIME} rover 1: a[31mb  cd é\n"
     assert strictly(json_entry(1, event))["text"] == event.text
     assert "\x1b" not in csv_entry(1, event)
 
