@@ -7,6 +7,7 @@ from io import TextIOWrapper
 import typer
 
 from mav_tasks.cli import config, control, exit_codes, halts, keys, plans, submit
+from mav_tasks.cli.completions import DemoCommand, SimCommand
 from mav_tasks.cli.demo import demo
 from mav_tasks.cli.dialect import dialect
 from mav_tasks.cli.history import history
@@ -35,8 +36,8 @@ app = typer.Typer(
 PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 app.command()(serve)
-app.command(context_settings=PASSED_ON, add_help_option=False)(sim)
-app.command(context_settings=PASSED_ON, add_help_option=False)(demo)
+app.command(cls=SimCommand, context_settings=PASSED_ON, add_help_option=False)(sim)
+app.command(cls=DemoCommand, context_settings=PASSED_ON, add_help_option=False)(demo)
 app.add_typer(submit.app, name="submit")
 app.command()(status)
 app.command()(queue)

@@ -5,7 +5,7 @@ from typing import Annotated, get_args
 
 import typer
 
-from mav_tasks.cli import output
+from mav_tasks.cli import completions, output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common, Deadline, StartAt, StartIn, TaskId, seconds_of, start_of
 from mav_tasks.errors import UsageError
@@ -119,7 +119,11 @@ async def release(
     common: Common,
     wish: Annotated[
         list[str],
-        typer.Argument(metavar="[ID] again|remainder|skip", help="Without an ID: the held one."),
+        typer.Argument(
+            metavar="[ID] again|remainder|skip",
+            autocompletion=completions.releases,
+            help="Without an ID: the held one.",
+        ),
     ],
 ) -> None:
     """Decide about a held task.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mav_tasks.cli import output
+from mav_tasks.cli import completions, output
 from mav_tasks.errors import KeyRingError, UsageError
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def add(
         str,
         typer.Option(
             metavar="ROLE",
+            autocompletion=completions.roles,
             help="What its holder may do: observer, submitter, operator or safety; "
             "or vehicle: it is for the link to a rover.",
         ),
@@ -52,6 +53,7 @@ def add(
         str | None,
         typer.Option(
             metavar="HOW",
+            autocompletion=completions.derivations,
             help="What a passphrase becomes a key by: sha256 (QGroundControl 5.0, MAVProxy; "
             "the default) or pbkdf2 (later QGroundControl).",
         ),

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mav_tasks.cli import completions
 from mav_tasks.errors import UsageError
 
 if TYPE_CHECKING:
@@ -55,7 +56,10 @@ class Common:
     sign: Annotated[
         str,
         typer.Option(
-            metavar="NAME", envvar="MAV_TASKS_SIGN", help="Sign with this key of the key ring."
+            metavar="NAME",
+            envvar="MAV_TASKS_SIGN",
+            autocompletion=completions.key_names,
+            help="Sign with this key of the key ring.",
         ),
     ] = ""
     keys: Annotated[

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import completions
+
 LINKS = (
     "udpin:host:port and tcpin:host:port listen, udpout: and tcp: dial, "
     "serial:/dev/ttyUSB0:57600 is a line; ?unsigned=allow, ?unsigned=refuse and ?key=NAME behind "
@@ -42,6 +44,7 @@ def serve(
         str | None,
         typer.Option(
             metavar="WHO",
+            autocompletion=completions.arming,
             help="Who arms: server, operator, or (default) auto: server on loopback links only.",
         ),
     ] = None,
@@ -97,7 +100,10 @@ def serve(
     set_: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=VALUE", help="Any key of the configuration; repeatable."
+            "--set",
+            metavar="KEY=VALUE",
+            autocompletion=completions.settings,
+            help="Any key of the configuration; repeatable.",
         ),
     ] = None,
 ) -> None:

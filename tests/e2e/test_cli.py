@@ -102,6 +102,30 @@ def test_a_shell_can_complete_commands() -> None:
     assert set(words.lines) == {"move", "rotate", "drive", "goto", "face", "wait", "home"}
 
 
+@pytest.mark.slow
+def test_a_shell_completes_values_and_the_options_of_the_simulator(tmp_path: Path) -> None:
+    ring = str(tmp_path / "keys.toml")
+    mav_tasks("keys", "add", "anna", "--role", "operator", "--keys", ring)
+    for typed, expected in {
+        "release 3 ": {"again", "remainder", "skip"},
+        "keys add bo --role o": {"observer", "operator"},
+        "keys add bo --passphrase --derivation ": {"sha256", "pbkdf2"},
+        "serve --arming ": {"auto", "operator", "server"},
+        "serve --set driving.sp": {"driving.speed="},
+        "queue --sign ": {"anna"},
+        "sim --perso": {"--persona"},
+        "sim --persona ": {"ardupilot", "px4", "generic"},
+        "demo --f": {"--fast"},
+    }.items():
+        words = mav_tasks(
+            _MAV_TASKS_COMPLETE="complete_bash",
+            COMP_WORDS=f"mav-tasks {typed}",
+            COMP_CWORD=str(typed.count(" ") + 1),
+            MAV_TASKS_SIGNING_KEYS=ring,
+        )
+        assert set(words.lines) == expected, typed
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
