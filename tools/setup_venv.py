@@ -38,6 +38,7 @@ INPUTS = (
     "tools/lock/without_dependencies.txt",
     "tools/setup_venv.py",
     "tools/hatch_build.py",
+    "tools/hatch_readme.py",
     "tools/build_dialect.py",
     "dialects/mav_tasks.xml",
     "dialects/base_additions.xml",

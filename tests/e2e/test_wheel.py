@@ -91,6 +91,13 @@ def without_extras(python: str, folder: Path) -> None:
     for name in ("mav_tasks.xml", "base_additions.xml"):
         assert (Path(path) / name).read_bytes() == (ROOT / "dialects" / name).read_bytes()
 
+    told = "from importlib.metadata import metadata; print(metadata('mav-tasks').get_payload())"
+    readme = run(python, "-c", told, folder=folder).stdout
+    assert "## Ten minutes" in readme
+    assert "](" not in readme, "links of a repository that a reader of the wheel has not"
+    for document in ("README.md", "GUIDE.md", "CHANGELOG.md"):
+        assert (Path(path).parents[1] / document).is_file()
+
     refused = run(python, "-m", "mav_tasks.cli", "sim", "--body", "bullet", folder=folder)
     assert refused.returncode == 2, refused.stdout
     assert "pip install pybullet numpy" in refused.stderr
@@ -102,7 +109,7 @@ def without_extras(python: str, folder: Path) -> None:
         assert (done.returncode, done.stderr) == (0, "")
         assert "completed" in done.stdout
         later = ask("submit", "move", "1", "--in", "1h", "--server", url)
-        assert (later.returncode, later.stdout.strip()) == (0, "task 2")
+        assert (later.returncode, later.stdout.strip()) == (0, "rover 1: task 2")
         queue = ask("queue", "--json", "--server", url)
         assert [task["id"] for task in json.loads(queue.stdout)["waiting"]] == [2]
 
