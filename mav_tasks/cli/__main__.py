@@ -1,4 +1,4 @@
-"""``python -m mav_tasks.cli`` is ``mav-tasks``."""
+"""``python -m mav_tasks.cli`` runs ``mav-tasks``."""
 
 from mav_tasks.cli.app import main
 

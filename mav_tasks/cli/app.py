@@ -1,4 +1,4 @@
-"""All commands together: composition only."""
+"""The ``mav-tasks`` command: composes all commands."""
 
 import sys
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ app = typer.Typer(
     cls=Root,
     callback=root,
     no_args_is_help=True,
-    rich_markup_mode=None,  # plain help: rich alone would cost a third of the time to show it
+    rich_markup_mode=None,  # plain help: rich would take a third of the time to show it
     pretty_exceptions_enable=False,
     epilog=exit_codes.TABLE,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -64,10 +64,10 @@ app.command()(dialect)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: what goes wrong is one line on standard error, and an exit status."""
+    """Run the command line. Report an error as one line on standard error and an exit status."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that knows ASCII only
+            stream.reconfigure(errors="replace")  # for terminals with ASCII only
     try:
         app(arguments, prog_name="mav-tasks")
     except exit_codes.TOLD as error:

@@ -1,7 +1,7 @@
-"""An async function becomes a command; options that many commands have are written once, as groups.
+"""Typer commands from async functions, with shared groups of options.
 
-A group is a frozen dataclass whose fields are annotated as Typer has it. A parameter of that type
-stands for all of its options.
+A group is a frozen dataclass with Typer annotations. A parameter of that type stands for all fields
+of the group as options.
 """
 
 import dataclasses
@@ -12,15 +12,15 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-#: of a NumbersCommand
+#: context settings of a NumbersCommand
 NUMBERS = {"ignore_unknown_options": True}
 
 
 class NumbersCommand(TyperCommand):
-    """A command that takes a negative number for an argument, and a mistyped option for none."""
+    """A command that accepts negative numbers as arguments, but no mistyped options."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse them, after a look for options that there are not."""
+        """Parse the arguments. Fail if one is an unknown option."""
         known = [name for each in self.get_params(ctx) for name in each.opts + each.secondary_opts]
         for argument in takewhile(lambda each: each != "--", args):
             name = argument.partition("=")[0]
@@ -45,7 +45,7 @@ def _similar(name: str, known: list[str]) -> str:
 
 
 def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
-    """Return what Typer takes for a command; it runs ``body`` on a loop of its own."""
+    """Return a Typer command that runs ``body`` on its own event loop."""
     groups: dict[str, Any] = {
         name: parameter.annotation
         for name, parameter in inspect.signature(body).parameters.items()

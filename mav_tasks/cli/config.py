@@ -1,4 +1,4 @@
-"""``mav-tasks config``: what is in force, whether a file is good, and a file to begin with."""
+"""``mav-tasks config``: show the values in force, check a file, write a sample file."""
 
 import os
 import sys
@@ -30,7 +30,7 @@ def show(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="As JSON, for scripts.")] = False,
 ) -> None:
-    """Print each key with the value in force and where it comes from."""
+    """Print each key with the value in force and its source."""
     from mav_tasks.config import report  # noqa: PLC0415
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
 
@@ -46,7 +46,7 @@ def show(
 def check(
     file: Annotated[str, typer.Argument(metavar="FILE", help="- for standard input.")],
 ) -> None:
-    """Say "ok", or every fault of a file by its line; exit code 2 then."""
+    """Check a file: print "ok", or each fault with its line and exit with 2."""
     from mav_tasks.config import configuration, toml_file  # noqa: PLC0415
 
     if file == STANDARD_INPUT:
@@ -67,7 +67,7 @@ def init(
 ) -> None:
     """Print or write a sample file.
 
-    It has each key with its meaning, its range and its default.
+    The sample has each key with its meaning, range and default.
     """
     from mav_tasks.config.sample import sample  # noqa: PLC0415
 
@@ -83,7 +83,7 @@ def init(
 
 
 def _parameters(settings: "ServerSettings") -> dict[str, float]:
-    """Return what clients have set as MAVLink parameters, as far as the store can be looked at."""
+    """Return the MAVLink parameters that clients have set; {} if the store cannot be read."""
     from mav_tasks.store.place import path_of_store  # noqa: PLC0415
     from mav_tasks.store.reading import read_parameters  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""Commands about tasks that are there: cancel, clear, modify, release."""
+"""Commands on existing tasks: cancel, clear, modify, release."""
 
 import sys
 from typing import Annotated, get_args
@@ -29,7 +29,7 @@ async def cancel(
         bool, typer.Option("--kill", help="Put the rover into HOLD at once, too.")
     ] = False,
 ) -> None:
-    """Call a task off: the one named, or the one that runs."""
+    """Cancel a task: the named one, or the running one."""
     from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
 
     async with opened(common) as client:
@@ -50,7 +50,7 @@ async def clear(
     everything: Annotated[bool, typer.Option("--all", help="The running one, too.")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
 ) -> None:
-    """Call off all tasks that wait."""
+    """Cancel all waiting tasks."""
     if everything and not yes:
         _confirm("Call off all tasks, the running one, too?")
     from mav_tasks.cli.session import opened  # noqa: PLC0415
@@ -85,9 +85,9 @@ async def modify(
         str | None, typer.Option(metavar="TEXT", help="A name for it: 24 letters; '': none.")
     ] = None,
 ) -> None:
-    """Change a task that is not over.
+    """Change a task that has not ended.
 
-    What is not given stays as it is.
+    Options that are not given change nothing.
     """
     start = start_of(start_in, start_at)
     until = seconds_of("--deadline", deadline)
@@ -126,9 +126,9 @@ async def release(
         ),
     ],
 ) -> None:
-    """Decide about a held task.
+    """Release a held task.
 
-    Drive all of it again from here, or the remainder, or skip it.
+    "again" restarts it here, "remainder" finishes it, "skip" drops it.
     """
     from mav_tasks.client.handle import Release  # noqa: PLC0415
 

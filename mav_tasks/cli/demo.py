@@ -1,4 +1,4 @@
-"""``mav-tasks demo``: hand over to the demonstration, which is the simulated rover's."""
+"""``mav-tasks demo``: run the demonstration, a program of the simulated rover."""
 
 import os
 import sys
@@ -7,6 +7,6 @@ import typer
 
 
 def demo(context: typer.Context) -> None:
-    """Show it: three tasks are driven, and measured."""
+    """Run a demonstration: drive three tasks and measure them."""
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "rover_sim.demo", *context.args])

@@ -1,4 +1,4 @@
-"""``mav-tasks dialect``: the MAVLink definitions of the task messages, for other programs."""
+"""``mav-tasks dialect``: print the MAVLink definitions of the task messages."""
 
 import sys
 from typing import Annotated

@@ -1,6 +1,6 @@
-"""What the exit status of a command says, and what is said along with it; GUIDE.md has the table.
+"""Exit statuses and error messages of all commands. GUIDE.md has the table.
 
-The one place where an error becomes words for the operator: one line on standard error.
+Only this module turns an error into a message for the operator: one line on standard error.
 """
 
 import os
@@ -16,11 +16,11 @@ from mav_tasks.errors import (
 )
 
 DONE = 0
-FAILED = 1  # a task ended in another way than completed, or a request was refused
-USAGE = 2  # what was asked for cannot be done as it stands: the one line says what to change
-NO_ANSWER = 3  # nobody answered in time
-INTERRUPTED = 130  # by Ctrl-C, as a shell reports SIGINT
-READER_GONE = 141  # who read the output has ended, as a shell reports SIGPIPE
+FAILED = 1  # a task did not complete, or a request was refused
+USAGE = 2  # usage error; the message says how to fix it
+NO_ANSWER = 3  # no answer in time
+INTERRUPTED = 130  # Ctrl-C, as a shell reports SIGINT
+READER_GONE = 141  # the reader of the output has ended, as a shell reports SIGPIPE
 
 TABLE = """\b
 Exit status:
@@ -30,12 +30,12 @@ Exit status:
   3  no answer in time
   130  Ctrl-C"""
 
-#: what may come out of a command; anything else is our own mistake, and its traceback is wanted
+#: expected errors of a command; any other one is a bug and shows its traceback
 TOLD = (UsageError, ClientError, KeyboardInterrupt)
 
 
 def tell(error: BaseException) -> int:
-    """Say on standard error what went wrong; gives the exit status."""
+    """Print an error on standard error. Return the exit status."""
     match error:
         case KeyboardInterrupt():
             return INTERRUPTED
@@ -64,7 +64,7 @@ def _say(text: str) -> None:
 
 
 def _let_go_of_output() -> None:
-    """Have what is still to be written go nowhere, so that Python does not stumble at its end."""
+    """Redirect standard output to /dev/null, so that Python's flush at exit does not fail."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)

@@ -1,4 +1,4 @@
-"""A task while it is waited for: a line that changes on a terminal, lines or JSON elsewhere."""
+"""Show a task until it ends: one updated line on a terminal, else a line or JSON per change."""
 
 import asyncio
 import sys
@@ -17,23 +17,23 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import TaskStatus
 
-LOOK = 0.5  # s between two looks at whether anything is heard
-BAR_WIDTH = 30  # columns at the most
-BAR_FROM = 60  # columns of a window in which there is room for a bar
+LOOK = 0.5  # s between two checks for silence
+BAR_WIDTH = 30  # columns at most
+BAR_FROM = 60  # columns; a narrower window has no bar
 
 
 class View(Protocol):
-    """Where a task is shown."""
+    """An output for a task's progress."""
 
     def show(self, status: TaskStatus) -> None:
-        """There is news."""
+        """Show a new status."""
 
     def silence(self, *, is_silent: bool) -> None:
-        """Whether nothing is heard of the rover and its server."""
+        """Show whether the rover and its server are silent."""
 
 
 async def follow(client: Client, task: Task, *, as_json: bool) -> None:
-    """Show a task until it is over; TaskFailed unless it has completed."""
+    """Show a task until it has ended. Raise TaskFailed unless it completed."""
     try:
         with _view(task.vehicle, as_json=as_json) as view:
             looking = asyncio.create_task(_look(client, task, view))
@@ -75,7 +75,7 @@ def _view(rover: int, *, as_json: bool) -> Iterator[View]:
 
 
 class Lines:
-    """A line for each change of state, and for a silence."""
+    """Prints the status line when it changes, and when the rover falls silent or returns."""
 
     def __init__(self, rover: int) -> None:
         self._rover = rover
@@ -83,38 +83,38 @@ class Lines:
         self._is_silent = False
 
     def show(self, status: TaskStatus) -> None:
-        """There is news."""
+        """Print a status whose line has changed."""
         line = words.line_of(status)
         if line != self._told:
             self._told = line
             output.say(line)
 
     def silence(self, *, is_silent: bool) -> None:
-        """Whether nothing is heard."""
+        """Print a change between silent and heard."""
         if is_silent != self._is_silent:
             self._is_silent = is_silent
             output.say(f"rover {self._rover}: {'silent' if is_silent else 'heard again'}")
 
 
 class Objects:
-    """A JSON object for each change, of progress, too."""
+    """Prints a JSON object at each change of state, reason, progress or item."""
 
     def __init__(self) -> None:
         self._told: tuple[object, ...] = ()
 
     def show(self, status: TaskStatus) -> None:
-        """There is news."""
+        """Print a status that has changed."""
         told = (status.state, status.reason, status.progress, status.item)
         if told != self._told:
             self._told = told
             output.say_json(words.task_json(status))
 
     def silence(self, *, is_silent: bool) -> None:
-        """A program sees that for itself."""
+        """Print nothing: a program detects silence itself."""
 
 
 class Bar:
-    """One line of a terminal, written over again and again."""
+    """A progress line that is redrawn in place."""
 
     def __init__(self) -> None:
         self.status: TaskStatus | None = None
@@ -122,17 +122,17 @@ class Bar:
         self._is_silent = False
 
     def show(self, status: TaskStatus) -> None:
-        """There is news."""
+        """Redraw with a new status."""
         self.status = status
         self._draw()
 
     def silence(self, *, is_silent: bool) -> None:
-        """Whether nothing is heard; also the moment at which a changed window is seen."""
+        """Show or hide "rover silent"; this also adapts to a resized window."""
         self._is_silent = is_silent
         self._draw()
 
     def drawn(self) -> Table | Group:
-        """Return the line, as wide as the window at this moment, and below it what to do."""
+        """Return the line, fitted to the window, and below it the command to go on."""
         width = 80 if self.live is None else self.live.console.width
         grid = Table.grid(padding=(0, 1), expand=False)
         if self.status is None:

@@ -1,4 +1,4 @@
-"""Commands that stop rovers, and that let them go on: of one rover or of all."""
+"""Commands that stop and resume rovers: stop, pause, resume."""
 
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
@@ -31,7 +31,7 @@ async def stop(
     from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
 
     _require_one_choice(common, everywhere=everywhere)
-    async with unfound(common) as client:  # looking for the rovers would take time
+    async with unfound(common) as client:  # do not wait for discovery
         try:
             await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
         except Refused as error:
@@ -53,7 +53,7 @@ async def stop(
 
 @command
 async def pause(common: Common, everywhere: Everywhere = False) -> None:
-    """Stop a rover where it is; its task can go on from there."""
+    """Stop a rover; its task can continue from there."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     async with opened(common) as client:
@@ -77,7 +77,7 @@ async def resume(
         ),
     ] = None,
 ) -> None:
-    """Go on after a pause, a STOP or a takeover."""
+    """Resume after a pause, a STOP or a takeover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.cli.words import line_of  # noqa: PLC0415
     from mav_tasks.tasks.lifecycle import TaskState  # noqa: PLC0415
@@ -89,7 +89,7 @@ async def resume(
 
         async def resume_one(rover: int) -> str:
             await client.resume(epoch=epoch, vehicle=rover)
-            with suppress(ClientError):  # the resume was accepted before
+            with suppress(ClientError):  # the resume has been accepted
                 first = (await client.queue(limit=0, vehicle=rover)).current
                 if first is not None and first.state is TaskState.HELD:
                     return f"goes on after {line_of(first).removeprefix(f'rover {rover}: ')}"
@@ -104,7 +104,7 @@ def _require_one_choice(common: Common, *, everywhere: bool) -> None:
 
 
 def _chosen(client: "Client", common: Common, *, everywhere: bool) -> list[int]:
-    """Return the rovers that are meant: the one named, all, or the only one. UsageError."""
+    """Return the named rover, all rovers or the only one. Raise UsageError if ambiguous."""
     _require_one_choice(common, everywhere=everywhere)
     if common.vehicle is not None:
         return [common.vehicle]
@@ -126,9 +126,9 @@ async def _each(
     common: Common,
     action: str,
 ) -> None:
-    """Ask it of all rovers at the same time: none waits for a silent one. Say how it went of each.
+    """Ask all rovers at the same time, so that none waits for a silent one. Print each result.
 
-    Raise Refused, or NoAnswer, if any did not do it.
+    Raise Refused or NoAnswer if any of them failed.
     """
     import asyncio  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""``mav-tasks history``: the tasks that are over."""
+"""``mav-tasks history``: list the finished tasks."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,7 +22,7 @@ async def history(
 ) -> None:
     """List finished tasks, newest first.
 
-    Of every rover, unless one is named. 'mav-tasks log' has all that happened.
+    Without --vehicle, list those of every rover. 'mav-tasks log' prints all events.
     """
     from datetime import datetime  # noqa: PLC0415
 

@@ -1,6 +1,7 @@
-"""``mav-tasks keys``: the key ring. A secret is read without echo or from a pipe, never an option.
+"""``mav-tasks keys``: add, list and revoke the keys of the key ring.
 
-What is on a command line everybody on the machine can read.
+A secret is read without echo or from a pipe. It is never an option: all users of a machine can read
+a command line.
 """
 
 import sys
@@ -60,9 +61,9 @@ def add(
     ] = None,
     keys: File = "",
 ) -> None:
-    """Add a key; a running server takes it at once.
+    """Add a key; a running server accepts it at once.
 
-    Where standard input is no terminal, the passphrase or the digits are its first line.
+    If standard input is not a terminal, its first line is the passphrase or the digits.
     """
     from datetime import UTC, datetime  # noqa: PLC0415
 
@@ -76,7 +77,7 @@ def add(
     if derivation is not None and (not passphrase or derivation not in how.PASSPHRASES):
         words = " or ".join(how.PASSPHRASES)
         raise UsageError(f"--derivation: expected {words}, and --passphrase")
-    key_of(name, role, b"")  # before anybody types a passphrase for nothing
+    key_of(name, role, b"")  # check before the user types a passphrase
     if passphrase:
         derivation = derivation or how.SHA256
         secret = how.from_passphrase(_asked("Passphrase", is_new=True), derivation)
@@ -104,7 +105,7 @@ def list_(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, one object a line.")] = False,
     keys: File = "",
 ) -> None:
-    """Show the keys by their fingerprints; never a secret."""
+    """List the keys with their fingerprints; never a secret."""
     from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
     from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
 
@@ -130,9 +131,9 @@ def revoke(
     ] = False,
     keys: File = "",
 ) -> None:
-    """Have nobody sign with a key any more; a running server refuses it at once.
+    """Revoke a key; a running server refuses it at once.
 
-    The ring keeps its secret for one use only: to replay records in which it counted.
+    The ring keeps the secret only to replay records of runs in which the key was valid.
     """
     from datetime import UTC, datetime  # noqa: PLC0415
 
@@ -141,7 +142,7 @@ def revoke(
     from mav_tasks.key_ring.ring_file import change, load  # noqa: PLC0415
 
     path = ring_path(keys)
-    load(path)  # one that is not there is not to be made now
+    load(path)  # raises if there is none: do not create one
 
     def without_it(ring: KeyRing) -> KeyRing:
         is_revoked = any(each.name == name and not each.is_usable for each in ring.entries)
@@ -153,7 +154,7 @@ def revoke(
 
 
 def _asked(what: str, *, is_new: bool = False) -> str:
-    """Return a secret text: asked for without echo, or the first line of standard input."""
+    """Return a secret, prompted for without echo, or the first line of standard input."""
     if sys.stdin is None:
         raise UsageError(f"{what.lower()}: standard input is closed")
     if not sys.stdin.isatty():

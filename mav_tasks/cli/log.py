@@ -1,4 +1,4 @@
-"""``mav-tasks log``: what happened, out of the store's journal."""
+"""``mav-tasks log``: print the events of the store's journal."""
 
 import os
 import select
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from mav_tasks.logs.export import EntryOf
     from mav_tasks.store.journal import Journal
 
-MOST = 1 << 63  # SQLite has no such number
-LOOK = 0.5  # s, between two looks at whether the store was written to
+MOST = 1 << 63  # the first number beyond SQLite's integers
+LOOK = 0.5  # s between two checks for new events
 
 
 def log(
@@ -41,9 +41,9 @@ def log(
         bool, typer.Option("--follow", "-f", help="Go on with what happens, until Ctrl-C.")
     ] = False,
 ) -> None:
-    """Print what happened, one line an event.
+    """Print what happened, one line per event.
 
-    It is read from the store; the server may be running.
+    It reads the store; the server may be running.
     """
     import time  # noqa: PLC0415
     from contextlib import closing  # noqa: PLC0415
@@ -75,10 +75,10 @@ def log(
             while follow and _is_written_to(journal, seen):
                 seen = journal.version()
                 _print(journal, entry_of)
-        except BrokenPipeError:  # whoever read it has enough, as ``head``; there is nobody to tell
+        except BrokenPipeError:  # the reader has ended, as ``head`` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         except KeyboardInterrupt:
-            pass  # the way in which --follow ends
+            pass  # ends --follow
         except OSError as error:
             raise UsageError(f"standard output: {error.strerror}") from error
 
@@ -90,9 +90,9 @@ def _print(journal: "Journal", entry_of: "EntryOf") -> None:
 
 
 def _is_written_to(journal: "Journal", seen: int) -> bool:
-    """Wait until the store is; False: before that, who reads what we print went away."""
+    """Wait until the store changes. Return False if the reader of our output ended first."""
     poller = select.poll()
-    poller.register(sys.stdout.fileno(), 0)  # of errors only: the other end is closed
+    poller.register(sys.stdout.fileno(), 0)  # errors only: the other end has closed
     while journal.version() == seen:
         if poller.poll(LOOK * 1000):
             return False
@@ -100,7 +100,7 @@ def _is_written_to(journal: "Journal", seen: int) -> bool:
 
 
 def _store_of_server() -> str:
-    """Return the store that the configuration names, else that of the server started last."""
+    """Return the configured store, else the store of the server that was started last."""
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
     from mav_tasks.store.place import latest_store  # noqa: PLC0415
 

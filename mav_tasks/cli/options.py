@@ -1,4 +1,4 @@
-"""Options that many commands have, as groups."""
+"""Options that many commands share, as groups for ``command``."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
@@ -32,7 +32,7 @@ TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Of the task.")
 
 @dataclass(frozen=True, slots=True)
 class Common:
-    """How the server is reached, and how answers are shown."""
+    """Options for reaching the server and showing its answers."""
 
     server: Annotated[
         str,
@@ -70,7 +70,7 @@ class Common:
 
 @dataclass(frozen=True, slots=True)
 class TaskOptions:
-    """When a new task runs, and whether it is waited for."""
+    """Options for when a new task runs, and whether the command waits for it."""
 
     priority: Annotated[int, typer.Option(metavar="0..10", help="10 runs first.")] = PRIORITY
     after: Annotated[
@@ -89,14 +89,14 @@ class TaskOptions:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """A start delay in seconds, or a time of day, or neither."""
+    """A start delay in seconds, a start time, or neither."""
 
     delay: float | None
     at: "datetime | None"
 
 
 def start_of(start_in: str, start_at: str) -> Start:
-    """Read ``--in`` and ``--at``."""
+    """Return the parsed ``--in`` or ``--at``. Raise UsageError if invalid, or if both are given."""
     if start_in and start_at:
         raise UsageError("--in and --at: choose one of them")
     if not start_at:
@@ -109,7 +109,7 @@ def start_of(start_in: str, start_at: str) -> Start:
 
 
 def seconds_of(name: str, text: str) -> float | None:
-    """Return the seconds of an option, None if it is not given."""
+    """Return the parsed duration of an option, s; None if it is not given."""
     if not text:
         return None
     from mav_tasks.cli.times import parse_duration  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Standard output: whether it is a terminal that can be drawn on, JSON, and plain lines."""
+"""Standard output: lines, JSON objects and tables, adapted to the terminal."""
 
 import os
 import shutil
@@ -9,16 +9,16 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
 DUMB = ("dumb", "unknown", "")
-PIPE_WIDTH = 1000  # columns: nothing is cut where a program reads
+PIPE_WIDTH = 1000  # columns: nothing is cut for a program that reads
 
 
 def is_drawn_on() -> bool:
-    """Whether lines that were written can be written over: a terminal, and not a dumb one."""
+    """Return whether written lines can be overwritten: on a terminal that is not dumb."""
     return sys.stdout.isatty() and os.environ.get("TERM", "").lower() not in DUMB
 
 
 def console() -> "Console":
-    """Return what tables are printed on; without NO_COLOR and on a terminal, in colours."""
+    """Return the console for tables, in colours on a terminal unless NO_COLOR is set."""
     from rich.console import Console  # noqa: PLC0415
 
     is_drawn = is_drawn_on()
@@ -34,26 +34,26 @@ def console() -> "Console":
 
 
 def say(text: str) -> None:
-    """Write a line, now."""
+    """Write a line and flush."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
 
 def warn(text: str) -> None:
-    """Write a line on standard error, now; none if there is nothing to say."""
+    """Write a line on standard error, unless ``text`` is empty."""
     if text:
         sys.stderr.write(f"mav-tasks: {text}\n")
 
 
 def say_json(value: dict[str, Any]) -> None:
-    """Write an object as a line, now."""
+    """Write a JSON object as one line and flush."""
     import json  # noqa: PLC0415
 
     say(json.dumps(value))
 
 
 def say_done(as_json: bool, action: str, words: str, **fields: object) -> None:
-    """Say that a request was carried out: in words, or as an object with ``fields``."""
+    """Report a completed request: as text, or as a JSON object with ``fields``."""
     if as_json:
         say_json({"done": action, **fields})
     else:
@@ -61,7 +61,7 @@ def say_done(as_json: bool, action: str, words: str, **fields: object) -> None:
 
 
 def show(what: "RenderableType") -> None:
-    """Print a table; no blanks at the ends of its lines where a program reads them."""
+    """Print a table, without trailing blanks unless on a terminal."""
     target = console()
     if target.is_terminal:
         target.print(what)

@@ -1,21 +1,21 @@
-"""A place as it is typed: metres from the rover's origin, or latitude and longitude."""
+"""Parse a typed place: metres from the rover's origin, or latitude and longitude."""
 
 from math import hypot
 
 from mav_tasks.errors import UsageError
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace, Place
 
-#: m; a place that is farther from the origin may have been meant in degrees
+#: m; numbers of a place farther from the origin may be degrees
 NEAR = 20.0
-#: decimals with which nobody types metres
+#: decimals from which on numbers may be degrees
 DEGREES = 3
 
 
 def parse_place(first: str, second: str, *, is_global: bool, is_local: bool) -> Place:
-    """Return the place that two numbers mean.
+    """Return the place of two numbers.
 
-    Raise UsageError for what is no number or no place, and for numbers of which it is not plain
-    whether they are metres or degrees: 47.3977 8.5456 as metres is 48 m to the north-east.
+    Raise UsageError for invalid numbers, and for numbers that may be metres or degrees: 47.3977
+    8.5456 as metres is 48 m to the north-east.
     """
     if is_global and is_local:
         raise UsageError("--global and --local: choose one of them")

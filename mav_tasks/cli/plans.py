@@ -1,4 +1,4 @@
-"""``mav-tasks mission``, ``fence`` and ``rally``: plans to and from files."""
+"""``mav-tasks mission``, ``fence`` and ``rally``: upload and download plan files."""
 
 import sys
 from collections.abc import Sized
@@ -69,9 +69,9 @@ async def upload_mission(
 @mission.command("start")
 @command
 async def start_mission(common: Common, wait: Wait = False) -> None:
-    """Start the staged mission, or the last one that was staged again.
+    """Start the staged mission, or start the last one again.
 
-    Staged is what a ground station has uploaded, or 'mission upload --stage'.
+    A ground station's upload or 'mission upload --stage' stages a mission.
     """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
@@ -85,8 +85,8 @@ async def start_mission(common: Common, wait: Wait = False) -> None:
 async def download_mission(file: FileOut, common: Common, force: Force = False) -> None:
     """Write the staged mission of a rover into a file.
 
-    That is what a ground station has uploaded, or 'mission upload --stage'; one that 'mission
-    upload' has queued is a task.
+    A ground station's upload or 'mission upload --stage' stages a mission; 'mission upload'
+    without --stage queues a task.
     """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
@@ -100,7 +100,7 @@ async def download_mission(file: FileOut, common: Common, force: Force = False) 
 @fence.command("upload")
 @command
 async def upload_fence(file: PlanIn, common: Common, empty: Empty = False) -> None:
-    """Return the rover the fence of a file."""
+    """Upload the fence of a file to the rover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 
@@ -128,7 +128,7 @@ async def download_fence(file: PlanOut, common: Common, force: Force = False) ->
 @rally.command("upload")
 @command
 async def upload_rally_points(file: PlanIn, common: Common, empty: Empty = False) -> None:
-    """Return the rover the rally points of a file."""
+    """Upload the rally points of a file to the rover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 
@@ -146,7 +146,7 @@ def _check_place(file: str, *, force: bool) -> None:
 
 
 def _check_there(parts: Sized, kind: str, *, hint: str = "") -> None:
-    """An empty file would look as if there had been something to save."""
+    """Raise Refused if there is nothing to write: an empty file would be misleading."""
     if not parts:
         from mav_tasks.errors import Refused  # noqa: PLC0415
 

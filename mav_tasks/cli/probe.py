@@ -1,4 +1,4 @@
-"""``mav-tasks probe``: find out about one rover, directly, and write its profile."""
+"""``mav-tasks probe``: test one rover directly, without a server, and write its profile."""
 
 import sys
 from typing import TYPE_CHECKING, Annotated
@@ -91,9 +91,9 @@ async def probe(
     keys: Keys = "",
     as_json: Json = False,
 ) -> None:
-    """Find out what a rover can do, directly, with no server between.
+    """Test what a rover can do, directly, without a server.
 
-    It changes nothing for good and moves nothing, unless --set-failsafe or --drive is said.
+    Without --set-failsafe or --drive it moves nothing and changes nothing permanently.
     """
     from mav_tasks.cli.options import DEFAULT_SERVER  # noqa: PLC0415
     from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415
@@ -146,7 +146,7 @@ def _confirm(speed: float) -> None:
 
 
 def _show_failsafe(done: "Probe", *, as_json: bool) -> None:
-    """Print what was set, and what the rover does now."""
+    """Print the parameters set, and what the rover does now when setpoints stop."""
     from mav_tasks.cli import output as out  # noqa: PLC0415
     from mav_tasks.probe.report import as_json as values_of  # noqa: PLC0415
 
@@ -158,7 +158,7 @@ def _show_failsafe(done: "Probe", *, as_json: bool) -> None:
 
 
 def _show(done: "Probe", output: str | None, *, as_json: bool) -> None:
-    """Print the report, and write the profile; ConfigError, after all was said, if it cannot be."""
+    """Write the profile and print the report. Raise ConfigError last if writing failed."""
     from mav_tasks.cli import output as out  # noqa: PLC0415
     from mav_tasks.errors import ConfigError  # noqa: PLC0415
     from mav_tasks.probe import report  # noqa: PLC0415
@@ -183,7 +183,7 @@ def _show(done: "Probe", output: str | None, *, as_json: bool) -> None:
 
 
 def _keep(done: "Probe", output: str | None) -> str:
-    """Write the profile; gives its path."""
+    """Write the profile. Return its path."""
     from datetime import UTC, datetime  # noqa: PLC0415
 
     from mav_tasks.config import profiles  # noqa: PLC0415

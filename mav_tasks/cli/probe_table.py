@@ -1,4 +1,4 @@
-"""The report of a probe as a table."""
+"""The report of a probe, as a table."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,7 +16,7 @@ STYLES: Mapping[Mark, str] = {
 
 
 def table_of(lines: Sequence[Line]) -> Table:
-    """Return the lines; what does not fit goes on below."""
+    """Return the lines as a table; long texts are wrapped."""
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(no_wrap=True)

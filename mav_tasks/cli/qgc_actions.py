@@ -1,4 +1,4 @@
-"""``mav-tasks qgc-actions``: buttons for QGroundControl."""
+"""``mav-tasks qgc-actions``: print or install buttons for QGroundControl."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``mav-tasks queue``: what runs, what waits, and why."""
+"""``mav-tasks queue``: show the running and the waiting tasks."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,9 +22,9 @@ async def queue(
         int, typer.Option(min=1, metavar="NUMBER", help="Show so many waiting tasks.")
     ] = 100,
 ) -> None:
-    """Show what runs, what waits, and why.
+    """Show the running and the waiting tasks, and why they wait.
 
-    Of every rover, unless one is named.
+    Without --vehicle, show the queue of every rover.
     """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
@@ -38,13 +38,13 @@ async def queue(
 
 
 async def fetch(client: "Client", common: Common, *, limit: int) -> list["QueueStatus"]:
-    """Return the queues that are meant."""
+    """Return the queue of the named rover, or of all rovers."""
     meant = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
     return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]
 
 
 def show(queues: list["QueueStatus"], common: Common) -> None:
-    """Print them."""
+    """Print queues as tables, or as JSON."""
     from mav_tasks.cli import output, words  # noqa: PLC0415
 
     if common.json:

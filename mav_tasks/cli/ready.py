@@ -11,7 +11,7 @@ from mav_tasks.cli.options import Common
 if TYPE_CHECKING:
     from mav_tasks.client.values import VehicleStatus
 
-WITHIN = 2.0  # s
+WITHIN = 2.0  # s to wait for an answer
 
 
 @command
@@ -23,7 +23,7 @@ async def ready(
 ) -> None:
     """Check that the server answers and that it hears its rovers.
 
-    Exit status 0: it does; 1: a rover is silent; 3: no answer from a server.
+    Exit status 0: ready; 1: a rover is silent; 3: no server answers.
     """
     from mav_tasks.cli import output, words  # noqa: PLC0415
     from mav_tasks.cli.session import opened  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""``mav-tasks replay``: does a recorded run decide the same once more?"""
+"""``mav-tasks replay``: check that a recorded run decides the same again."""
 
 import sys
 from pathlib import Path
@@ -22,10 +22,10 @@ def replay(
 ) -> None:
     """Run a record through the server's code again.
 
-    Shows what happened in it.
+    Print what happened in it.
 
-    Exit code 0: all came as it is recorded, bit for bit; 1: something came otherwise; 2: the file
-    cannot be read.
+    Exit code 0: the output equals the record, bit for bit; 1: it differs; 2: the file cannot be
+    read.
     """
     from mav_tasks.key_ring.ring_file import load, path_of_ring  # noqa: PLC0415
     from mav_tasks.recording.reading import read  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Which key ring a command means, and the key that it is to sign with."""
+"""The key ring of a command, and the key that the command signs with."""
 
 import os
 from pathlib import Path
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def ring_path(asked: str) -> Path:
-    """Return the file of ``--keys``; "": that of the configuration, or the user's own."""
+    """Return the file of ``--keys``; if "", the configured key ring, or the user's own."""
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
     from mav_tasks.key_ring.ring_file import path_of_ring  # noqa: PLC0415
 
@@ -19,7 +19,7 @@ def ring_path(asked: str) -> Path:
 
 
 def key_to_sign_with(name: str, asked: str) -> "Key":
-    """Return a key by its name; KeyRingError."""
+    """Return a key by its name. Raise KeyRingError if there is none that is usable."""
     from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
 
     path = ring_path(asked)

@@ -1,4 +1,4 @@
-"""What all commands are in: how each of them ends that is cut short."""
+"""The root command group: ``--version``, and the exit status of an interrupted command."""
 
 import sys
 from typing import Annotated, Any
@@ -13,11 +13,11 @@ class Root(TyperGroup):
     """The group of all commands."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run a command."""
+        """Run a command. Raise Exit with our status after Ctrl-C or a closed pipe."""
         try:
             result = super().invoke(ctx)
-            sys.stdout.flush()  # here, where a reader that has gone is no mishap
-        except (KeyboardInterrupt, BrokenPipeError) as error:  # Typer has its own ends for them
+            sys.stdout.flush()  # here, where a closed pipe is handled
+        except (KeyboardInterrupt, BrokenPipeError) as error:  # Typer would handle them otherwise
             raise typer.Exit(exit_codes.tell(error)) from None
         return result
 
@@ -31,7 +31,7 @@ def _show_version(is_asked: bool) -> None:
 
 
 def root(
-    version: Annotated[  # its callback has it
+    version: Annotated[  # its callback uses it
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Say which this is."),
     ] = False,

@@ -1,4 +1,4 @@
-"""``mav-tasks serve``: the task server."""
+"""``mav-tasks serve``: run the task server."""
 
 import os
 import signal
@@ -109,9 +109,9 @@ def serve(
 ) -> None:
     """Run the task server.
 
-    Clients are on UDP 14560 and the rover on 14580, unless said otherwise.
+    By default clients use UDP 14560 and the rover uses 14580.
     """
-    # Of no effect yet, but not the end either: the configuration is read in a moment.
+    # Ignore SIGHUP until the configuration is read; by default it would end the process.
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
     from mav_tasks.config.reload import Reload  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""A client for one command: opened as its options say, and told what is wrong with them."""
+"""A client for one command, opened with the command's options."""
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -13,7 +13,7 @@ from mav_tasks.errors import NoAnswer, UsageError
 
 
 class Read(NamedTuple):
-    """TaskOptions as the library has them."""
+    """TaskOptions parsed for ``Client.submit``."""
 
     priority: int
     after: int
@@ -25,7 +25,7 @@ class Read(NamedTuple):
 
 
 def read(terms: TaskOptions) -> Read:
-    """Read the terms of a task; UsageError."""
+    """Return the parsed options of a task. Raise UsageError if one is invalid."""
     start = start_of(terms.start_in, terms.start_at)
     deadline = seconds_of("--deadline", terms.deadline) or 0.0
     delay = start.delay or 0.0
@@ -34,7 +34,7 @@ def read(terms: TaskOptions) -> Read:
 
 @asynccontextmanager
 async def opened(common: Common) -> AsyncIterator[Client]:
-    """Return a client that has found the server and the rovers."""
+    """Yield a client that has found the server and the rovers."""
     async with unfound(common) as client:
         await client.found()
         yield client
@@ -42,7 +42,7 @@ async def opened(common: Common) -> AsyncIterator[Client]:
 
 @asynccontextmanager
 async def unfound(common: Common) -> AsyncIterator[Client]:
-    """Return a client whose link is open, and that has heard nobody yet."""
+    """Yield a client whose link is open, without waiting for the server."""
     if common.keys and not common.sign:
         raise UsageError("--keys: say with which key, --sign NAME")
     client = Client(
@@ -55,7 +55,7 @@ async def unfound(common: Common) -> AsyncIterator[Client]:
     try:
         yield client
     except NoAnswer as error:
-        if common.sign or client.vehicles():  # else: perhaps it answers those only who sign
+        if common.sign or client.vehicles():  # else the server may answer only signed packets
             raise
         raise NoAnswer(
             f"{error} (does it want a signature? --sign NAME)", nonce=error.nonce
@@ -66,7 +66,7 @@ async def unfound(common: Common) -> AsyncIterator[Client]:
 
 @contextmanager
 def values_checked() -> Iterator[None]:
-    """Take a value that the library does not have for what it is: a mistake on the command line."""
+    """Raise UsageError for a ValueError of the library: a wrong value on the command line."""
     try:
         yield
     except ValueError as error:
@@ -74,7 +74,7 @@ def values_checked() -> Iterator[None]:
 
 
 async def find_task(client: Client, common: Common, task_id: int) -> Task:
-    """Return a task by its id alone; the server knows it whichever rover is asked."""
+    """Return a task by its id. Without --vehicle, ask any rover's server for the task's rover."""
     vehicle = common.vehicle
     if vehicle is None:
         anyone = client.vehicles()[0].id

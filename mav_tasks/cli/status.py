@@ -1,4 +1,4 @@
-"""``mav-tasks status``: how one task is."""
+"""``mav-tasks status``: show one task."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @command
 async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
-    """Show how a task is."""
+    """Show the status of a task."""
     from mav_tasks.cli import output, words  # noqa: PLC0415
     from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
 
@@ -39,7 +39,7 @@ async def _timing_of(task: "Task") -> "TaskTiming | None":
 
     try:
         return await task.timing()
-    except Refused:  # an older server does not know the question
+    except Refused:  # an older server does not support the request
         return None
 
 

@@ -1,4 +1,4 @@
-"""``mav-tasks submit``: a goal becomes a task."""
+"""``mav-tasks submit``: submit a goal as a task."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -64,7 +64,7 @@ async def drive(
     terms: TaskOptions,
     common: Common,
 ) -> None:
-    """Keep a velocity for a time."""
+    """Drive at a velocity for a time."""
     from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
     from mav_tasks.tasks.goal import Drive  # noqa: PLC0415
 
@@ -98,7 +98,7 @@ async def goto(
 ) -> None:
     """Drive to a place: metres from the rover's origin, or latitude and longitude.
 
-    Numbers that may be a latitude and a longitude need --local or --global.
+    If the numbers may be a latitude and a longitude, add --local or --global.
     """
     from mav_tasks.cli.places import parse_place  # noqa: PLC0415
     from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
@@ -129,7 +129,7 @@ async def wait(
     terms: TaskOptions,
     common: Common,
 ) -> None:
-    """Stand for a while."""
+    """Stand still for a time."""
     from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
     from mav_tasks.tasks.goal import Wait  # noqa: PLC0415
 
@@ -159,12 +159,12 @@ async def _submit(goals: "Sequence[Goal]", terms: TaskOptions, common: Common) -
 async def tell_submitted(
     client: "Client", task: "Task", common: Common, *, is_awaited: bool, hint: str = ""
 ) -> None:
-    """Say which task it is, and wait for it if that is wished."""
+    """Print the new task; follow it if ``is_awaited``."""
     from mav_tasks.cli import output  # noqa: PLC0415
 
     if not common.json:
         output.say(f"rover {task.vehicle}: task {task.id}{hint}")
-        if not is_awaited:  # who waits sees each reason when it changes
+        if not is_awaited:  # ``follow`` shows each reason
             output.warn(await _why_it_waits(client, task))
     if is_awaited:
         from mav_tasks.cli.follow import follow  # noqa: PLC0415
@@ -176,12 +176,12 @@ async def tell_submitted(
 
         try:
             output.say_json(task_json(await task.refresh()))
-        except ClientError:  # the task exists, and its number must not get lost
+        except ClientError:  # the task exists: do not lose its id
             output.say_json({"id": task.id, "vehicle": task.vehicle})
 
 
 async def _why_it_waits(client: "Client", task: "Task") -> str:
-    """Return why nothing runs, and what to do about it; "" if the task's turn comes by itself."""
+    """Return why the task does not start, and what to do; "" if it starts by itself."""
     from mav_tasks.cli import words  # noqa: PLC0415
     from mav_tasks.errors import ClientError  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""Queues, finished tasks and rovers as tables that fit a width."""
+"""Tables of queues, finished tasks and rovers, fitted to a width."""
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
@@ -15,10 +15,10 @@ from mav_tasks.cli.times import format_duration, moment_ago
 from mav_tasks.client.values import QueueStatus, TaskStatus, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskState
 
-GAP = 2  # columns between two columns
-LEAST_ROWS = 4  # below the first line, for a second one above the table
-LEAST_WORDS = 10  # columns that a column of words has at the least, if it needs them
-GOOD_WORDS = 24  # that it has before a column of numbers is added
+GAP = 2  # blanks between two columns
+LEAST_ROWS = 4  # rows below the first headline; with fewer there is no second one
+LEAST_WORDS = 10  # terminal columns that a text column gets at least, if it needs them
+GOOD_WORDS = 24  # those it gets before a number column is added
 STYLES = {
     TaskState.EXECUTING: "green",
     TaskState.STARTING: "green",
@@ -34,12 +34,12 @@ T = TypeVar("T")
 
 
 class Column(NamedTuple, Generic[T]):
-    """A column: its cells, and its place among those for which there may be no room, 0: always."""
+    """A column of a table. ``worth`` 0: always shown; the highest is dropped first."""
 
     name: str
     cell: Callable[[T], str]
     worth: int = 0
-    is_words: bool = False  # may be cut short
+    is_words: bool = False  # a text, which may be cut short
     is_right: bool = False
 
 
@@ -66,16 +66,16 @@ TASK_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def queue_table(queue: QueueStatus, *, width: int, rows: int | None = None) -> Group:
-    """Return a queue within ``width`` columns and ``rows`` lines, None: as many as it takes."""
+    """Return a queue within ``width`` columns and ``rows`` lines; None: no limit."""
     tasks = ([queue.current] if queue.current is not None else []) + list(queue.waiting)
     count = queue.waiting_count + (queue.current is not None)
     above = [words.headline_of(queue)]
     if queue.counts and (rows is None or rows >= len(above) + LEAST_ROWS):
         above.append(words.counts_of(queue))
     if rows is not None:
-        room = max(rows - len(above) - 1, 0)  # below the names of the columns
+        room = max(rows - len(above) - 1, 0)  # below the column names
         tasks = tasks[:room] if count <= room else tasks[: max(room - 1, 0)]
-    # in a window that is drawn again each line has its place; elsewhere the way on is not cut off
+    # a redrawn window cuts its lines; elsewhere they wrap, which keeps the command at the end
     parts: list[Text | Table] = [Text(text) if rows is None else _line(text) for text in above]
     if tasks:
         waits = words.waits_of(queue)
@@ -88,9 +88,9 @@ def queue_table(queue: QueueStatus, *, width: int, rows: int | None = None) -> G
 
 
 def history_table(tasks: Sequence[TaskStatus], *, now: datetime, width: int) -> Table:
-    """Return finished tasks, one a line, with the columns for which there is room.
+    """Return finished tasks, one per line, with the columns that fit.
 
-    ``now`` is of the zone in which times are shown.
+    Times are shown in the time zone of ``now``.
     """
 
     def ended(status: TaskStatus) -> str:
@@ -111,7 +111,7 @@ def history_table(tasks: Sequence[TaskStatus], *, now: datetime, width: int) -> 
 
 
 def vehicle_table(vehicles: Sequence[VehicleStatus], *, width: int) -> Table:
-    """Return rovers, one a line, with the columns for which there is room."""
+    """Return rovers, one per line, with the columns that fit."""
     return _table(VEHICLE_COLUMNS, vehicles, width, styles={})
 
 
@@ -144,7 +144,7 @@ def _table(
 def fitting(
     columns: Sequence[Column[T]], rows: Sequence[T], width: int
 ) -> list[tuple[Column[T], int]]:
-    """Return the columns for which there is room, each with its width, without the empty ones."""
+    """Return the columns that fit, each with its width, without empty columns."""
     wanted = {column.name: _width(column, rows) for column in columns}
     shown: list[Column[T]] = []
     for column in sorted(columns, key=lambda c: c.worth):

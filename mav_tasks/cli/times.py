@@ -1,4 +1,4 @@
-"""Durations and times of day as people write them. Pure; UsageError says what is wrong."""
+"""Parse and format durations and times of day. Pure."""
 
 import re
 from datetime import datetime, time, timedelta, tzinfo
@@ -7,12 +7,12 @@ from mav_tasks.errors import UsageError
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 DURATION = re.compile(rf"(?:{_NUMBER}d)?(?:{_NUMBER}h)?(?:{_NUMBER}m)?(?:{_NUMBER}s?)?", re.ASCII)
-UNITS = (86_400.0, 3600.0, 60.0, 1.0)  # s, of the four numbers
+UNITS = (86_400.0, 3600.0, 60.0, 1.0)  # s, of the four groups
 LONGEST = 366 * 86_400.0  # s
 
 
 def parse_duration(name: str, text: str) -> float:
-    """Return the seconds of "90", "30s", "5m", "1h30m" or "2d"; ``name`` is the option's."""
+    """Return the seconds of "90", "30s", "5m", "1h30m" or "2d". Raise UsageError if invalid."""
     match = DURATION.fullmatch(text.strip().lower())
     if not match or not any(match.groups()):
         raise UsageError(f"{name} {text}: expected a duration such as 30s, 5m or 1h30m")
@@ -26,9 +26,10 @@ def parse_duration(name: str, text: str) -> float:
 def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = None) -> datetime:
     """Return the moment of "2026-11-20T14:30", or the next "14:30"; ``now`` has a time zone.
 
-    Local time unless the text names a zone ("…Z", "…+01:00"); ``zone`` None: the system's.
+    Without a zone in the text ("…Z", "…+01:00") it is local time of ``zone``; None: the system's.
+    Raise UsageError if invalid, past, or more than 366 days ahead.
     """
-    # a day alone, "14" or "1430" would be read by the standard library, too: none is a clear time
+    # the standard library would also accept a date, "14" or "1430": none is clearly a time
     moment = (_next(text, now, zone) or _dated(text, zone)) if ":" in text else None
     if moment is None:
         raise UsageError(f"{name} {text}: expected a time such as 14:30 or 2026-11-20T14:30")
@@ -40,7 +41,7 @@ def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = N
 
 
 def format_duration(seconds: float) -> str:
-    """Return seconds as they can be written: "4.2s", "5m", "1h30m"."""
+    """Return a duration in the form that ``parse_duration`` reads: "4.2s", "5m", "1h30m"."""
     if seconds < UNITS[2] - 0.05:
         return f"{seconds:.1f}".removesuffix(".0") + "s"
     minutes, rest = divmod(round(seconds), 60)
@@ -51,7 +52,7 @@ def format_duration(seconds: float) -> str:
 
 
 def spoken_duration(seconds: float) -> str:
-    """Return seconds as they are read, in whole seconds and at most two units: "1 min 20 s"."""
+    """Return a duration for people, rounded to seconds, in at most two units: "1 min 20 s"."""
     minutes, rest = divmod(round(max(seconds, 0.0)), 60)
     hours, minutes = divmod(minutes, 60)
     days, hours = divmod(hours, 24)
@@ -62,7 +63,7 @@ def spoken_duration(seconds: float) -> str:
 
 
 def moment_ago(seconds: float, *, now: datetime) -> str:
-    """Return the time of day so long before ``now``, with the day if that is another one."""
+    """Return the time of day ``seconds`` before ``now``, with the date if it was another day."""
     moment = now - timedelta(seconds=seconds)
     if moment.date() == now.date():
         return moment.strftime("%H:%M:%S")

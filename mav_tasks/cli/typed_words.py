@@ -1,8 +1,8 @@
-"""A server's refusal of a number, in the words of the command line that it was typed on.
+"""Translate a server's refusal of a number into the terms of the command line.
 
-The server names a parameter of MAVLink ("param2 speed 99 not in 0.01..2"); an operator who typed
-``--speed 99`` reads the name of that option, its unit, and the setting that holds the limit. A task
-of one goal is a plan of one or a few items on the wire: their numbers are left out.
+The server names a MAVLink parameter ("param2 speed 99 not in 0.01..2"). After ``--speed 99`` the
+operator reads the option, its unit, and the setting that holds the limit. A task of one goal is a
+plan of one or a few items on the wire: the item numbers are left out.
 """
 
 import re
@@ -18,7 +18,7 @@ OUT_OF_RANGE = re.compile(r"param\d ([a-z ]+) (\S+) not in (-?[\d.e+]+)\.\.(-?[\
 
 
 class Typed(NamedTuple):
-    """Where a number was typed, its unit, and the server's setting that limits it."""
+    """The option or argument of a number, its unit, and the setting that limits it."""
 
     name: str
     unit: str = ""
@@ -42,7 +42,7 @@ TYPED = {
 
 @contextmanager
 def in_typed_words() -> Iterator[None]:
-    """Say a refusal that names a parameter in the words of the command line."""
+    """Translate the Refused errors of a block with ``typed_words``."""
     try:
         yield
     except Refused as error:
@@ -53,7 +53,7 @@ def in_typed_words() -> Iterator[None]:
 
 
 def typed_words(refusal: str) -> str | None:
-    """Return a refusal in words of the command line; None if it is about something else."""
+    """Return a refusal in terms of the command line; None if it needs no translation."""
     found = OUT_OF_RANGE.search(refusal)
     typed = None if found is None else TYPED.get(found[1])
     if found is None or typed is None:

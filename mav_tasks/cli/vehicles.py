@@ -1,10 +1,10 @@
-"""``mav-tasks vehicles``: the rovers of the server."""
+"""``mav-tasks vehicles``: show the rovers of the server."""
 
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 
-LOOK = 0.01  # s
-LOOKS = 150  # telemetry is asked for once a second
+LOOK = 0.01  # s between two checks
+LOOKS = 150  # checks, 1.5 s: telemetry arrives once a second
 
 
 @command

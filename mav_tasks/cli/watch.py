@@ -1,4 +1,4 @@
-"""Queues kept up to date: a window on a terminal, a new block for each change elsewhere."""
+"""``queue --watch``: a full-screen view on a terminal, else a new block at each change."""
 
 import asyncio
 import signal
@@ -17,12 +17,12 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.values import QueueStatus
 from mav_tasks.errors import NoAnswer
 
-PERIOD = 1.0  # s between two looks
-OLD = 2.5  # s; what is older is said to be
+PERIOD = 1.0  # s between two requests
+OLD = 2.5  # s without an answer, after which the view says so
 
 
 async def watch_queues(client: Client, common: Common, *, limit: int) -> None:
-    """Show them until the task is cancelled, also over an absence of the server."""
+    """Show queues until cancelled; keep trying if the server does not answer."""
     if common.json or not output.is_drawn_on():
         await _print_changes(client, common, limit=limit)
     else:
@@ -62,7 +62,7 @@ async def _draw(client: Client, common: Common, *, limit: int) -> None:
 
 
 async def _refresh(window: "Window") -> None:
-    """See to it that an answer's age is told while the next one does not come."""
+    """Redraw the age of the last answer while no new one arrives."""
     while True:
         await asyncio.sleep(PERIOD)
         if window.age > OLD and window.live is not None:
@@ -70,7 +70,7 @@ async def _refresh(window: "Window") -> None:
 
 
 class Window:
-    """What is on the screen: the latest queues, cut to the size that it has at that moment."""
+    """The screen: the latest queues, cut to the present size of the terminal."""
 
     def __init__(self) -> None:
         self.live: Live | None = None
@@ -84,12 +84,12 @@ class Window:
         return self._loop.time() - self._at
 
     def take(self, queues: list[QueueStatus]) -> None:
-        """Take an answer."""
+        """Store the latest queues."""
         self._queues = queues
         self._at = self._loop.time()
 
     def drawn(self) -> Group:
-        """Return the window's lines."""
+        """Return the lines of the screen."""
         if self.live is None:
             return Group()
         width, height = self.live.console.size
@@ -104,7 +104,7 @@ def _line(text: str) -> Text:
 
 
 def _essence(queue: QueueStatus) -> object:
-    """What makes a queue another one: no times, and nothing that drives on."""
+    """Return what counts as a change: no times and no progress."""
     current = queue.current and (queue.current.id, words.state_of(queue.current))
     tasks = [(t.id, t.state, t.reason, t.priority, t.after) for t in queue.waiting]
     return current, queue.running, queue.paused, dict(queue.counts), tasks

@@ -1,4 +1,4 @@
-"""What a client learns, in words and as JSON. Pure. Angles are degrees here."""
+"""Tasks, queues and rovers as text and as JSON. Pure. Angles are in degrees here."""
 
 from datetime import datetime, timedelta
 from math import degrees, inf
@@ -10,7 +10,7 @@ from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Unit, V
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
 UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}
-#: a task with one of these waits until the queue is continued
+#: reasons of tasks that wait until the queue is resumed
 UNTIL_RESUMED = (
     TaskReason.QUEUE_PAUSED,
     TaskReason.OPERATOR,
@@ -19,7 +19,7 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
-#: a task with one of these has its turn without anybody's doing
+#: reasons of waiting tasks that start without an operator's action
 COMES_BY_ITSELF = (
     TaskReason.NONE,
     TaskReason.START_TIME,
@@ -30,18 +30,18 @@ COMES_BY_ITSELF = (
 
 
 def state_of(status: TaskStatus) -> str:
-    """Return the name of its state."""
+    """Return the name of a task's state."""
     return status.state.name.lower()
 
 
 def what_of(status: TaskStatus) -> str:
-    """Return what it is about: "move 2 m"."""
+    """Return what a task does: "move 2 m"."""
     what, colon, _ = status.words.partition(" '" if status.label else ": ")
     return what if colon else f"command {status.command}"
 
 
 def why_of(status: TaskStatus) -> str:
-    """Return why a task is in its state, with the rover's own words; "" if there is no reason."""
+    """Return why a task is in its state, with the rover's text; "" if there is no reason."""
     if not status.reason:
         return ""
     why = words_of(status.reason)
@@ -50,7 +50,7 @@ def why_of(status: TaskStatus) -> str:
 
 
 def waits_of(queue: QueueStatus) -> dict[int, str]:
-    """Return why each waiting task of a queue waits, by the task's id: "behind task 4"."""
+    """Return why each task of a queue waits, by its id: "behind task 4"."""
     waits: dict[int, str] = {}
     before = None if queue.current is None else queue.current.id
     for status in queue.waiting:
@@ -67,28 +67,28 @@ def waits_of(queue: QueueStatus) -> dict[int, str]:
 
 
 def time_of(seconds: float | None) -> str:
-    """Return an expected time from now; None: "unknown"."""
+    """Return an expected duration as text; "unknown" for None."""
     return "unknown" if seconds is None else spoken_duration(seconds)
 
 
 def starts_of(status: TaskStatus) -> str:
-    """Return in how long a task starts that waits."""
+    """Return the time until a waiting task starts; "" for other tasks."""
     return time_of(status.time_to_start) if status.is_waiting else ""
 
 
 def ends_of(status: TaskStatus) -> str:
-    """Return in how long a task ends that is not over."""
+    """Return the time until a task ends; "" if it has ended."""
     return "" if status.is_over else time_of(status.time_to_finish)
 
 
 def took_of(status: TaskStatus) -> str:
-    """Return how long a task was driven; "" if it was not."""
+    """Return how long a task was driven; "" if it was not driven."""
     return format_duration(status.execution_time) if status.execution_time else ""
 
 
 def way_on_of(status: TaskStatus) -> str:
-    """Return what lets it go on, nothing if that is not for the operator to say."""
-    is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released, and waits to begin
+    """Return the operator's command that continues a task; "" if there is none."""
+    is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released already, waits to start
     if status.state is TaskState.HELD and not is_decided:
         return f"decide: mav-tasks release {status.id} again|remainder|skip"
     return "to go on: mav-tasks resume" if status.reason in UNTIL_RESUMED else ""
@@ -105,18 +105,18 @@ def line_of(status: TaskStatus) -> str:
 
 
 def name_of(status: TaskStatus) -> str:
-    """Return by what people know a task: "rover 1: task 3"."""
+    """Return the name of a task: "rover 1: task 3"."""
     return f"rover {status.vehicle}: task {status.id}"
 
 
 def end_of(status: TaskStatus) -> str:
-    """Return why a task is in its state, unless the state says that: "cancelled: cancelled"."""
+    """Return why a task is in its state; "" if it repeats the state ("cancelled: cancelled")."""
     why = why_of(status)
     return "" if why == state_of(status) else why
 
 
 def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
-    """Return why a new task does not run, and what to do; "" if its turn comes by itself."""
+    """Return why a new task does not start, and what to do; "" if it starts by itself."""
     if not status.is_waiting or status.reason in COMES_BY_ITSELF:
         return ""
     why, way_on = why_of(status), way_on_of(status)
@@ -131,7 +131,7 @@ def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
 
 
 def percent_of(status: TaskStatus) -> str:
-    """Return how much of a task is done."""
+    """Return how much of a task is done, in percent."""
     if status.progress is None:
         return ""
     percent = f"{status.progress * 100:.0f} %"
@@ -139,7 +139,7 @@ def percent_of(status: TaskStatus) -> str:
 
 
 def left_of(status: TaskStatus) -> str:
-    """Return what is left of a task: "1.10 m"."""
+    """Return the remainder of a task: "1.10 m"."""
     amount, unit = left(status)
     if amount is None or unit is None or status.is_over:
         return ""
@@ -149,12 +149,12 @@ def left_of(status: TaskStatus) -> str:
 
 
 def is_of_last_save(status: TaskStatus) -> bool:
-    """Return whether a task was driven on after its progress was saved, by a server that died."""
+    """Return whether the progress is a last save: the server died while it drove the task."""
     return status.state is TaskState.HELD and status.reason is TaskReason.OUTCOME_UNKNOWN
 
 
 def left(status: TaskStatus) -> tuple[float | None, str | None]:
-    """Return what is left of it as a number and its unit."""
+    """Return the remainder of a task as a number and its unit."""
     if status.remaining is None or status.unit is Unit.NONE:
         return None, None
     is_angle = status.unit is Unit.RADIANS
@@ -162,7 +162,7 @@ def left(status: TaskStatus) -> tuple[float | None, str | None]:
 
 
 def silence_of(heartbeat_age: float | None) -> str:
-    """Return how long a rover has been silent; "" if it is heard, or nobody knows."""
+    """Return how long a rover has been silent; "" if it is heard, or if that is unknown."""
     if heartbeat_age is None or heartbeat_age <= SILENT_AFTER:
         return ""
     if heartbeat_age == inf:
@@ -171,7 +171,7 @@ def silence_of(heartbeat_age: float | None) -> str:
 
 
 def headline_of(queue: QueueStatus) -> str:
-    """Return what a rover does, and what is in the way."""
+    """Return what a rover does, and what blocks its queue."""
     if queue.current is not None:
         does = f"task {queue.current.id} {state_of(queue.current)}"
         does += f" ({why_of(queue.current)})" if queue.current.reason else ""
@@ -189,12 +189,12 @@ def headline_of(queue: QueueStatus) -> str:
 
 
 def counts_of(queue: QueueStatus) -> str:
-    """Return how many tasks are in which state."""
+    """Return the number of tasks in each state."""
     return ", ".join(f"{count} {state.name.lower()}" for state, count in queue.counts.items())
 
 
 def history_json(status: TaskStatus, *, now: datetime) -> dict[str, Any]:
-    """Return a finished task as JSON has it."""
+    """Return a finished task as JSON, with the time of its end."""
     ago = status.ended_ago
     ended_at = None if ago is None else now - timedelta(seconds=ago)
     return task_json(status) | {
@@ -205,7 +205,7 @@ def history_json(status: TaskStatus, *, now: datetime) -> dict[str, Any]:
 
 
 def task_json(status: TaskStatus) -> dict[str, Any]:
-    """Return a task as JSON has it; what is not known is null."""
+    """Return a task as JSON; unknown values are null."""
     amount, unit = left(status)
     return {
         "id": status.id,
@@ -233,7 +233,7 @@ def task_json(status: TaskStatus) -> dict[str, Any]:
 
 
 def timing_of(timing: TaskTiming | None) -> str:
-    """Return how evenly its setpoints left, nothing if there were none."""
+    """Return how evenly a task's setpoints left; "" if there were none."""
     if timing is None or timing.p50 is None or timing.p99 is None or timing.max is None:
         return ""
     return (
@@ -243,7 +243,7 @@ def timing_of(timing: TaskTiming | None) -> str:
 
 
 def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
-    """Return it as JSON has it, in seconds; null: nothing is known of it."""
+    """Return the timing as JSON, in seconds; null if it is unknown."""
     if timing is None:
         return None
     return {
@@ -257,7 +257,7 @@ def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
 
 
 def queue_json(queue: QueueStatus) -> dict[str, Any]:
-    """Return a queue as JSON has it."""
+    """Return a queue as JSON."""
     waits = waits_of(queue)
     return {
         "vehicle": queue.vehicle,
@@ -275,7 +275,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
 
 
 def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
-    """Return a rover as JSON has it."""
+    """Return a rover as JSON."""
     heading = None if vehicle.yaw is None else round(degrees(vehicle.yaw), 4) % 360.0
     return {
         "vehicle": vehicle.id,
@@ -293,10 +293,10 @@ def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
 
 
 def _age(heartbeat_age: float | None) -> float | None:
-    """Return an age as JSON has it: null for one that never came, too."""
+    """Return an age for JSON: null also if there was no heartbeat."""
     return None if heartbeat_age in (None, inf) else _rounded(heartbeat_age)
 
 
 def _rounded(value: float | None) -> float | None:
-    """Return a number without the digits that a float of 32 bits only seems to have."""
+    """Return a number rounded to 4 decimals, without the noise of a float32."""
     return None if value is None else round(value, 4)

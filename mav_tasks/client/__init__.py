@@ -1,1 +1,1 @@
-"""The client library: tasks for rovers from a script. What is public is in ``mav_tasks`` itself."""
+"""The client library: submit tasks from a script. Its public names are in ``mav_tasks``."""

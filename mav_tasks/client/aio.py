@@ -1,4 +1,4 @@
-"""The client library for asyncio. No polling: what the server tells wakes who waits for it."""
+"""The asyncio client. Messages of the server wake the coroutines that await them: no polling."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
@@ -53,34 +53,34 @@ from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 DEFAULT_LINK = "udpout:127.0.0.1:14560"
-#: not a ground station's (255), so that two on one link are told apart
+#: not 255, so that a ground station and a script on one link differ
 SCRIPT = Address(244, 190)
 FIND_WITHIN = 5.0  # s
-STOP_AGAIN = 0.1  # s
+STOP_AGAIN = 0.1  # s between copies of a STOP
 STOP_WITHIN = 3.0  # s
 KILL = 1.0  # param2 of TASK_CANCEL
 RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
-EPOCHS = 1 << 24  # that a float32 tells apart
-PAGE = 16  # tasks that one request shows
+EPOCHS = 1 << 24  # integers that a float32 holds exactly
+PAGE = 16  # tasks that one request returns
 NO_HISTORY = "the server does not list finished tasks: it is older than this client"
 OVERTAKEN = "a STOP has overtaken this: ask for it again if it is still meant"
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
 
 
 class Client:
-    """A connection to a task server, and through it to its rovers.
+    """A connection to a task server and, through the server, to its rovers.
 
-    ``link`` is the server's, as a URL (``udpout:host:port``, ``tcp:host:port``,
-    ``serial:device:baud``, ``udpin:host:port`` where the server pushes) or an open Link.
-    ``vehicle`` is the system id of the rover that is meant where none is named; it can be left out
-    where there is only one. ``timeout`` in seconds: until a server and a rover are found.
+    ``link`` is a URL of the server (``udpout:host:port``, ``tcp:host:port``,
+    ``serial:device:baud``, or ``udpin:host:port`` if the server pushes), or an open Link.
+    ``vehicle`` is the system id of the default rover; it can be left out if there is only one.
+    ``timeout``: seconds to wait for a server and a rover.
 
-    With a ``key``, of 32 bytes, all that is sent is signed (MAVLink 2), and nothing is believed
-    that the server has not signed with it. ``link_id`` 0 to 255 goes into the signatures; by chance
-    if it is None. ValueError if the key is none.
+    With a ``key`` of 32 bytes the client signs all packets (MAVLink 2) and drops packets that the
+    server has not signed with this key. ``link_id``, 0 to 255, goes into the signatures; None: a
+    random one. Raise ValueError if the key is invalid.
 
-    Every method may raise NoAnswer, Refused and NoSuchVehicle. All of it belongs to the loop on
-    which it was opened.
+    Every method may raise NoAnswer, Refused and NoSuchVehicle. Use a client only on the event loop
+    on which it was opened.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Client:
         self._served = asyncio.Event()
         self._tasks: WeakValueDictionary[Followed, Task] = WeakValueDictionary()
         self._submissions = Submissions()
-        self._halts = 0  # STOPs and pauses that were asked for here
+        self._halts = 0  # STOPs and pauses that this client requested
 
     def __repr__(self) -> str:
         return f"Client({self._link}, {'closed' if self._connection is None else 'open'})"
@@ -129,7 +129,7 @@ class Client:
         await self.close()
 
     def open(self) -> None:
-        """Open the link, and wait for nothing. LinkUrlError, LinkOpenError."""
+        """Open the link without waiting. Raise LinkUrlError or LinkOpenError if that fails."""
         if self._connection is not None:
             raise MavTasksError(f"{self!r}: it is open already")
         connection = Connection(
@@ -143,7 +143,10 @@ class Client:
         self._connection, self._asker = connection, Asker(connection)
 
     async def found(self) -> None:
-        """Wait until a task server has answered, of each rover that is heard."""
+        """Wait until the task server of the default rover, or of each rover heard, has answered.
+
+        Raise NoAnswer after ``timeout``; without a default rover only if none has answered.
+        """
         session = self._open.session
         try:
             async with asyncio.timeout(self._timeout):
@@ -161,7 +164,7 @@ class Client:
             raise NoAnswer(words) from None
 
     async def close(self) -> None:
-        """Close the link. Tasks go on: the server has them."""
+        """Close the link. The server continues the tasks."""
         connection, self._connection = self._connection, None
         asker, self._asker = self._asker, None
         if connection is not None:
@@ -170,7 +173,7 @@ class Client:
             asker.close()
         for task in list(self._tasks.values()):
             task.close()
-        self._served.set()  # for who still waits to find one
+        self._served.set()  # wakes ``found``
 
     # tasks
 
@@ -187,14 +190,14 @@ class Client:
         nonce: int = 0,
         label: str = "",
     ) -> Task:
-        """Have a goal driven, or several in their order as one task; returns once it is durable.
+        """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
-        ``priority`` 0 to 10, 10 runs first. ``after`` names a task that must complete first.
-        ``delay`` in seconds is waited before it runs, ``deadline`` in seconds is when it must have
-        begun (0: neither); ``at`` is a start at a time of day, with its time zone. It is sent until
-        it is answered, and is one task however often it arrives: ``nonce`` (1 to 1,065,353,215, 0:
-        one by chance) is its mark, for a second try after NoAnswer. ``label`` is a name of up to 24
-        bytes, shown wherever the task is.
+        ``priority``: 0 to 10, 10 runs first. ``after``: a task that must complete first. The task
+        starts no earlier than in ``delay`` seconds, and expires if it has not started within
+        ``deadline`` seconds (0: neither). ``at``: start time, with a time zone. The client repeats
+        the submission until it is answered; the server creates one task per ``nonce`` (1 to
+        1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
+        ``label``: a name of up to 24 bytes, shown with the task.
         """
         check_label(label)
         system_id = self._which(vehicle)
@@ -214,7 +217,7 @@ class Client:
         return task
 
     async def task(self, task_id: int, *, vehicle: int | None = None) -> Task:
-        """Return the handle of a task that is there, whoever submitted it. Refused (NOT_FOUND)."""
+        """Return the handle of any client's task. Raise Refused (NOT_FOUND) for an unknown id."""
         system_id = self._which(vehicle)
         followed = self._open.session.follow(task_id, system_id, nonce=None, now=self._now)
         task = self._handle(followed)
@@ -222,26 +225,26 @@ class Client:
         return task
 
     async def status(self, task_id: int, *, vehicle: int | None = None) -> TaskStatus:
-        """Ask how a task is. Refused (NOT_FOUND) if there is none of this id."""
+        """Return the status of a task. Raise Refused (NOT_FOUND) if there is no task of this id."""
         return await self._ask.status(task_id, self._which(vehicle))
 
     async def timing(self, task_id: int | None = None, *, vehicle: int | None = None) -> TaskTiming:
-        """Ask how evenly the setpoints of a task left, or those of the running one.
+        """Return how evenly the setpoints of a task left; None: of the running task.
 
-        Refused (NOT_FOUND) if there is none of this id, or none runs.
+        Raise Refused (NOT_FOUND) if there is no task of this id, or no task is running.
         """
         return await self._ask.timing(task_id or 0, self._which(vehicle))
 
     async def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Call a task off, or the running one; gives its id. Refused if there is none."""
+        """Cancel a task, None: the running one. Return its id. Raise Refused if there is none."""
         return await self._cancel(task_id, 0.0, vehicle)
 
     async def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """The same, and the rover is put into HOLD at once."""
+        """Cancel a task and put the rover into HOLD at once. Return the task's id."""
         return await self._cancel(task_id, KILL, vehicle)
 
     async def clear(self, *, running_too: bool = False, vehicle: int | None = None) -> None:
-        """Call off every task that waits, or all of them."""
+        """Cancel all waiting tasks; ``running_too``: the running one, too."""
         await self._control(vehicle, MavCmd.TASK_CLEAR, 1.0 if running_too else 0.0)
 
     async def modify(
@@ -258,10 +261,10 @@ class Client:
         label: str | None = None,
         vehicle: int | None = None,
     ) -> None:
-        """Change a task that is not over; what is None stays as it is.
+        """Change a task that has not ended; an argument of None changes nothing.
 
-        Times in seconds from now. ``preemptible``: others may interrupt it; ``preemptive``: it may
-        interrupt others.
+        Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
+        it may interrupt other tasks.
         """
         changes: list[tuple[TaskProperty, float]] = []
         named: tuple[tuple[TaskProperty, float | None], ...] = (
@@ -290,9 +293,10 @@ class Client:
         epoch: int | None = None,
         vehicle: int | None = None,
     ) -> int:
-        """Decide about a held task, None: the held one; gives its id. ``epoch`` as of ``resume``.
+        """Release a held task, None: the held one. Return its id.
 
-        While the queue is paused the task goes on when that is resumed.
+        "again" restarts the task here, "remainder" finishes it, "skip" drops it. ``epoch`` as in
+        ``resume``. If the queue is paused, the task continues on resume.
         """
         if how not in RELEASES:
             raise ValueError(f"{how!r}: expected one of {', '.join(RELEASES)}")
@@ -303,7 +307,7 @@ class Client:
     # the queue and the rovers
 
     async def queue(self, *, vehicle: int | None = None, limit: int = 100) -> QueueStatus:
-        """Ask what a rover does and what waits, of that up to ``limit`` tasks."""
+        """Return the running task of a rover and up to ``limit`` of its waiting tasks."""
         system_id = self._which(vehicle)
         overview = await self._ask.overview(system_id)
         running = overview.running_id
@@ -312,7 +316,7 @@ class Client:
             try:
                 current = await self.status(running, vehicle=system_id)
             except Refused:
-                current = None  # over, and forgotten, in between
+                current = None  # it ended meanwhile, and the server forgot it
         waiting = sum(overview.counts[state] for state in WAITING)
         begun = sum(overview.counts[state] for state in ACTIVE)
         tasks: dict[int, TaskStatus] = {}
@@ -325,10 +329,9 @@ class Client:
     async def history(
         self, *, vehicle: int | None = None, limit: int = 20
     ) -> tuple[TaskStatus, ...]:
-        """Ask for the tasks of a rover that are over, newest first, up to ``limit``.
+        """Return up to ``limit`` finished tasks of a rover, newest first.
 
-        ``ended_ago`` of each says when it ended. Raise Refused if the server is too old to list
-        them.
+        ``ended_ago`` says when each ended. Raise Refused if the server is too old to list them.
         """
         system_id = self._which(vehicle)
         overview = await self._ask.overview(system_id)
@@ -345,11 +348,11 @@ class Client:
     async def stop(
         self, *, clear: bool = False, vehicle: int | None = None, within: float = STOP_WITHIN
     ) -> None:
-        """Stop every rover, or the one named, at once; nothing runs until ``resume``.
+        """Stop all rovers, or only ``vehicle``, at once; no task runs until ``resume``.
 
-        ``clear``: what waits is called off, too. It need not be found before: this is sent on any
-        open link, ten times a second until it is answered, for ``within`` seconds. Refused
-        (VEHICLE_SILENT) means that it stays in force, and reaches the rover when it is heard again.
+        This ignores the client's default rover, and needs no ``found``. ``clear`` also cancels the
+        waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds.
+        After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
         """
         self._halts += 1
         command = m.CommandLong(
@@ -366,32 +369,32 @@ class Client:
         await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
 
     async def pause(self, *, vehicle: int | None = None) -> None:
-        """Stop the rover where it is, so that its task can go on."""
+        """Stop the rover; its task can continue from there."""
         self._halts += 1
         await self._control(vehicle, MavCmd.DO_PAUSE_CONTINUE, 0.0, is_urgent=True)
 
     async def resume(self, *, epoch: int | None = None, vehicle: int | None = None) -> None:
-        """Go on after a pause, a STOP or a takeover. Refused says what is in the way.
+        """Resume after a pause, a STOP or a takeover. Raise Refused, with the reason, if blocked.
 
-        ``epoch`` is the ``halt_epoch`` of the status that you have seen, None: of now. Whatever
-        makes the rover stand after that is not undone: Refused (STALE), however long this took.
+        ``epoch`` is the ``halt_epoch`` of the status that you have seen, None: the present one. If
+        anything has halted the rover since then, raise Refused (STALE), however late this arrives.
         """
         seen = await self._seen(vehicle, epoch)
         await self._control(vehicle, MavCmd.DO_PAUSE_CONTINUE, RESUME, seen)
 
     @property
     def vehicle(self) -> int:
-        """The rover that is meant where a call names none. Raise NoSuchVehicle if it is not there,
-        or if there are several and ``vehicle`` was not given.
+        """The default rover. Raise NoSuchVehicle if the server does not have it, or if there is no
+        default and not exactly one rover.
         """
         return self._which(None)
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
-        """Return the rovers of the server, as they were heard last."""
+        """Return the last known state of the server's rovers."""
         return self._open.session.vehicles(now=self._now)
 
     async def texts(self) -> AsyncIterator[Text]:
-        """Yield the texts that rovers and task servers say from now on."""
+        """Yield each STATUSTEXT of rovers and task servers from now on."""
         with self._ask.hearing() as heard:
             while True:
                 text = await heard.get()
@@ -416,7 +419,7 @@ class Client:
     ) -> Task:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
-        PlanFileError says what is wrong with a file. Terms as those of ``submit``.
+        Raise PlanFileError if a file is invalid. Other arguments as in ``submit``.
         """
         check_label(label)
         system_id = self._which(vehicle)
@@ -429,9 +432,9 @@ class Client:
         return task
 
     async def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> Task:
-        """Upload a mission to the autopilot's own place, where it waits until it is started.
+        """Stage a mission: upload it to the autopilot's address, to wait for ``start_mission``.
 
-        It takes the place of the one that waits there.
+        It replaces the mission staged before.
         """
         system_id = self._which(vehicle)
         items = items_of(plan)
@@ -440,34 +443,34 @@ class Client:
         return await self._submit_plan(items, system_id, None, component=AUTOPILOT)
 
     async def start_mission(self, *, epoch: int | None = None, vehicle: int | None = None) -> Task:
-        """Start the mission that waits there, or the last one again, as another task.
+        """Start the staged mission, or the last one again, as a new task.
 
-        ``epoch`` as of ``resume``.
+        ``epoch`` as in ``resume``.
         """
         seen = await self._seen(vehicle, epoch)
         task_id = await self._control(vehicle, MavCmd.MISSION_START, 0.0, 0.0, seen)
         return await self.task(task_id, vehicle=self._which(vehicle))
 
     async def mission(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
-        """Fetch the mission from the autopilot's place, as it was uploaded."""
+        """Return the staged mission, as it was uploaded."""
         return await self._ask.download(self._autopilot(vehicle), MavMissionType.MISSION)
 
     async def mission_file(self, *, vehicle: int | None = None) -> PlanFile:
-        """Fetch the mission as ``write_plan`` takes it; home, if it came along, is apart."""
+        """Return the staged mission for ``write_plan``; a home item becomes ``PlanFile.home``."""
         has_home_item = self._has_home_item(self._which(vehicle))
         items = wire.file_items(await self.mission(vehicle=vehicle))
         return plan_files.mission_of(items, has_home_item=has_home_item)
 
     async def fence_file(self, *, vehicle: int | None = None) -> PlanFile:
-        """Fetch the fence as ``write_plan`` takes it. PlanFileError if a file cannot hold it."""
+        """Return the fence for ``write_plan``. Raise PlanFileError if a file cannot hold it."""
         return plan_files.fence_of(wire.file_items(await self.fence(vehicle=vehicle)))
 
     async def fence(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
-        """Fetch the fence."""
+        """Return the items of the fence."""
         return await self._ask.download(self._autopilot(vehicle), MavMissionType.FENCE)
 
     async def set_fence(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
-        """Upload the fence of a .plan file, which may be empty; gives the number of its items."""
+        """Upload the fence of a .plan file, which may be empty. Return the number of items."""
         items = wire.items_of_file(fence_items(file_of(plan)))
         await self._ask.upload(self._autopilot(vehicle), items, MavMissionType.FENCE)
         return len(items)
@@ -475,7 +478,7 @@ class Client:
     async def set_rally_points(
         self, plan: PlanFile | Path | str, *, vehicle: int | None = None
     ) -> int:
-        """Upload the rally points of a .plan file; gives their number."""
+        """Upload the rally points of a .plan file. Return their number."""
         items = wire.items_of_file(rally_items(file_of(plan)))
         await self._ask.upload(self._autopilot(vehicle), items, MavMissionType.RALLY)
         return len(items)
@@ -483,13 +486,13 @@ class Client:
     # for handles
 
     def rearm(self) -> None:
-        """What somebody waits for has changed: see to the timer."""
+        """Set the timer again: the listeners have changed."""
         if self._connection is not None:
             self._connection.turn()
 
     @contextmanager
     def streaming(self, vehicle: int, interval: float) -> Iterator[None]:
-        """Have a rover's active task told each so many seconds, for as long as this is open."""
+        """Stream the status of a rover's active task every ``interval`` s while this is open."""
         watch = self._open.session.watch
         wished = watch.open_stream(vehicle, interval)
         self._set_stream(vehicle, wished)
@@ -500,7 +503,7 @@ class Client:
             if self._connection is not None:
                 self._set_stream(vehicle, left)
 
-    # inside
+    # internal
 
     @property
     def _open(self) -> Connection:
@@ -510,7 +513,7 @@ class Client:
 
     @property
     def _ask(self) -> Asker:
-        self._open  # noqa: B018  # says so if it is not
+        self._open  # noqa: B018  # raises if the client is closed
         assert self._asker is not None, "opened and closed with the connection"
         return self._asker
 
@@ -525,7 +528,7 @@ class Client:
         return Address(self._which(vehicle), AUTOPILOT)
 
     def _has_home_item(self, vehicle: int) -> bool:
-        """Return whether the first item of a mission is home there. NoAnswer if nobody knows."""
+        """Return whether a rover's missions begin with home. Raise NoAnswer if not known."""
         view = self._open.session.fleet.get(vehicle)
         if view is None or not view.is_known:
             words = f"rover {vehicle} is silent: whether its missions begin with home is not known"
@@ -546,16 +549,16 @@ class Client:
         is_urgent: bool = False,
         fits: Callable[[m.CommandAck], bool] = lambda _ack: True,
     ) -> int:
-        # An unused parameter marks each call as one of its own: the server takes an equal command
-        # that follows within 2.5 s for a copy, and so a resume before a STOP for the one after it.
+        # A nonce in an unused parameter makes each call distinct. The server takes an equal command
+        # within 2.5 s for a copy: without nonces, also a resume after a STOP for one before it.
         filled = (*params, *(0.0,) * (6 - len(params)), to_param(self._submissions.nonce()))
         message = m.CommandLong(self._which(vehicle), AUTOPILOT, command, 0, *filled)
         return await self._ask.ask(message, command.name, is_urgent=is_urgent, fits=fits)
 
     async def _seen(self, vehicle: int | None, epoch: int | None) -> float:
-        """Return what names an epoch in a command; None: the present one.
+        """Return the command parameter for an epoch; None: the present one.
 
-        Raise ClientError if this client itself has asked for a STOP or a pause since.
+        Raise ClientError if this client requests a STOP or a pause meanwhile.
         """
         if epoch is None:
             halts = self._halts
@@ -565,7 +568,7 @@ class Client:
         return float(epoch % EPOCHS)
 
     async def _cancel(self, task_id: int | None, how: float, vehicle: int | None) -> int:
-        if task_id is None:  # by its id: a command that is repeated must not call off the next one
+        if task_id is None:  # look up its id: a repeated command must not cancel the next task
             task_id = (await self._ask.overview(self._which(vehicle))).running_id
             if not task_id:
                 words = "no task is running"
@@ -594,7 +597,7 @@ class Client:
         *,
         vehicle: int | None,
     ) -> None:
-        """Change a property whose value a float cannot hold."""
+        """Change a property whose value a float32 cannot hold exactly."""
         system_id, mark = self._which(vehicle), to_param(self._submissions.nonce())
         first = to_param(task_id), float(name), value, nan
         command = m.CommandInt(
@@ -643,19 +646,19 @@ class Client:
             await task.modify(deadline=deadline)
         except Refused as refused:
             if refused.reason != TaskReason.WRONG_STATE:
-                raise  # else it is over already, and so has begun in time
+                raise  # else it has started in time already
 
     async def _set_label(self, task: Task, label: str) -> None:
         try:
             await task.modify(label=label)
         except Refused as refused:
             if refused.reason != TaskReason.WRONG_STATE:
-                raise  # else it is over already
+                raise  # else it has ended already
 
     async def _complete(
         self, task: Task, *, deadline: float, at: datetime | None, label: str, nonce: int
     ) -> None:
-        """Return a task that is there what its submission could not carry."""
+        """Set the properties that the submission could not carry."""
         try:
             if deadline:
                 await self._set_deadline(task, deadline)
@@ -663,7 +666,7 @@ class Client:
                 await task.modify(at=at)
             if label:
                 await self._set_label(task, label)
-        except NoAnswer as error:  # the task is there: submitted again it must not be another one
+        except NoAnswer as error:  # the task exists: a second try needs its nonce
             raise NoAnswer(str(error), nonce=nonce) from None
 
     def _submitted_as(self, task_id: int, vehicle: int, nonce: int) -> Task:
@@ -672,7 +675,7 @@ class Client:
         followed = session.follow(task_id, vehicle, nonce=nonce, now=self._now)
         session.watch.shed(self._tasks.__contains__)
         if followed.status is None:
-            session.ask_about(followed, now=self._now)  # and have its changes told from now on
+            session.ask_about(followed, now=self._now)  # its changes are sent from now on
             self.rearm()
         return self._handle(followed)
 
@@ -680,7 +683,7 @@ class Client:
         self._open.session.set_stream(vehicle, interval, now=self._now)
         self.rearm()
 
-    # what the session tells
+    # session callbacks
 
     def _on_news(self, followed: Followed) -> None:
         task = self._tasks.get(followed)

@@ -1,4 +1,4 @@
-"""Questions to task servers, as things to await. Refused and NoAnswer say what came of them."""
+"""Awaitable requests to task servers: each returns its answer, or raises Refused or NoAnswer."""
 
 import asyncio
 from collections.abc import Callable, Container, Iterator
@@ -22,14 +22,14 @@ T = TypeVar("T")
 
 ANSWER_WITHIN = 10.0  # s
 PAGE_TRIES = 6
-PAGE_WITHIN = 0.3  # s after its ack, in which the rest of a page comes
-FINISHED = 1.0  # param4 of REQUEST_MESSAGE: tasks that are over
-LATER = 1.0  # s, after which what was one request too many is sent again
-MOST_HEARD = 1000  # texts that wait to be read
+PAGE_WITHIN = 0.3  # s to wait for the rest of a page after its ack
+FINISHED = 1.0  # param4 of REQUEST_MESSAGE: finished tasks
+LATER = 1.0  # s until a rate-limited request is sent again
+MOST_HEARD = 1000  # unread texts; later ones are dropped
 
 
 class Asker:
-    """What is asked on one connection, until it is answered."""
+    """The unanswered requests of one connection."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
@@ -49,7 +49,7 @@ class Asker:
         return f"Asker({self._connection!r}, {len(self._pending)} pending)"
 
     def close(self) -> None:
-        """Tell who still waits that nothing will come."""
+        """End the pending requests with ClientError, and the queues of texts."""
         for future in self._pending:
             if not future.done():
                 future.set_exception(ClientError("the client was closed"))
@@ -70,10 +70,10 @@ class Asker:
         is_told_apart: bool = False,
         is_urgent: bool = False,
     ) -> int:
-        """Send a command until it is answered; gives the answer's result_param2.
+        """Send a command until it is answered. Return the result_param2 of its ack.
 
-        Who stops waiting has it sent no more. One that was one too many is asked again after a
-        while. See Call for the rest.
+        Cancelling the await stops the repeats. A rate-limited command is sent again after LATER
+        seconds. See Call for the other arguments.
         """
         loop = asyncio.get_running_loop()
         end, refused, left = loop.time() + within, None, within
@@ -94,7 +94,7 @@ class Asker:
                     raise
                 refused = error
             except NoAnswer:
-                if refused is not None:  # it may have ended since: why it did not is known
+                if refused is not None:  # the refusal says more than a time-out
                     raise refused from None
                 raise
             await asyncio.sleep(LATER)
@@ -132,13 +132,13 @@ class Asker:
                 self._connection.settle(call, is_answered=False)
 
     def call_off(self, is_meant: Callable[[Command], bool], why: str) -> None:
-        """Have commands that are still unanswered sent no more, and tell who waits for them."""
+        """Stop sending the unanswered commands that match; their callers get ClientError(why)."""
         for future, command in self._asked.items():
             if is_meant(command) and not future.done():
                 future.set_exception(ClientError(why))
 
     async def status(self, task_id: int, vehicle: int) -> TaskStatus:
-        """Ask how a task is."""
+        """Return the status of a task."""
         request = request_message(vehicle, m.TaskStatus.id, to_param(task_id))
         with self._future(TaskStatus) as future:
 
@@ -150,7 +150,7 @@ class Asker:
                 return await self._shown(future, request, f"task {task_id}")
 
     async def timing(self, task_id: int, vehicle: int) -> TaskTiming:
-        """Ask how evenly the setpoints of a task left; 0: of the running one."""
+        """Return how evenly the setpoints of a task left; 0: of the running task."""
         request = request_message(vehicle, m.TaskTiming.id, to_param(task_id))
         with self._future(TaskTiming) as future:
 
@@ -164,7 +164,7 @@ class Asker:
                 return await self._shown(future, request, what)
 
     async def overview(self, vehicle: int) -> m.TaskQueueStatus:
-        """Ask for a queue as a whole."""
+        """Return the TASK_QUEUE_STATUS of a rover."""
         request = request_message(vehicle, m.TaskQueueStatus.id)
         with self._future(m.TaskQueueStatus) as future:
 
@@ -178,13 +178,13 @@ class Asker:
     async def page(
         self, vehicle: int, first: int, count: int, *, begun: int, known: Container[int]
     ) -> list[TaskStatus]:
-        """Ask for waiting tasks by their place; if some are lost on the way, again.
+        """Return ``count`` waiting tasks, from place ``first`` on. Ask again if some are lost.
 
-        ``begun`` is how many tasks have begun: a position counts them, the place in the queue does
-        not. ``known`` are those of earlier pages, which may still come.
+        ``begun`` is the number of active tasks: a task's position counts them, its place in the
+        queue does not. ``known`` are the ids of earlier pages, whose statuses may still arrive.
         """
         found: dict[int, TaskStatus] = {}
-        # any number of them may end meanwhile, and one may begin
+        # meanwhile any of the active tasks may end, and one task may start
         positions = range(first, first + count + begun + 1)
         whole = asyncio.Event()
 
@@ -204,16 +204,16 @@ class Asker:
     async def finished(
         self, vehicle: int, first: int, count: int, *, known: Container[int]
     ) -> list[TaskStatus]:
-        """Ask for tasks that are over, newest first; if some are lost on the way, again.
+        """Return ``count`` finished tasks, newest first. Ask again if some are lost.
 
-        ``known`` are those of earlier pages, which may still come.
+        ``known`` are the ids of earlier pages, whose statuses may still arrive.
         """
-        found: dict[int, tuple[float, TaskStatus]] = {}  # with when it ended
+        found: dict[int, tuple[float, TaskStatus]] = {}  # with its end time
         whole, loop = asyncio.Event(), asyncio.get_running_loop()
 
         def take(status: TaskStatus) -> None:
             if status.vehicle != vehicle or status.ended_ago is None or status.id in known:
-                return  # without its age it is no answer to a question, but news
+                return  # without ``ended_ago`` it is a change notification, not an answer
             found.setdefault(status.id, (loop.time() - status.ended_ago, status))
             if len(found) >= count:
                 whole.set()
@@ -233,7 +233,7 @@ class Asker:
         with _added(self._statuses, take):
             for _ in range(PAGE_TRIES):
                 await self.ask(request, f"the tasks of rover {vehicle}", is_told_apart=True)
-                with suppress(TimeoutError):  # the ack may overtake what it announces
+                with suppress(TimeoutError):  # the ack may arrive before the statuses
                     async with asyncio.timeout(PAGE_WITHIN):
                         await whole.wait()
                 if whole.is_set():
@@ -242,7 +242,7 @@ class Asker:
     async def upload(
         self, target: Address, items: tuple[Item, ...], kind: MavMissionType, *, nonce: int = 0
     ) -> int:
-        """Send a plan; gives the id that it has there. ValueError: a number that none can carry."""
+        """Upload a plan. Return its id. Raise ValueError if a number does not fit its field."""
         session = self._connection.session
         for seq, item in enumerate(items):
             session.check(message_of(item, seq, kind, to=target))
@@ -268,7 +268,7 @@ class Asker:
             return opaque_id
 
     async def download(self, target: Address, kind: MavMissionType) -> tuple[Item, ...]:
-        """Fetch a plan."""
+        """Download a plan."""
         with self._future(tuple[Item, ...]) as future:
 
             def done(items: tuple[Item, ...] | None, refused: MavMissionResult | None) -> None:
@@ -288,16 +288,16 @@ class Asker:
 
     @contextmanager
     def hearing(self) -> Iterator[asyncio.Queue[Text | None]]:
-        """Return a queue of the texts that come while this is open; None: there will be no more.
+        """Yield a queue of the texts that arrive while this is open; None ends it.
 
-        Not an asynchronous generator: a loop that ends closes all of those at once, and one that
-        waits inside another is then closed twice.
+        Not an async generator: ``shutdown_asyncgens`` closes all of them at once, so one that
+        another one awaits would be closed twice.
         """
         heard: asyncio.Queue[Text | None] = asyncio.Queue(MOST_HEARD)
         with _added(self._listening, heard):
             yield heard
 
-    # inside
+    # internal
 
     @contextmanager
     def _future(self, _kind: type[T]) -> Iterator[asyncio.Future[T]]:
@@ -306,7 +306,7 @@ class Asker:
             yield future
 
     async def _shown(self, future: asyncio.Future[T], request: m.CommandLong, what: str) -> T:
-        """Ask until what is asked for has come: the ack alone is no answer, it may overtake it."""
+        """Send a request until its message arrives. Its ack alone is no answer: it may be first."""
         answer: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         call = self._call(request, answer, what, fits=lambda _ack: future.done())
         try:
@@ -355,7 +355,7 @@ class Asker:
         connection.turn()
         return call
 
-    # what the session tells
+    # session callbacks
 
     def _on_status(self, status: TaskStatus) -> None:
         for take in list(self._statuses):
@@ -371,7 +371,7 @@ class Asker:
 
     def _on_text(self, text: Text) -> None:
         for queue in self._listening:
-            if not queue.full():  # who does not read misses what comes
+            if not queue.full():  # a slow reader misses later texts
                 queue.put_nowait(text)
 
 
@@ -385,7 +385,7 @@ def _added(to: set[T], what: T) -> Iterator[None]:
 
 
 def _place(status: TaskStatus) -> float:
-    """Those that wait for a time or another task have none, and come last."""
+    """Return the sort key: tasks without a position (SCHEDULED, BLOCKED) come last."""
     return inf if status.position is None else status.position
 
 
@@ -395,7 +395,7 @@ def _raised(answer: asyncio.Future[int]) -> Any:
 
 
 async def _words(heard: asyncio.Queue[Text | None], vehicle: int, *, otherwise: str) -> str:
-    """Wait a moment for the words of a refusal."""
+    """Return the STATUSTEXT of a refusal, ``otherwise`` if none comes within WORDS_WITHIN."""
     try:
         async with asyncio.timeout(WORDS_WITHIN):
             while True:

@@ -1,9 +1,9 @@
-"""Commands under way to task servers: one at a time of each kind, sent again until answered.
+"""Commands in flight to task servers, repeated until answered. Pure.
 
-MAVLink guide, "Command Protocol". An ack names the command and not the request, so that each
-(vehicle, command id) is a lane of its own. A late copy of an earlier answer must not be taken for
-the next one's: where an ack does not say whose it is, and after a call that took several copies,
-the lane rests until no more acks can be on their way. Pure.
+MAVLink guide, "Command Protocol". An ack names the command and not the request, so each (vehicle,
+command id) is a lane with one call in flight at a time. A late copy of an ack must not answer the
+next call. So the lane pauses until no more acks can arrive: after a refusal, an abandoned call, an
+ack that could belong to another call, and a call that was sent more than once.
 """
 
 from collections import deque
@@ -16,30 +16,30 @@ from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.services.retry import Retry
 
 AGAIN = 0.5  # s between copies; the server answers within that time
-LATE = 0.6  # s, in which acks of further copies may still come
+LATE = 0.6  # s for which acks of further copies may still arrive
 MOST_CONFIRMED = 255
 
 Command = m.CommandLong | m.CommandInt
 
 
 class Answered(Protocol):
-    """What is done with the answer to a command; None: there was none in time."""
+    """A callback for the answer to a command; ``ack`` None: time-out."""
 
     def __call__(self, ack: m.CommandAck | None, *, now: float) -> None: ...
 
 
 @dataclass(slots=True)
 class Call:
-    """One command, and what is done with its answer.
+    """One command and the callback for its answer.
 
-    ``done`` is called once. ``fits`` says of an accepting ack whether it can be this call's.
-    ``is_told_apart``: by that, or because to mistake one for another does no harm. What is urgent
-    is sent once at once, whatever its lane is about.
+    ``done`` is called at most once. ``fits`` returns whether an accepting ack can belong to this
+    call. ``is_told_apart``: ``fits`` identifies the ack, or a wrong match does no harm.
+    ``is_urgent``: an immediate call sends one copy at once, even if its lane is busy.
     """
 
     message: Command
     done: Answered
-    give_up_after: float  # s, from its first copy
+    give_up_after: float  # s from the first copy
     fits: Callable[[m.CommandAck], bool] = lambda _ack: True
     again: float = AGAIN
     is_told_apart: bool = False
@@ -56,7 +56,7 @@ class _Lane:
 
 
 class Calls:
-    """All lanes of one client."""
+    """The lanes of one client, by vehicle and command id."""
 
     def __init__(self) -> None:
         self._lanes: dict[tuple[int, int], _Lane] = {}
@@ -67,7 +67,7 @@ class Calls:
         return f"Calls(flying={flying})"
 
     def begin(self, call: Call, *, now: float) -> None:
-        """Send a command, after those of its kind."""
+        """Send a command once the earlier calls of its lane have ended."""
         key = call.message.target_system, call.message.command
         lane = self._lanes.setdefault(key, _Lane())
         call.begun_at = now
@@ -77,7 +77,7 @@ class Calls:
             self._outgoing.append(call.message)
 
     def receive(self, ack: m.CommandAck, *, vehicle: int, now: float) -> None:
-        """Take in an ack that is for this client."""
+        """Process an ack addressed to this client."""
         lane = self._lane_of(ack, vehicle)
         call = None if lane is None else lane.flying
         if lane is None or call is None or ack.result == MavResult.IN_PROGRESS:
@@ -87,9 +87,9 @@ class Calls:
         self._end(lane, ack, now=now)
 
     def settle(self, call: Call, *, is_answered: bool, now: float) -> None:
-        """End a call, if it is not over: it was answered otherwise, or nobody waits any more.
+        """End a call without ``done``: another message answered it, or its caller stopped waiting.
 
-        ``done`` is not called.
+        An ended call is left alone.
         """
         for lane in self._lanes.values():
             if lane.flying is call:
@@ -99,7 +99,7 @@ class Calls:
                 lane.waiting.remove(call)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
+        """Return when to call ``handle_deadline``; None: no call is pending."""
         due = []
         for lane in self._lanes.values():
             if lane.flying is not None and lane.flying.retry is not None:
@@ -109,7 +109,7 @@ class Calls:
         return min(due, default=None)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Send again what is due, and give up what is too old."""
+        """Repeat the calls that are due, and end those that have timed out."""
         for lane in list(self._lanes.values()):
             call = lane.flying
             if call is not None and call.retry is not None:
@@ -121,7 +121,7 @@ class Calls:
             self._advance(lane, now=now)
 
     def take(self) -> list[Command]:
-        """Return what is to be sent since the last call."""
+        """Return the commands to send since the last ``take``."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 
@@ -129,7 +129,7 @@ class Calls:
         lane = self._lanes.get((vehicle, ack.command))
         if lane is not None and lane.flying is not None:
             return lane
-        return self._lanes.get((0, ack.command))  # sent to all: one of them answers
+        return self._lanes.get((0, ack.command))  # a broadcast: any vehicle answers
 
     def _advance(self, lane: _Lane, *, now: float) -> None:
         if lane.flying is None and lane.waiting and now >= lane.rests_until:
@@ -155,7 +155,7 @@ class Calls:
         self._advance(lane, now=now)
 
     def _give_up_waiting(self, lane: _Lane, *, now: float) -> None:
-        """Nobody answers: end what would have been given up by now, had it been sent."""
+        """End the waiting calls that would have timed out by now if sent."""
         for call in [each for each in lane.waiting if now >= each.begun_at + each.give_up_after]:
             lane.waiting.remove(call)
             call.done(None, now=now)

@@ -1,4 +1,4 @@
-"""A session on a real link and an asyncio loop: reading, one timer, sending. It decides nothing."""
+"""The I/O of a Session: reads a link on an asyncio loop, sends, and keeps one timer."""
 
 import asyncio
 import time
@@ -15,11 +15,11 @@ from mav_tasks.links.url import parse_url
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.stream import StreamSplitter
 
-DRAIN = 64  # datagrams read before the loop has another turn
+DRAIN = 64  # datagrams read per callback, so that other tasks get to run
 
 
 class Connection:
-    """Turns a session; ``turn`` after each thing that the session was asked for."""
+    """Runs a session on a link. Call ``turn`` after each request to the session."""
 
     def __init__(
         self,
@@ -28,7 +28,7 @@ class Connection:
         *,
         signatures: ClientSignatures | None = None,
     ) -> None:
-        """LinkUrlError and LinkOpenError say what is wrong with the link."""
+        """Open the link. Raise LinkUrlError or LinkOpenError if that fails."""
         self._loop = asyncio.get_running_loop()
         self._signatures = signatures
         self.link = _open(link) if isinstance(link, str) else link
@@ -41,7 +41,7 @@ class Connection:
         self._tending: asyncio.TimerHandle | None = None
         try:
             self._loop.add_reader(self.link.fileno(), self._on_readable)
-        except BaseException:  # the loop cannot wait for it: it may have no real time
+        except BaseException:  # the loop cannot watch it: a virtual-time loop, for instance
             self.link.close()
             raise
         if isinstance(self.link, StreamLink):
@@ -53,16 +53,16 @@ class Connection:
 
     @property
     def now(self) -> float:
-        """The loop's time, seconds."""
+        """The loop's time in seconds."""
         return self._loop.time()
 
     def settle(self, call: Call, *, is_answered: bool) -> None:
-        """Nobody waits for a call any more; the connection may be closed."""
+        """End a call: see ``Calls.settle``. The connection may be closed."""
         self.session.settle(call, is_answered=is_answered, now=self.now)
         self.turn()
 
     def turn(self) -> None:
-        """Send what is to be sent, and see that the session is woken in time."""
+        """Send the session's packets, and set the timer to its next deadline."""
         if self._is_closed:
             return
         for packet in self.session.take_packets():
@@ -78,7 +78,7 @@ class Connection:
             self._timer = self._loop.call_at(due, self._on_timer)
 
     def close(self) -> None:
-        """Return the link back."""
+        """Cancel the timers and close the link."""
         self._is_closed = True
         for timer in (self._timer, self._tending):
             if timer is not None:

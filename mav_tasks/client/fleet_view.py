@@ -1,4 +1,4 @@
-"""The rovers that a client hears, each as its packets show it. Pure."""
+"""The rovers that a client knows, from their packets. Pure."""
 
 from collections.abc import Iterator, Sequence
 from math import hypot
@@ -14,23 +14,23 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.persona import PERSONAS, Persona
 
-SILENT_AFTER = 3.5  # s without a heartbeat; as the server has it
-GAP = 1.7  # s between two heartbeats, after which the server may be another process
-ASK_AGAIN = 0.6  # s, until a vehicle's task server has shown itself
+SILENT_AFTER = 3.5  # s without a heartbeat; same as in the server
+GAP = 1.7  # s without a heartbeat, after which the server may be another process
+ASK_AGAIN = 0.6  # s between requests to a vehicle's task server until it answers
 
-#: telemetry of which the latest is kept
+#: telemetry messages whose latest packet is kept
 KEPT = frozenset({m.LocalPositionNed.id, m.Attitude.id})
 
 
 class VehicleView:
-    """One system with an autopilot, or of which a task server tells that it was there."""
+    """A rover that is heard, or that a task server reported."""
 
     def __init__(self, system_id: int, *, now: float) -> None:
         self.system_id = system_id
-        self._monitor: HeartbeatMonitor | None = None  # None: no heartbeat came here
-        #: when the rover's last heartbeat reached the server, as that tells; None: it does not
+        self._monitor: HeartbeatMonitor | None = None  # None: no heartbeat yet
+        #: when the rover's last heartbeat reached the server; None: unknown
         self._server_heard_at: float | None = None
-        #: of the task server inside it; None until that has answered
+        #: component id of its task server; None until the server has answered
         self.server_component: int | None = None
         self.ask_at = now
         self.latest: dict[int, Packet] = {}
@@ -40,17 +40,17 @@ class VehicleView:
 
     @property
     def is_known(self) -> bool:
-        """Whether its kind is known: a heartbeat of it came here."""
+        """Whether a heartbeat was received, so that the autopilot is known."""
         return self._monitor is not None
 
     @property
     def has_home_item(self) -> bool:
-        """Whether the first item of a mission is home there."""
+        """Whether its missions begin with a home item."""
         persona = self._persona
         return persona is not None and persona.has_home_item
 
     def heartbeat(self, message: m.Heartbeat, *, now: float) -> bool:
-        """Take a heartbeat in; whether it is the first, or the first after a gap."""
+        """Process a heartbeat. Return whether it is the first, or the first after a gap."""
         if self._monitor is None:
             self._monitor = HeartbeatMonitor(message, lost_after=SILENT_AFTER, now=now)
             return True
@@ -59,17 +59,17 @@ class VehicleView:
         return is_back
 
     def told_by_server(self, age: float | None, *, now: float) -> None:
-        """Take in how old the rover's last heartbeat is at the server, s."""
+        """Store the age in seconds of the rover's last heartbeat at the server; None: unknown."""
         self._server_heard_at = None if age is None else now - age
 
     def heartbeat_age(self, *, now: float) -> float | None:
-        """Return seconds since the last heartbeat, inf: none in this run; None: not known."""
+        """Return seconds since the last heartbeat; inf: none in the server's run; None: unknown."""
         heard = [] if self._monitor is None else [self._monitor.heard_at]
         heard += [] if self._server_heard_at is None else [self._server_heard_at]
         return now - max(heard) if heard else None
 
     def status(self, decoder: Decoder, *, now: float) -> VehicleStatus:
-        """Return what is known of it."""
+        """Return the rover's last known state."""
         place = self._latest(decoder, m.LocalPositionNed)
         attitude = self._latest(decoder, m.Attitude)
         monitor = self._monitor
@@ -106,11 +106,11 @@ class VehicleView:
 
 
 class FleetView:
-    """All of them."""
+    """All rovers that a client knows."""
 
     def __init__(self) -> None:
         self._views: dict[int, VehicleView] = {}
-        #: whether a server has answered which rovers it has
+        #: whether a server has listed its rovers
         self.is_listed = False
 
     def __repr__(self) -> str:
@@ -120,22 +120,22 @@ class FleetView:
         return iter(self._views.values())
 
     def get(self, system_id: int) -> VehicleView | None:
-        """Return one, None if it was never heard."""
+        """Return a rover, None if it is not known."""
         return self._views.get(system_id)
 
     def served(self) -> list[int]:
-        """Return the ids of those in which a task server has answered, the lowest first."""
+        """Return the sorted ids of the rovers whose task server has answered."""
         return sorted(v.system_id for v in self if v.server_component is not None)
 
     def is_found(self, wished: int | None) -> bool:
-        """Whether the task server of a vehicle has answered; None: that of each that there is."""
+        """Return whether the task server of a vehicle, None: of every vehicle, has answered."""
         if wished is not None:
             return wished in self.served()
         are_served = all(v.server_component is not None for v in self)
         return self.is_listed and bool(self._views) and are_served
 
     def why_not_found(self, wished: int | None) -> str:
-        """Return why, in words; "{where}" stands for where and how long it was listened for."""
+        """Return the reason as text; "{where}" is a placeholder for the link and the time-out."""
         served = self.served()
         if not self._views and self.is_listed:
             return "a task server is there, but no rover was heard {where}: is it on, and linked?"
@@ -146,7 +146,10 @@ class FleetView:
         return f"rover {wished} was not found {{where}}: {_there_are(served)}"
 
     def which(self, wished: int | None) -> int:
-        """Return the vehicle that is meant, None: the only one. NoSuchVehicle."""
+        """Return ``wished``, None: the only vehicle.
+
+        Raise NoSuchVehicle if the server does not have it, or if there is not exactly one.
+        """
         served = self.served()
         if wished is not None and wished not in served:
             raise NoSuchVehicle(f"rover {wished} is not there: {_there_are(served)}")
@@ -157,9 +160,9 @@ class FleetView:
         return served[0]
 
     def heartbeat(self, packet: Packet, message: m.Heartbeat, *, now: float) -> bool:
-        """Take an autopilot's heartbeat in; whether it is one that may be new here.
+        """Process a heartbeat. Return whether its rover is new, or back after a gap.
 
-        New is also one that comes back: behind it there may be another server process.
+        After a gap the server may be another process.
         """
         if packet.component_id != AUTOPILOT or message.autopilot == MavAutopilot.INVALID:
             return False
@@ -170,16 +173,16 @@ class FleetView:
         return is_new
 
     def served_by(self, source: Address, age: float | None, *, now: float) -> None:
-        """A task server has told of a rover: it is there, whether the rover is heard or not.
+        """Note that a task server has a rover; the rover itself may be silent.
 
-        ``age``: of the rover's last heartbeat at the server, s, inf: none; None: it does not tell.
+        ``age``: seconds since the rover's last heartbeat at the server; inf: none; None: unknown.
         """
         view = self._view(source.system_id, now=now)
         view.server_component = source.component_id
         view.told_by_server(age, now=now)
 
     def telemetry(self, packet: Packet) -> None:
-        """Keep a vehicle's telemetry, to be looked at when somebody asks."""
+        """Keep a vehicle's telemetry packet; ``status`` decodes it."""
         view = self._views.get(packet.system_id)
         if view is not None and packet.component_id == AUTOPILOT:
             view.latest[packet.message_id] = packet
@@ -191,12 +194,12 @@ class FleetView:
         return view
 
     def next_deadline(self) -> float | None:
-        """Return when a task server is to be asked whether it is there."""
+        """Return when to ask the next task server; None: all have answered."""
         due = [v.ask_at for v in self if v.server_component is None]
         return min(due, default=None)
 
     def to_ask(self, *, now: float) -> list[int]:
-        """Return the vehicles whose task server is to be asked now."""
+        """Return the vehicles whose task server to ask now."""
         due = [v for v in self if v.server_component is None and now >= v.ask_at]
         for view in due:
             view.ask_at = now + ASK_AGAIN

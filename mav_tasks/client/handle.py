@@ -1,4 +1,4 @@
-"""A task in a script's hands: asked, watched, awaited, changed."""
+"""The handle of one task: query it, follow it, await it, change it."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -17,9 +17,7 @@ Release = Literal["again", "remainder", "skip"]
 
 
 class Task:
-    """One task of one server. It stays good while the client is open, also over the server's end
-    and return.
-    """
+    """A handle of one task, valid while the client is open, even if the server restarts."""
 
     def __init__(self, client: "Client", followed: Followed) -> None:
         self._client = client
@@ -33,7 +31,7 @@ class Task:
 
     @property
     def id(self) -> int:
-        """Its number, which the server gives to no other while it may be asked for."""
+        """The task id. The server does not reuse it while the task can be queried."""
         return self._followed.id
 
     @property
@@ -43,14 +41,14 @@ class Task:
 
     @property
     def status(self) -> TaskStatus | None:
-        """What was heard of it last; None before anything was."""
+        """The last status received; None before the first."""
         return self._followed.status
 
     async def done(self) -> TaskStatus:
-        """Wait until it is over, and give its last status.
+        """Wait until the task has ended. Return its final status.
 
-        Raises TaskFailed if it ended in another way than completed. To wait for so long only is
-        ``asyncio.timeout``'s; the task goes on then.
+        Raise TaskFailed unless it completed. Use ``asyncio.timeout`` to limit the wait; the task
+        continues after a time-out.
         """
         while not self._followed.is_over:
             await self._news()
@@ -66,9 +64,9 @@ class Task:
         return status
 
     async def updates(self, *, interval: float = 0.5) -> AsyncIterator[TaskStatus]:
-        """Yield its status now and at each change, while it is driven each ``interval`` seconds.
+        """Yield the status now, at each change, and every ``interval`` seconds while it is driven.
 
-        Ends with the status in which the task is over. Who reads slowly gets the latest only.
+        The final status is the last one. A slow reader gets only the latest status.
         """
         with self._client.streaming(self.vehicle, interval):
             told: TaskStatus | None = None
@@ -83,21 +81,22 @@ class Task:
                     await self._news()
 
     async def refresh(self) -> TaskStatus:
-        """Ask the server how it is now. Refused (NOT_FOUND) if it does not know it."""
+        """Request and return the status. Raise Refused (NOT_FOUND) if the server lacks the task."""
         return await self._client.status(self.id, vehicle=self.vehicle)
 
     async def timing(self) -> TaskTiming:
-        """Ask the server how evenly its setpoints have left so far; also after it is over."""
+        """Return how evenly its setpoints have left so far; also works after the end."""
         return await self._client.timing(self.id, vehicle=self.vehicle)
 
     async def cancel(self) -> None:
-        """Call it off; if it is being driven the rover is stopped at once. Await ``done`` to see it
-        stand. Raises Refused if it is over.
+        """Cancel the task; if it is being driven, the rover stops at once.
+
+        Await ``done`` to wait for standstill. Raise Refused if the task has ended.
         """
         await self._client.cancel(self.id, vehicle=self.vehicle)
 
     async def kill(self) -> None:
-        """The same, and the rover is put into HOLD; nothing else starts until it stands."""
+        """Cancel the task and put the rover into HOLD; no task starts until it stands still."""
         await self._client.kill(self.id, vehicle=self.vehicle)
 
     async def modify(
@@ -112,7 +111,7 @@ class Task:
         at: datetime | None = None,
         label: str | None = None,
     ) -> None:
-        """Change what is given: see ``Client.modify``."""
+        """Change the task: see ``Client.modify``."""
         await self._client.modify(
             self.id,
             vehicle=self.vehicle,
@@ -127,17 +126,17 @@ class Task:
         )
 
     async def release(self, how: Release) -> None:
-        """Decide about it if it is held: all of it again from here, the remainder, or skip it."""
+        """Release the task: "again" restarts it here, "remainder" finishes it, "skip" drops it."""
         await self._client.release(self.id, how, vehicle=self.vehicle)
 
     def wake(self) -> None:
-        """There is news; the client calls it."""
+        """Wake the waiting coroutines. The client calls it when the status changes."""
         for future in self._waiting:
             if not future.done():
                 future.set_result(None)
 
     def close(self) -> None:
-        """There will be no more news; the client calls it."""
+        """End the waiting coroutines with ClientError. The client calls it when it closes."""
         self._is_closed = True
         for future in self._waiting:
             if not future.done():

@@ -1,4 +1,4 @@
-"""What a mission can be made of: a file, what was read from one, or goals."""
+"""The sources of a mission: a file, a parsed file, or goals."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,12 +13,12 @@ Plan = PlanFile | Sequence[Goal] | Path | str
 
 
 def file_of(plan: PlanFile | Path | str) -> PlanFile:
-    """Return what a file says. PlanFileError."""
+    """Return the parsed file. Raise PlanFileError if it is invalid."""
     return plan if isinstance(plan, PlanFile) else plan_files.read_plan(Path(plan))
 
 
 def items_of(plan: Plan) -> tuple[Item, ...]:
-    """Return the items of a mission. PlanFileError, and ValueError where there are none."""
+    """Return a mission's items. Raise PlanFileError for a bad file, ValueError if it is empty."""
     items = (
         wire.items_of_file(file_of(plan).items)
         if isinstance(plan, PlanFile | Path | str)

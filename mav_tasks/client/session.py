@@ -1,7 +1,7 @@
-"""A client's end of the contract as one pure object: packets and time in, packets out.
+"""The client's protocol, sans-I/O: packets and time in, packets out.
 
-It says hello, finds the task servers inside the rovers, keeps what they tell, and sees that what is
-asked is answered or given up. What it means for a script is ``aio``'s affair.
+A Session sends heartbeats, finds the task server of each rover, keeps the latest statuses, and
+repeats each request until it is answered or times out. ``aio`` builds the API for scripts on it.
 """
 
 import struct
@@ -35,12 +35,12 @@ from mav_tasks.services.heartbeat import HeartbeatSender, component_heartbeat
 from mav_tasks.services.text_receiver import TextReceiver
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 
-#: s, in which the words of a refusal follow its ack
+#: s within which the STATUSTEXT of a refusal follows its ack
 WORDS_WITHIN = 0.25
-#: Hz, of telemetry that somebody may ask about; a client's share of a busy link is small
+#: Hz of telemetry; a client's share of a busy link is small
 TELEMETRY_RATE = 1
 EVERYBODY = 0  # target_system
-FOLLOWED_AGAIN = 3.0  # s that an unanswered question about a followed task goes on
+FOLLOWED_AGAIN = 3.0  # s for which a request about a followed task is repeated
 
 DECODED = frozenset(
     kind.id
@@ -58,7 +58,7 @@ DECODED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What was answered to a command, with the words of a refusal."""
+    """The answer to a command; ``words`` is the reason of a refusal."""
 
     result: int
     value: int
@@ -66,7 +66,7 @@ class Reply:
 
     @property
     def is_accepted(self) -> bool:
-        """Whether it was."""
+        """Whether the command was accepted."""
         return self.result == MavResult.ACCEPTED
 
 
@@ -82,9 +82,9 @@ class _Refused:
 
 
 class Session:
-    """What one client knows and what it is about.
+    """The protocol state of one client.
 
-    The callbacks are the shell's: what it does with news.
+    The asyncio layer sets the ``on_`` callbacks to receive news.
     """
 
     def __init__(self, address: Address, *, now: float) -> None:
@@ -99,7 +99,7 @@ class Session:
         self._transfers: dict[Address, Transfers] = {}
         self._refused: list[_Refused] = []
         self._out: list[bytes] = []
-        self._listing: Call | None = None  # the question for rovers, unanswered
+        self._listing: Call | None = None  # the unanswered request for the list of rovers
         self.on_served: Callable[[], None] = lambda: None
         self.on_news: Callable[[Followed], None] = lambda _followed: None
         self.on_status: Callable[[TaskStatus], None] = lambda _status: None
@@ -113,7 +113,7 @@ class Session:
     # time and packets
 
     def receive(self, packet: Packet, *, now: float) -> None:
-        """Take one packet in."""
+        """Process one packet."""
         if packet.message_id in KEPT:
             self.fleet.telemetry(packet)
         if packet.message_id not in DECODED:
@@ -143,7 +143,7 @@ class Session:
                     transfers.receive(message, now=now)
 
     def next_deadline(self) -> float:
-        """Return when ``handle_deadline`` has something to do."""
+        """Return when to call ``handle_deadline``."""
         due = [
             self._texts.next_deadline(),
             self._heartbeat.next_deadline(),
@@ -156,7 +156,7 @@ class Session:
         return min(due)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Do what is due."""
+        """Send and repeat what is due, and end timed-out requests."""
         if self._heartbeat.is_due(now=now):
             self.greet()
         for vehicle in self.fleet.to_ask(now=now):
@@ -173,7 +173,7 @@ class Session:
             refused.done(_reply(refused.ack, ""))
 
     def take_packets(self) -> list[bytes]:
-        """Return what is to be sent since the last call, in order."""
+        """Return the packets to send since the last call, in order."""
         for command in self._calls.take():
             self.send(command)
         for transfers in self._transfers.values():
@@ -182,21 +182,21 @@ class Session:
         out, self._out = self._out, []
         return out
 
-    # what the shell asks for
+    # requests of the asyncio layer
 
     def greet(self) -> None:
-        """Say that somebody is here: a script, no ground station whose loss could mean a stop."""
+        """Send a heartbeat. It is not a ground station's: losing one could stop the rover."""
         self.send(component_heartbeat(MavState.ACTIVE))
 
     def ask_for_rovers(self, *, now: float) -> None:
-        """Ask which rovers a server has, until it is answered: a silent one sends no heartbeat."""
+        """Request the list of rovers until it is answered: a silent rover sends no heartbeat."""
 
         def done(_reply: Reply | None) -> None:
             self._listing = None
             self.fleet.is_listed = True
             self.on_served()
 
-        if self._listing is not None:  # the link is up only now
+        if self._listing is not None:  # the link came up only now
             self._calls.settle(self._listing, is_answered=True, now=now)
         request = request_message(EVERYBODY, m.TaskQueueStatus.id)
         self._listing = self.call(request, done, now=now, within=inf)
@@ -206,7 +206,7 @@ class Session:
         self._out.append(self._encoder.encode(message))
 
     def check(self, message: m.Message) -> None:
-        """Raise ValueError for what no packet can carry: found when it is sent, it hit all else."""
+        """Raise ValueError if a number does not fit its field, before it breaks a whole send."""
         try:
             Packer().pack(message, self.address, seq=0)
         except (OverflowError, struct.error) as error:
@@ -225,9 +225,9 @@ class Session:
         is_told_apart: bool = True,
         is_urgent: bool = False,
     ) -> Call:
-        """Send a command until it is answered; ``done`` is called once, with None for silence.
+        """Send a command until it is answered. Call ``done`` once, with None after a time-out.
 
-        See Call for the rest. ValueError if it has a number that cannot be sent.
+        See Call for the other arguments. Raise ValueError if a number does not fit its field.
         """
         self.check(message)
         vehicle = message.target_system
@@ -245,23 +245,26 @@ class Session:
         return call
 
     def settle(self, call: Call, *, is_answered: bool, now: float) -> None:
-        """A call was answered by something else than an ack, or nobody waits for it any more."""
+        """End a call that another message answered, or whose caller stopped waiting."""
         self._calls.settle(call, is_answered=is_answered, now=now)
 
     def transfers(self, target: Address) -> Transfers:
-        """Return the plans on their way to and from a component."""
+        """Return the uploads and downloads of a component."""
         transfers = self._transfers.get(target)
         if transfers is None:
             transfers = self._transfers[target] = Transfers(target)
         return transfers
 
     def vehicles(self, *, now: float) -> tuple[VehicleStatus, ...]:
-        """Return the rovers in which a task server has answered, by id."""
+        """Return the rovers whose task server has answered, by id."""
         views = (self.fleet.get(system_id) for system_id in self.fleet.served())
         return tuple(v.status(self._decoder, now=now) for v in views if v is not None)
 
     def follow(self, task_id: int, vehicle: int, *, nonce: int | None, now: float) -> Followed:
-        """Follow a task; one of its id but another nonce is lost: the server has begun anew."""
+        """Follow a task.
+
+        A followed task with its id and another nonce is lost: the server restarted its task ids.
+        """
         before = self.watch.get(task_id)
         if before is not None and nonce is not None and before.nonce not in (None, nonce):
             self.watch.lose(before)
@@ -269,7 +272,7 @@ class Session:
         return self.watch.follow(task_id, vehicle, nonce=nonce, now=now)
 
     def ask_about(self, followed: Followed, *, now: float) -> None:
-        """Ask how a followed task fares; what comes of it is news as any other."""
+        """Request the status of a followed task. Its answer arrives as news."""
         vehicle = followed.vehicle
         followed.is_asked = True
 
@@ -288,14 +291,14 @@ class Session:
             self.set_stream(vehicle, interval, now=now)
 
     def set_stream(self, vehicle: int, interval: float | None, *, now: float) -> None:
-        """Have the active task told each ``interval`` seconds; None: only when it changes."""
+        """Request the active task's status each ``interval`` seconds; None: only at changes."""
         us = -1.0 if interval is None else interval * 1e6
         command = m.CommandLong(
             vehicle, AUTOPILOT, MavCmd.SET_MESSAGE_INTERVAL, 0, m.TaskStatus.id, us, 0, 0, 0, 0, 0
         )
         self.call(command, lambda _reply: None, now=now, within=FOLLOWED_AGAIN)
 
-    # what came
+    # received messages
 
     def _is_meant(self, message: m.Message) -> bool:
         return target_of(message).reaches(self.address)
@@ -334,7 +337,7 @@ class Session:
 
 
 def request_message(vehicle: int, message_id: int, *params: float) -> m.CommandLong:
-    """Return the REQUEST_MESSAGE that asks a vehicle's task server for something."""
+    """Return the REQUEST_MESSAGE command for a message of a vehicle's task server."""
     filled = (*params, *(0.0,) * (6 - len(params)))
     return m.CommandLong(vehicle, AUTOPILOT, MavCmd.REQUEST_MESSAGE, 0, float(message_id), *filled)
 

@@ -1,8 +1,8 @@
-"""A client's signatures: all that it sends is signed, and only what its server signed is believed.
+"""MAVLink 2 signing for a client: sign every packet, accept only packets signed with the same key.
 
-Its clock alone gives the times of its signatures; a tick is 10 µs, so that one run follows another
-within less than it takes to start one. Each client has a link id of its own, by chance: two of one
-key and address are two streams, and the one does not make the other old.
+Timestamps come from the client's clock alone. A tick is 10 µs, so the timestamps of a new run are
+past those of the last run by the time it has started. Each client has a random link id: two clients
+with one key and address are two streams, and neither makes the other's packets old.
 """
 
 from dataclasses import dataclass
@@ -23,23 +23,23 @@ from mav_tasks.mavlink.signing import (
     timestamp_of,
 )
 
-WINDOW = int(60 * UNITS)  # as the server's, if nobody has set it otherwise
+WINDOW = int(60 * UNITS)  # the server's default
 
 
 @dataclass(slots=True)
 class NotBelieved:
-    """What was heard and not believed, in packets."""
+    """Counts of received packets that were dropped."""
 
     unsigned: int = 0
     unknown: int = 0  # signed with another key
-    old: int = 0  # signed well, but heard before, or of a clock that is far behind
+    old: int = 0  # valid signature, but a repeated or too old timestamp
 
 
 class ClientSignatures:
     """Signs and verifies with one key. Times in seconds since 1970."""
 
     def __init__(self, key: Key | bytes, *, link_id: int | None = None) -> None:
-        """``link_id`` 0 to 255, None: by chance. ValueError: the key has not 32 bytes."""
+        """``link_id`` 0 to 255, None: random. Raise ValueError if it or the key is invalid."""
         self.key = Key("", key) if isinstance(key, bytes) else key
         if len(self.key.secret) != KEY_LENGTH:
             raise ValueError(f"a key has {KEY_LENGTH} bytes, not {len(self.key.secret)}")
@@ -53,15 +53,15 @@ class ClientSignatures:
         return f"ClientSignatures({self._named()}, {self.not_believed})"
 
     def sealed(self, raw: bytes, *, utc: float) -> bytes:
-        """Return a packet as it is to leave.
+        """Return the packet with its signature.
 
-        DEVIATION: what the server's clock says is not taken over: of two clients with one key, that
-        one which has heard the server would be ahead of the other one's clock.
+        DEVIATION: the client does not adopt later timestamps of the server. Of two clients with one
+        key, one that had heard the server would be ahead of the other.
         """
         return self._signer.sign(raw, clock=timestamp_at(utc))
 
     def believes(self, packet: Packet, *, utc: float) -> bool:
-        """Whether a packet is the server's, and is no repetition."""
+        """Return whether to accept a packet: signed with the key and new, or a radio modem's."""
         if not packet.is_signed:
             self.not_believed.unsigned += packet.message_id not in FROM_RADIOS
             return packet.message_id in FROM_RADIOS
@@ -77,7 +77,7 @@ class ClientSignatures:
         return True
 
     def why_silent(self) -> str:
-        """Return what may be the matter when nothing was believed, in words."""
+        """Return the likely reason, as text, why no packet was accepted."""
         heard = self.not_believed
         if heard.unknown:
             return f"what is heard is signed with another key than {self._named()}"

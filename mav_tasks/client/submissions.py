@@ -1,4 +1,4 @@
-"""What a client remembers of its submissions, so that each is one task however often it is sent."""
+"""The nonces of a client's submissions: a submission is one task, however often it is sent."""
 
 from datetime import UTC, datetime
 from random import SystemRandom
@@ -6,27 +6,28 @@ from random import SystemRandom
 from mav_tasks.client import wire
 from mav_tasks.tasks.task import MAX_NONCE
 
-LATE_ACK = 3.0  # s, in which a copy of an ack may still come
+LATE_ACK = 3.0  # s for which a copy of an ack may still arrive
 REMEMBERED_IDS = 10_000
 REMEMBERED_DELAYS = 1_000
 
 
 class Submissions:
-    """Nonces, ids and start times; ``now`` in monotonic seconds."""
+    """The nonces, task ids and start delays of submissions; ``now`` in monotonic seconds."""
 
     def __init__(self) -> None:
-        self._nonces: dict[int, tuple[int, float]] = {}  # by task id; when that was
-        self._delays: dict[int, float] = {}  # by nonce, of starts at a time of day
+        self._nonces: dict[int, tuple[int, float]] = {}  # by task id; with the time
+        self._delays: dict[int, float] = {}  # s, by nonce, of submissions with ``at``
         self._last_nonce = SystemRandom().randrange(MAX_NONCE)
 
     def __repr__(self) -> str:
         return f"Submissions({len(self._nonces)} remembered)"
 
     def nonce(self, wished: int = 0) -> int:
-        """Return the nonce wished for, or one not used yet: from a random one on, each once.
+        """Return ``wished``, 0: the next unused nonce. The first one is random.
 
-        All scripts of an address share one set of nonces. The server takes one for a copy until 10
-        minutes after its task is over: two processes rarely draw the same of 10⁹ by then.
+        All scripts of one address share a set of nonces. The server treats a repeated nonce as a
+        copy until 10 minutes after its task has ended. Two processes rarely draw the same of 10⁹
+        nonces within that time.
         """
         wire.check_nonce(wished)
         if wished:
@@ -35,21 +36,21 @@ class Submissions:
         return self._last_nonce
 
     def note(self, task_id: int, nonce: int, *, now: float) -> None:
-        """Take note of an id that was given to a submission."""
+        """Remember the task id of a submission."""
         self._nonces.pop(task_id, None)
         self._nonces[task_id] = nonce, now
         while len(self._nonces) > REMEMBERED_IDS:
             del self._nonces[next(iter(self._nonces))]
 
     def is_anothers(self, task_id: int, nonce: int, *, now: float) -> bool:
-        """Whether an id is that of another submission of late: a copy of an old ack names it."""
+        """Return whether another submission got this id just now: a late copy of its ack."""
         its_nonce, at = self._nonces.get(task_id, (nonce, 0.0))
         return its_nonce != nonce and now - at < LATE_ACK
 
     def delay(self, delay: float, at: datetime | None, nonce: int) -> float:
-        """Return the seconds that a task must not run: a time of day is set once it is there.
+        """Return the start delay, s. For ``at`` it bridges the time until START_UTC is set.
 
-        Again with the same nonce the same ones: else it were another task to the server.
+        The same nonce gets the same delay: with another one the server would see another task.
         """
         if at is None:
             return delay
@@ -63,7 +64,7 @@ class Submissions:
 
 
 def utc_of(at: datetime) -> float:
-    """Return UTC seconds; ValueError for a time of day that is nobody's."""
+    """Return UTC seconds. Raise ValueError if ``at`` has no time zone."""
     if at.tzinfo is None:
         raise ValueError(f"at {at}: a time of day without a time zone is nobody's")
     return at.timestamp()

@@ -1,7 +1,7 @@
-"""The client library without asyncio: the same calls, each waiting for its answer.
+"""The blocking client: the calls of the asyncio client, each waiting for its answer.
 
-The asyncio client runs on a loop in a thread of its own, or wherever a Portal runs it; what it does
-meanwhile, heartbeats and news, goes on while the script does other things.
+The asyncio client runs on an event loop in its own thread, or where a given Portal runs it. It
+sends heartbeats and receives statuses while the script does other things.
 """
 
 import asyncio
@@ -33,23 +33,23 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 T = TypeVar("T")
 
-ENDS_BY_ITSELF = 0.2  # s
+ENDS_BY_ITSELF = 0.2  # s until ``close`` cancels a coroutine
 
 
 class Portal(Protocol):
-    """Where coroutines are run for somebody who waits."""
+    """Runs coroutines for a caller that blocks."""
 
     def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run it to its end; give what it gives, raise what it raises."""
+        """Run a coroutine to its end. Return its result, or raise its exception."""
         ...
 
     def close(self) -> None:
-        """It is not needed any more."""
+        """Free the portal's resources."""
         ...
 
 
 class ThreadPortal:
-    """A loop in a thread of its own, which ends with the program."""
+    """An event loop in its own daemon thread."""
 
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()
@@ -59,7 +59,7 @@ class ThreadPortal:
         self._thread.start()
 
     def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run it there; Ctrl-C here ends it there. ClientError when the portal is closed."""
+        """Run a coroutine; Ctrl-C cancels it. Raise ClientError if the portal is closed."""
         if self._loop.is_closed():
             coroutine.close()
             raise ClientError("the client was closed")
@@ -71,7 +71,7 @@ class ThreadPortal:
             raise
 
     def close(self) -> None:
-        """End the thread, and what still runs there: other threads may wait for it."""
+        """End the running coroutines, which other threads may wait for, and the thread."""
         asyncio.run_coroutine_threadsafe(self._end_tasks(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
@@ -81,15 +81,15 @@ class ThreadPortal:
         await self._loop.shutdown_asyncgens()
         others = asyncio.all_tasks() - {asyncio.current_task()}
         if others:
-            await asyncio.wait(others, timeout=ENDS_BY_ITSELF)  # what was told that it is closed
+            await asyncio.wait(others, timeout=ENDS_BY_ITSELF)  # the client has told them to end
         for task in others:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
-        await asyncio.sleep(0)  # who waits in another thread is told in the loop's next turn
+        await asyncio.sleep(0)  # the next iteration wakes the waiting threads
 
 
 class SyncTask:
-    """One task; see ``Task``."""
+    """A blocking handle of one task; see ``Task``."""
 
     def __init__(self, task: Task, portal: Portal) -> None:
         self._task = task
@@ -100,7 +100,7 @@ class SyncTask:
 
     @property
     def id(self) -> int:
-        """Its number, which the server gives to no other while it may be asked for."""
+        """The task id. The server does not reuse it while the task can be queried."""
         return self._task.id
 
     @property
@@ -110,14 +110,14 @@ class SyncTask:
 
     @property
     def status(self) -> TaskStatus | None:
-        """What was heard of it last; None before anything was."""
+        """The last status received; None before the first."""
         return self._task.status
 
     def done(self, *, timeout: float | None = None) -> TaskStatus:
-        """Wait until it is over, and give its last status.
+        """Wait until the task has ended. Return its final status.
 
-        Raises TaskFailed if it ended in another way than completed, and TimeoutError after
-        ``timeout`` seconds; the task goes on then.
+        Raise TaskFailed unless it completed. Raise TimeoutError after ``timeout`` seconds; the
+        task continues.
         """
 
         async def within() -> TaskStatus:
@@ -132,23 +132,23 @@ class SyncTask:
         return self._portal.call(within())
 
     def updates(self, *, interval: float = 0.5) -> Iterator[TaskStatus]:
-        """Yield its status now and at each change; while it drives, each ``interval`` seconds."""
+        """Yield the status now, at each change, and every ``interval`` s while it is driven."""
         return _each(self._task.updates(interval=interval), self._portal)
 
     def refresh(self) -> TaskStatus:
-        """Ask the server how it is now."""
+        """Request and return the status."""
         return self._portal.call(self._task.refresh())
 
     def timing(self) -> TaskTiming:
-        """Ask the server how evenly its setpoints have left so far; also after it is over."""
+        """Return how evenly its setpoints have left so far; also works after the end."""
         return self._portal.call(self._task.timing())
 
     def cancel(self) -> None:
-        """Call it off; see ``Task.cancel``."""
+        """Cancel the task; see ``Task.cancel``."""
         self._portal.call(self._task.cancel())
 
     def kill(self) -> None:
-        """The same, and the rover is put into HOLD."""
+        """Cancel the task and put the rover into HOLD."""
         self._portal.call(self._task.kill())
 
     def modify(
@@ -163,7 +163,7 @@ class SyncTask:
         at: datetime | None = None,
         label: str | None = None,
     ) -> None:
-        """Change what is given: see ``Client.modify``."""
+        """Change the task: see ``Client.modify``."""
         self._portal.call(
             self._task.modify(
                 priority=priority,
@@ -178,14 +178,14 @@ class SyncTask:
         )
 
     def release(self, how: Release) -> None:
-        """Decide about it if it is held."""
+        """Release the held task: see ``Task.release``."""
         self._portal.call(self._task.release(how))
 
 
 class SyncClient:
-    """A connection to a task server; see ``Client``, of which every method is here.
+    """A connection to a task server, with the methods of ``Client``.
 
-    Open from the beginning of a ``with`` block to its end. ``portal``: where its asyncio part runs.
+    It is open within a ``with`` block. ``portal`` runs its asyncio part.
     """
 
     def __init__(
@@ -234,7 +234,7 @@ class SyncClient:
         self.close()
 
     def open(self) -> None:
-        """Open the link, and wait for nothing."""
+        """Open the link without waiting."""
         if self._portal is not None:
             raise MavTasksError(f"{self!r}: it is open already")
         portal = self._portal = self._given or ThreadPortal()
@@ -245,11 +245,11 @@ class SyncClient:
             raise
 
     def found(self) -> None:
-        """Wait until a task server has answered, of each rover that is heard."""
+        """Wait for the task server: see ``Client.found``."""
         self._call(lambda client: client.found())
 
     def close(self) -> None:
-        """Close the link. Tasks go on: the server has them."""
+        """Close the link. The server continues the tasks."""
         client, self._client = self._client, None
         portal, self._portal = self._portal, None
         if portal is None:
@@ -272,7 +272,7 @@ class SyncClient:
         nonce: int = 0,
         label: str = "",
     ) -> SyncTask:
-        """Have a goal driven, or several as one task: see ``Client.submit``."""
+        """Submit a goal, or several as one task: see ``Client.submit``."""
         return self._task(
             lambda client: client.submit(
                 goal,
@@ -288,27 +288,27 @@ class SyncClient:
         )
 
     def task(self, task_id: int, *, vehicle: int | None = None) -> SyncTask:
-        """Return the handle of a task that is there."""
+        """Return the handle of any client's task."""
         return self._task(lambda client: client.task(task_id, vehicle=vehicle))
 
     def status(self, task_id: int, *, vehicle: int | None = None) -> TaskStatus:
-        """Ask how a task is."""
+        """Return the status of a task."""
         return self._call(lambda client: client.status(task_id, vehicle=vehicle))
 
     def timing(self, task_id: int | None = None, *, vehicle: int | None = None) -> TaskTiming:
-        """Ask how evenly the setpoints of a task left, or those of the running one."""
+        """Return how evenly the setpoints of a task left; None: of the running task."""
         return self._call(lambda client: client.timing(task_id, vehicle=vehicle))
 
     def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Call a task off, or the running one; gives its id."""
+        """Cancel a task, None: the running one. Return its id."""
         return self._call(lambda client: client.cancel(task_id, vehicle=vehicle))
 
     def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """The same, and the rover is put into HOLD at once."""
+        """Cancel a task and put the rover into HOLD at once. Return the task's id."""
         return self._call(lambda client: client.kill(task_id, vehicle=vehicle))
 
     def clear(self, *, running_too: bool = False, vehicle: int | None = None) -> None:
-        """Call off every task that waits, or all of them."""
+        """Cancel all waiting tasks; ``running_too``: the running one, too."""
         self._call(lambda client: client.clear(running_too=running_too, vehicle=vehicle))
 
     def modify(
@@ -325,7 +325,7 @@ class SyncClient:
         label: str | None = None,
         vehicle: int | None = None,
     ) -> None:
-        """Change a task that is not over: see ``Client.modify``."""
+        """Change a task: see ``Client.modify``."""
         self._call(
             lambda client: client.modify(
                 task_id,
@@ -349,33 +349,33 @@ class SyncClient:
         epoch: int | None = None,
         vehicle: int | None = None,
     ) -> int:
-        """Decide about a held task, None: the held one; gives its id."""
+        """Release a held task: see ``Client.release``."""
         return self._call(lambda client: client.release(task_id, how, epoch=epoch, vehicle=vehicle))
 
     def queue(self, *, vehicle: int | None = None, limit: int = 100) -> QueueStatus:
-        """Ask what a rover does and what waits."""
+        """Return the running and the waiting tasks of a rover."""
         return self._call(lambda client: client.queue(vehicle=vehicle, limit=limit))
 
     def history(self, *, vehicle: int | None = None, limit: int = 20) -> tuple[TaskStatus, ...]:
-        """Ask for the tasks of a rover that are over, newest first: see ``Client.history``."""
+        """Return finished tasks of a rover, newest first: see ``Client.history``."""
         return self._call(lambda client: client.history(vehicle=vehicle, limit=limit))
 
     def stop(
         self, *, clear: bool = False, vehicle: int | None = None, within: float = STOP_WITHIN
     ) -> None:
-        """Stop every rover, or the one named, at once: see ``Client.stop``."""
+        """Stop all rovers, or only ``vehicle``, at once: see ``Client.stop``."""
         self._call(lambda client: client.stop(clear=clear, vehicle=vehicle, within=within))
 
     def pause(self, *, vehicle: int | None = None) -> None:
-        """Stop the rover where it is, so that its task can go on."""
+        """Stop the rover; its task can continue from there."""
         self._call(lambda client: client.pause(vehicle=vehicle))
 
     def resume(self, *, epoch: int | None = None, vehicle: int | None = None) -> None:
-        """Go on after a pause, a STOP or a takeover."""
+        """Resume after a pause, a STOP or a takeover."""
         self._call(lambda client: client.resume(epoch=epoch, vehicle=vehicle))
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
-        """Return the rovers of the server, as they were heard last."""
+        """Return the last known state of the server's rovers."""
 
         async def vehicles(client: Client) -> tuple[VehicleStatus, ...]:
             return client.vehicles()
@@ -383,7 +383,7 @@ class SyncClient:
         return self._call(vehicles)
 
     def texts(self) -> Iterator[Text]:
-        """Return the texts that rovers and task servers say from now on."""
+        """Yield each STATUSTEXT of rovers and task servers from now on."""
         client, portal = self._opened_here()
         return _each(client.texts(), portal)
 
@@ -416,35 +416,35 @@ class SyncClient:
         )
 
     def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> SyncTask:
-        """Upload a mission to where it waits until it is started."""
+        """Stage a mission: see ``Client.stage_mission``."""
         return self._task(lambda client: client.stage_mission(plan, vehicle=vehicle))
 
     def start_mission(self, *, epoch: int | None = None, vehicle: int | None = None) -> SyncTask:
-        """Start the mission that waits there, or the last one again."""
+        """Start the staged mission, or the last one again."""
         return self._task(lambda client: client.start_mission(epoch=epoch, vehicle=vehicle))
 
     def mission(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
-        """Fetch the mission as it was uploaded."""
+        """Return the staged mission, as it was uploaded."""
         return self._call(lambda client: client.mission(vehicle=vehicle))
 
     def mission_file(self, *, vehicle: int | None = None) -> PlanFile:
-        """Fetch the mission as ``write_plan`` takes it."""
+        """Return the staged mission for ``write_plan``."""
         return self._call(lambda client: client.mission_file(vehicle=vehicle))
 
     def fence_file(self, *, vehicle: int | None = None) -> PlanFile:
-        """Fetch the fence as ``write_plan`` takes it."""
+        """Return the fence for ``write_plan``."""
         return self._call(lambda client: client.fence_file(vehicle=vehicle))
 
     def fence(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
-        """Fetch the fence."""
+        """Return the items of the fence."""
         return self._call(lambda client: client.fence(vehicle=vehicle))
 
     def set_fence(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
-        """Upload the fence of a .plan file; gives the number of its items."""
+        """Upload the fence of a .plan file. Return the number of items."""
         return self._call(lambda client: client.set_fence(plan, vehicle=vehicle))
 
     def set_rally_points(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
-        """Upload the rally points of a .plan file; gives their number."""
+        """Upload the rally points of a .plan file. Return their number."""
         return self._call(lambda client: client.set_rally_points(plan, vehicle=vehicle))
 
     async def _opened(self) -> Client:
@@ -468,19 +468,19 @@ class SyncClient:
 
 
 def _each(generator: AsyncIterator[T], portal: Portal) -> Iterator[T]:
-    """Yield what an async generator gives, each when it is there."""
+    """Yield the values of an async generator as they arrive."""
 
     async def following() -> T | None:
         return await anext(generator, None)
 
     async def closed() -> None:
-        await generator.aclose()  # type: ignore[attr-defined]  # they are generators, all of them
+        await generator.aclose()  # type: ignore[attr-defined]  # all callers pass generators
 
     try:
         while (value := portal.call(following())) is not None:
             yield value
     finally:
-        with suppress(ClientError):  # closed: there is nothing left to end
+        with suppress(ClientError):  # the portal is closed: nothing is left to end
             portal.call(closed())
 
 

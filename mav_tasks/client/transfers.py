@@ -1,8 +1,8 @@
-"""Plans on their way to and from task servers: one after another, tried again while that is safe.
+"""Uploads and downloads of plans: one at a time per component, retried while that is safe. Pure.
 
-An upload that came to nothing is repeated with the same bytes: within 10 s of the last try the
-server takes it for the same one. While it takes one from another client it refuses at once, and is
-asked again a little later. Pure.
+A failed upload is repeated with the same bytes: within 10 s of the last try the server treats it as
+the same upload. While another client uploads, the server refuses at once; the upload is then tried
+again after BUSY_AGAIN.
 """
 
 from collections import deque
@@ -16,13 +16,13 @@ from mav_tasks.services.mission_downloader import MissionDownloader
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import MissionUploader, Patience
 
-#: the server itself gives up after 2.3 s without an item
+#: the server gives up after 2.3 s without an item
 PATIENCE = Patience(count_again=0.5, give_up=2.6, at_most=60.0, last_again=0.5)
 TRIES = 4
-BUSY_AGAIN = 0.25  # s until the next try, where another client's upload is under way
-BUSY_WITHIN = 10.0  # s of such tries
-REST = 0.6  # s after a refusal, in which copies of it may still come
-LATE = 3.0  # s after an upload, in which copies of its ack may still come
+BUSY_AGAIN = 0.25  # s until the next try while another client uploads
+BUSY_WITHIN = 10.0  # s for which such tries continue
+REST = 0.6  # s after a refusal for which its copies may still arrive
+LATE = 3.0  # s after an upload for which copies of its ack may still arrive
 
 MESSAGES = (
     m.MissionAck,
@@ -33,7 +33,7 @@ MESSAGES = (
     m.MissionRequestInt,
 )
 
-#: MAV_MISSION_RESULT, None for silence; the plan's id
+#: MAV_MISSION_RESULT, None after a time-out; the plan's id
 Uploaded = Callable[[MavMissionResult | None, int], None]
 Downloaded = Callable[[tuple[Item, ...] | None, MavMissionResult | None], None]
 
@@ -44,7 +44,7 @@ class _Upload:
     items: tuple[Item, ...]
     done: Uploaded
     tries: int = 0
-    is_asked: bool = False  # an item of it was
+    is_asked: bool = False  # the server has requested an item
     give_way_until: float = 0.0
 
 
@@ -55,14 +55,14 @@ class _Download:
 
 
 class Transfers:
-    """Those with one component."""
+    """The uploads and downloads of one component."""
 
     def __init__(self, target: Address) -> None:
         self.target = target
         self._uploader = MissionUploader(target, patience=PATIENCE, fits=self._fits)
         self._downloader = MissionDownloader(target)
         self._waiting: deque[_Upload | _Download] = deque()
-        self._uploaded: dict[int, tuple[_Upload, float]] = {}  # by id; until when acks may come
+        self._uploaded: dict[int, tuple[_Upload, float]] = {}  # by id; until when acks may arrive
         self._now = 0.0
         self._rests_until: float | None = None
 
@@ -72,13 +72,13 @@ class Transfers:
     def upload(
         self, mission_type: int, items: tuple[Item, ...], done: Uploaded, *, now: float
     ) -> None:
-        """Send a plan; ``done`` is called once."""
+        """Upload a plan. Call ``done`` once."""
         self._begin(_Upload(mission_type, items, done), now=now)
 
     def drop(self, done: Uploaded) -> None:
-        """Nobody waits for an upload any more: one that has not begun is left out.
+        """Abandon an upload: remove it if it has not started.
 
-        One that has begun comes to its end, and is not tried again: it may be there already.
+        A started upload continues but is not retried: the server may have the plan already.
         """
         for upload in list(self._waiting):
             if isinstance(upload, _Upload) and upload.done is done:
@@ -87,11 +87,11 @@ class Transfers:
                     self._waiting.remove(upload)
 
     def download(self, mission_type: int, done: Downloaded, *, now: float) -> None:
-        """Fetch a plan; ``done`` is called once."""
+        """Download a plan. Call ``done`` once."""
         self._begin(_Download(mission_type, done), now=now)
 
     def receive(self, message: m.Message, *, now: float) -> None:
-        """Take in what the component says of plans."""
+        """Process a mission message of the component."""
         self._now = now
         if not self._waiting or self._rests_until is not None:
             return
@@ -103,13 +103,13 @@ class Transfers:
             self._downloader.receive(message, now=now)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
+        """Return when to call ``handle_deadline``; None: nothing is pending."""
         begin_at = self._rests_until if self._waiting else None
         due = (self._uploader.next_deadline(), self._downloader.next_deadline(), begin_at)
         return min((at for at in due if at is not None), default=None)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Ask and send again."""
+        """Repeat what is due, and start the next transfer."""
         for each in (self._uploader, self._downloader):
             due = each.next_deadline()
             if due is not None and now >= due:
@@ -120,11 +120,11 @@ class Transfers:
                 self._start(now=now)
 
     def take(self) -> list[m.Message]:
-        """Return what is to be sent since the last call."""
+        """Return the messages to send since the last call."""
         return self._downloader.take() + self._uploader.take()
 
     def _fits(self, opaque_id: int) -> bool:
-        """Whether an id can be that of the upload under way: of another plan it is not."""
+        """Return whether an id can be this upload's: not if another plan just got it."""
         upload = self._waiting[0]
         assert isinstance(upload, _Upload)
         earlier, until = self._uploaded.get(opaque_id, (upload, 0.0))

@@ -1,4 +1,4 @@
-"""What a client learns: frozen values of what the server's messages say. SI units."""
+"""Frozen values decoded from the server's messages. SI units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,15 +25,14 @@ class Unit(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class TaskStatus:
-    """One task as the server told it last.
+    """The last status of one task.
 
-    ``progress`` is 0 to 1, ``remaining`` in ``unit``, times in seconds; None is "not known".
-    ``position`` counts the tasks that run before it; only answers to a question have it. ``item``
-    of ``items`` is the item of a plan that is being driven, from 1 as in its file; of another task
-    it is the leg. ``version`` grows with each change, ``halt_epoch`` with all that makes its rover
-    stand. ``label`` is the name that its submitter gave it, "" for none.
-    stand. ``ended_ago``: seconds since it ended, as of the answer to a question; None: it is not
-    over, or the server does not tell.
+    ``progress`` is 0 to 1, ``remaining`` is in ``unit``, times are in seconds; None: unknown.
+    ``position`` is the number of tasks that run before it; only answers to a request have it.
+    ``item`` of ``items`` is the plan item being driven, from 1 as in its file; for other tasks it
+    is the leg. ``version`` grows with each change. ``halt_epoch`` grows with each event that halts
+    its rover. ``label`` is the submitter's name for it, "" for none. ``ended_ago``: seconds from
+    its end to the answer of a request; None: it has not ended, or the server does not say.
     """
 
     id: int
@@ -62,28 +61,28 @@ class TaskStatus:
 
     @property
     def is_over(self) -> bool:
-        """Whether it has ended, in whatever way."""
+        """Whether it has ended, in any final state."""
         return self.state in TERMINAL
 
     @property
     def is_active(self) -> bool:
-        """Whether it has begun and is not over."""
+        """Whether it has started and not ended."""
         return self.state in ACTIVE
 
     @property
     def is_waiting(self) -> bool:
-        """Whether it has not begun."""
+        """Whether it has not started."""
         return self.state in WAITING
 
 
 @dataclass(frozen=True, slots=True)
 class QueueStatus:
-    """A rover's queue. ``paused`` says why nothing runs, None: it does.
+    """A rover's queue. ``paused`` is the reason why it is paused, None: it is not.
 
-    ``counts`` are its tasks by state; ``waiting`` are those asked for, in the order in which they
-    run, those that wait for a time or another task after them. ``halt_epoch`` grows with all that
-    makes the rover stand. ``heartbeat_age``: seconds since the rover's last heartbeat reached the
-    server; inf: none since it started; None: it does not tell.
+    ``counts`` are its tasks by state. ``waiting`` are the requested waiting tasks in the order in
+    which they run; tasks that wait for a time or another task come last. ``halt_epoch`` grows with
+    each event that halts the rover. ``heartbeat_age``: seconds since the rover's last heartbeat
+    reached the server; inf: none since the server started; None: the server does not say.
     """
 
     vehicle: int
@@ -100,7 +99,7 @@ class QueueStatus:
 
     @property
     def waiting_count(self) -> int:
-        """How many tasks have not begun."""
+        """The number of tasks that have not started."""
         return sum(self.counts.get(state, 0) for state in WAITING)
 
 
@@ -108,10 +107,9 @@ class QueueStatus:
 class TaskTiming:
     """How evenly the setpoints of a task left the server while it was being driven.
 
-    ``rate`` in Hz is what the server is set to; of the ``count`` intervals between two setpoints
-    half were at most ``p50`` seconds, 99 in 100 at most ``p99``, and the longest is ``max``; None
-    where there was no interval. ``late`` of them were longer than one and a half of what ``rate``
-    asks for.
+    ``rate`` is the server's setpoint rate, Hz. ``count`` is the number of intervals between two
+    setpoints; ``p50`` and ``p99`` are their percentiles and ``max`` the longest, in seconds; None
+    without an interval. ``late`` intervals were longer than 1.5 / ``rate``.
     """
 
     id: int
@@ -127,10 +125,10 @@ class TaskTiming:
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:
     """A rover as its telemetry shows it. ``north`` and ``east`` in m, ``yaw`` in rad, ``speed`` in
-    m/s; None is "not heard", and so is "unknown" for ``kind`` and ``mode``. ``is_heard``: its
-    heartbeats come. ``server_component`` is the task server's component id inside its system.
+    m/s; None, or "unknown" for ``kind`` and ``mode``: not received. ``is_heard``: its heartbeats
+    arrive. ``server_component`` is the task server's component id in the rover's system.
     ``heartbeat_age``: seconds since its last heartbeat; inf: none since the server started; None:
-    none came here, and the server does not tell.
+    none arrived here, and the server does not say.
     """
 
     id: int
@@ -148,7 +146,7 @@ class VehicleStatus:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A STATUSTEXT: ``severity`` 0 (emergency) to 7 (debug), who said it, and the words."""
+    """A STATUSTEXT: its sender, ``severity`` 0 (emergency) to 7 (debug), and the text."""
 
     vehicle: int
     component: int
@@ -157,7 +155,7 @@ class Text:
 
 
 def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
-    """Return what a TASK_STATUS says; ``vehicle`` is the system that it came from."""
+    """Return a decoded TASK_STATUS; ``vehicle`` is the sender's system id."""
     reason = reason_of(message.reason)
     finish = known(message.time_to_finish)
     is_over = message.state in TERMINAL
@@ -189,7 +187,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
 
 
 def task_timing_of(message: m.TaskTiming, vehicle: int) -> TaskTiming:
-    """Return what a TASK_TIMING says; ``vehicle`` is the system that it came from."""
+    """Return a decoded TASK_TIMING; ``vehicle`` is the sender's system id."""
     return TaskTiming(
         id=message.task_id,
         vehicle=vehicle,
@@ -208,7 +206,7 @@ def queue_status_of(
     waiting: tuple[TaskStatus, ...],
     current: TaskStatus | None,
 ) -> QueueStatus:
-    """Return what a TASK_QUEUE_STATUS says, with tasks that were asked for besides."""
+    """Return a decoded TASK_QUEUE_STATUS, with tasks that were requested separately."""
     counts = {
         state: count for state, count in zip(TaskState, message.counts, strict=False) if count
     }
@@ -228,29 +226,29 @@ def queue_status_of(
 
 
 def heartbeat_age_of(message: m.TaskQueueStatus) -> float | None:
-    """Return s since the rover's last heartbeat, inf: none; None: the server does not tell."""
+    """Return s since the rover's last heartbeat; inf: none; None: the server does not say."""
     if not message.heartbeat_age:
         return None
     return inf if message.heartbeat_age == NO_HEARTBEAT else message.heartbeat_age / 1000
 
 
 def reason_of(number: int) -> TaskReason:
-    """Return a TASK_REASON; one of a newer server, that is not known here, as NONE."""
+    """Return a TASK_REASON; NONE for an unknown number of a newer server."""
     return TaskReason(number) if number in TaskReason._value2member_map_ else TaskReason.NONE
 
 
 def state_of(number: int) -> TaskState:
-    """Return a TASK_STATE; one that is not known here as UNKNOWN."""
+    """Return a TASK_STATE; UNKNOWN for an unknown number."""
     return TaskState(number) if number in TaskState._value2member_map_ else TaskState.UNKNOWN
 
 
 def unit_of(number: int) -> Unit:
-    """Return a TASK_UNIT; one that is not known here as NONE."""
+    """Return a TASK_UNIT; NONE for an unknown number."""
     return Unit(number) if number in Unit._value2member_map_ else Unit.NONE
 
 
 def known(value: float) -> float | None:
-    """Return a number, None for NaN."""
+    """Return the number; None if it is NaN or infinite."""
     return value if isfinite(value) else None
 
 

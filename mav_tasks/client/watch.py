@@ -1,7 +1,7 @@
-"""What a client knows of the tasks that it follows, and when that is worth asking about. Pure.
+"""The tasks that a client follows, and when to request their status. Pure.
 
-The server tells each change unasked. Where nothing was heard of a task for a while, although
-somebody waits for it, the word may have been lost, or the server was another process meanwhile.
+The server sends each change unasked. If a caller waits for a task and no status arrives for a
+while, a packet was lost or the server restarted: the client then requests the status.
 """
 
 from collections.abc import Callable
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 from mav_tasks.client.values import TaskStatus
 
-SILENT = 2.0  # s without a word of a task that is under way
-MOST_UNHELD = 100  # tasks followed, from which on it is looked whether anybody still holds them
-SILENT_WAITING = 10.0  # s, at the most, without a word of one that waits
+SILENT = 2.0  # s without a status of an active task
+MOST_UNHELD = 100  # followed tasks from which on ``shed`` removes those without a handle
+SILENT_WAITING = 10.0  # s, at most, for a waiting task
 
 
 @dataclass(slots=True, eq=False, weakref_slot=True)
 class Followed:
-    """One task: its latest status, None before the first; how many wait for news."""
+    """A followed task. ``status``: None before the first; ``listeners``: coroutines that wait."""
 
     id: int
     vehicle: int
@@ -25,17 +25,17 @@ class Followed:
     listeners: int = 0
     ask_at: float = 0.0
     patience: float = SILENT
-    is_asked: bool = False  # a question about it is under way
+    is_asked: bool = False  # a request for its status is in flight
     is_lost: bool = False
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing more will be heard of it."""
+        """Whether no more news will arrive."""
         return self.is_lost or (self.status is not None and self.status.is_over)
 
 
 class Watch:
-    """The tasks followed, and the streams wished for them."""
+    """The followed tasks, and the requested status streams."""
 
     def __init__(self) -> None:
         self._followed: dict[int, Followed] = {}
@@ -46,7 +46,7 @@ class Watch:
         return f"Watch({list(self._followed)})"
 
     def follow(self, task_id: int, vehicle: int, *, nonce: int | None, now: float) -> Followed:
-        """Follow a task; one that is followed already is given as it is."""
+        """Follow a task. Return the existing entry if it is followed already."""
         followed = self._followed.get(task_id)
         if followed is None:
             followed = self._followed[task_id] = Followed(task_id, vehicle, nonce=nonce)
@@ -54,18 +54,18 @@ class Watch:
         return followed
 
     def shed(self, is_held: Callable[[Followed], bool]) -> None:
-        """Follow no more what nobody holds; looks only now and then, as they become many."""
+        """Remove tasks without a handle or listener; does nothing until there are many."""
         if len(self._followed) < self._shed_at:
             return
         held = {number: f for number, f in self._followed.items() if f.listeners or is_held(f)}
         self._followed, self._shed_at = held, MOST_UNHELD + 2 * len(held)
 
     def get(self, task_id: int) -> Followed | None:
-        """Return one that is followed."""
+        """Return a followed task, None if it is not followed."""
         return self._followed.get(task_id)
 
     def receive(self, status: TaskStatus, *, now: float) -> Followed | None:
-        """Take a status in; gives the task if this is news of it."""
+        """Process a status. Return the followed task if this is news of it."""
         followed = self._followed.get(status.id)
         if followed is None or followed.is_over:
             return None
@@ -74,11 +74,11 @@ class Watch:
         before = followed.status
         if followed.nonce != status.nonce or (
             before is not None and before.command != status.command
-        ):  # an id that means another task now: the server has begun anew
+        ):  # the id names another task now: the server restarted its task ids
             self.lose(followed)
             return followed
         if before is not None and status.version < before.version:
-            return None  # overtaken on its way
+            return None  # a newer status arrived first
         followed.status = status
         followed.patience = SILENT if status.is_active else min(followed.patience, SILENT_WAITING)
         followed.ask_at = now + followed.patience
@@ -87,24 +87,24 @@ class Watch:
         return followed
 
     def lose(self, followed: Followed) -> None:
-        """The server knows it no more."""
+        """Mark a task as unknown to the server, and stop following it."""
         followed.is_lost = True
         if self._followed.get(followed.id) is followed:
             del self._followed[followed.id]
 
     def hurry(self, vehicle: int, *, now: float) -> None:
-        """Have all tasks of a vehicle asked about: its server may be another process."""
+        """Make all tasks of a vehicle due: its server may be another process."""
         for followed in self._followed.values():
             if followed.vehicle == vehicle:
                 followed.ask_at = now
                 followed.patience = SILENT
 
     def next_deadline(self) -> float | None:
-        """Return when somebody waits for news that are overdue."""
+        """Return when to call ``to_ask``; None: no caller waits."""
         return min((f.ask_at for f in self._followed.values() if _is_awaited(f)), default=None)
 
     def to_ask(self, *, now: float) -> list[Followed]:
-        """Return the tasks to ask about now; each time later, while they wait."""
+        """Return the tasks to ask about now; the interval of waiting tasks grows."""
         due = [f for f in self._followed.values() if _is_awaited(f) and now >= f.ask_at]
         for followed in due:
             if followed.status is not None and followed.status.is_waiting:
@@ -113,13 +113,13 @@ class Watch:
         return due
 
     def open_stream(self, vehicle: int, interval: float) -> float:
-        """Somebody wants the active task told so often (s); gives the interval to ask for."""
+        """Add a stream of the active task's status. Return the interval to request, s."""
         intervals = self._streams.setdefault(vehicle, [])
         intervals.append(interval)
         return min(intervals)
 
     def close_stream(self, vehicle: int, interval: float) -> float | None:
-        """Nobody wants that any more; gives the interval to ask for, None for no stream."""
+        """Remove a stream. Return the interval to request, s; None: no stream."""
         intervals = self._streams[vehicle]
         intervals.remove(interval)
         if not intervals:
@@ -127,7 +127,7 @@ class Watch:
         return min(intervals, default=None)
 
     def stream_of(self, vehicle: int) -> float | None:
-        """Return the interval that is wished for, seconds."""
+        """Return the requested interval, s; None: no stream."""
         return min(self._streams.get(vehicle, ()), default=None)
 
 

@@ -1,8 +1,8 @@
-"""Goals → commands and mission items, in the units and with the parameters that the contract names.
+"""Goals → commands and mission items, in the units and parameters of the dialect. Pure.
 
-Pure. Our own three goals go as commands, which carry a nonce and their terms; every other goal goes
-as a plan of one, whose TASK_OPTIONS item carries both: so that each submission can be repeated and
-is one task, and two equal ones are two.
+Move, Rotate and Drive are sent as commands with a nonce and task options. Any other goal is sent as
+a plan whose TASK_OPTIONS item carries both. So a repeated submission is one task, and two equal
+submissions are two tasks.
 """
 
 from collections.abc import Sequence
@@ -27,22 +27,22 @@ from mav_tasks.tasks.goal import (
 )
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_TASK_ID
 
-#: what a client can ask for; angles in radians
+#: the goals that a client can submit; angles in radians
 Goal = Move | Rotate | Drive | GoTo | Face | Wait
 Command = m.CommandLong | m.CommandInt
 
-LOCAL_SCALE = 1e4  # x and y in a local frame are metres times this
-LARGEST = 0x7FFFFFFE  # of x and y; one more is "not given"
-ON_THE_SPOT = 0.01  # m, how near a place is "there" where nothing is said
-STOPPING = 0.01  # s; a place without any time at it is passed
-NORTH = 360.0  # deg; 0 would be "as it comes"
-LEAST_YAW = 1e-4  # deg, which is north
-OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: as configured
+LOCAL_SCALE = 1e4  # x and y in a local frame are in units of 0.1 mm
+LARGEST = 0x7FFFFFFE  # largest x and y; INT32_MAX means "not given"
+ON_THE_SPOT = 0.01  # m, acceptance radius if none is given
+STOPPING = 0.01  # s, least hold time of a stop: a waypoint without hold is passed
+NORTH = 360.0  # deg, sent for north: 0 would mean "no heading"
+LEAST_YAW = 1e-4  # deg; a smaller yaw is sent as NORTH
+OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: the configured speed
 
 
 @dataclass(frozen=True, slots=True)
 class TaskOptions:
-    """On what terms a task is to run: seconds from now, an id, a priority."""
+    """When and how a task runs; ``delay`` and ``deadline`` in seconds from now."""
 
     priority: int = DEFAULT_PRIORITY
     after: int = 0
@@ -58,19 +58,19 @@ class TaskOptions:
 
 
 def check_nonce(nonce: int) -> None:
-    """Raise ValueError for what is no nonce, and not 0 for none."""
+    """Raise ValueError unless this is a nonce, or 0 for none."""
     _whole("nonce", nonce, 0, MAX_NONCE)
 
 
 def is_command(goal: Goal) -> bool:
-    """Whether a goal has a command of our own."""
+    """Return whether a goal has a command of its own."""
     return isinstance(goal, Move | Rotate | Drive)
 
 
 def command_of(
     goal: Move | Rotate | Drive, terms: TaskOptions, *, target: tuple[int, int], nonce: int
 ) -> m.CommandLong:
-    """Return the command that submits a goal; its deadline, if any, is set afterwards."""
+    """Return the command that submits a goal. The deadline is set afterwards."""
     command, first, second, third = _own(goal)
     return m.CommandLong(
         *target,
@@ -87,7 +87,7 @@ def command_of(
 
 
 def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
-    """Return the items of a plan that drives these goals in their order."""
+    """Return the items of a plan that drives the goals in order."""
     for goal in goals:
         if not isinstance(goal, Goal):
             raise ValueError(f"{goal!r}: expected a goal, such as Move(2.0)")
@@ -95,14 +95,14 @@ def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
 
 
 def items_of_file(items: Sequence[PlanItem]) -> tuple[Item, ...]:
-    """Return the items of a file as they are sent."""
+    """Return the items of a file as mission items."""
     return tuple(
         Item(i.frame, i.command, 0, int(i.autocontinue), *i.params, i.x, i.y, i.z) for i in items
     )
 
 
 def file_items(items: Sequence[Item]) -> tuple[PlanItem, ...]:
-    """Return items that were fetched as a file has them: the inverse of ``items_of_file``."""
+    """Return downloaded items as items of a file: the inverse of ``items_of_file``."""
     return tuple(
         PlanItem(
             i.command,
@@ -118,7 +118,7 @@ def file_items(items: Sequence[Item]) -> tuple[PlanItem, ...]:
 
 
 def with_home(items: Sequence[Item]) -> tuple[Item, ...]:
-    """Return items behind a home, as ArduPilot has it: each jump goes one further."""
+    """Return the items after a home item, as in ArduPilot; DO_JUMP targets move by one."""
     home = Item(MavFrame.GLOBAL, MavCmd.NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
     moved = (
         item._replace(param1=item.param1 + 1) if item.command == MavCmd.DO_JUMP else item
@@ -128,10 +128,10 @@ def with_home(items: Sequence[Item]) -> tuple[Item, ...]:
 
 
 def options_of(terms: TaskOptions, *, nonce: int) -> Item:
-    """Return the item about the plan as a whole.
+    """Return the TASK_OPTIONS item of a plan.
 
-    It goes last, so that the numbers in jumps stay right. The nonce tells this plan from an equal
-    one, and has the server know it when it is sent again, however late.
+    It goes last, so that the targets of jumps stay right. The nonce tells this plan from an equal
+    one, and lets the server recognize a late copy.
     """
     return Item(
         MavFrame.MISSION,
