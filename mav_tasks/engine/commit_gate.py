@@ -1,7 +1,7 @@
-"""Holds replies back until all events recorded so far are durable, each with a time limit.
+"""Holds values back until all events recorded so far are durable, each with a time limit.
 
-What waits is a value, not a callback. ``knows`` registers once for each type how such a value is
-carried out and how it is given up. Values are released in the order in which they came.
+``knows`` registers, once for each type, how such a value is carried out and how it is given up.
+Values leave in the order in which they came.
 """
 
 from collections import deque
@@ -38,7 +38,7 @@ class CommitGate:
         return len(self._held)
 
     def knows(self, kind: type[Kind], accept: Step[Kind], give_up: Step[Kind]) -> None:
-        """Register how values of type ``kind`` are carried out, and how they are given up."""
+        """Register how values of a type are carried out, and given up."""
         self._accept[kind], self._give_up[kind] = accept, give_up
 
     def hold(self, what: object, *, now: float) -> None:

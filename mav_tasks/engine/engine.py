@@ -1,8 +1,8 @@
-"""The whole server as one pure object with five methods. It only composes; its parts decide.
+"""The whole server as one pure object with five methods. It composes; its parts decide.
 
-``handle`` takes an input and ``handle_deadline`` runs the timers that are due. ``take_events``
-returns what the store must write, ``take_packets`` what the links must send, and ``snapshot`` a
-view of the state. Every ``now`` is in monotonic seconds and never goes back.
+``handle`` takes an input and ``handle_deadline`` runs due timers. ``take_events`` returns what the
+store must write, ``take_packets`` what the links must send. ``now`` is in monotonic seconds and
+never goes back.
 """
 
 from math import inf
@@ -72,7 +72,7 @@ class Engine:
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         kept = {} if restored is None else restored.parameters
         configured, (settings, why_not) = settings, with_all(settings, kept)
-        #: for each parameter that a client set and the latest settings override: the reason
+        #: why the latest settings override parameters that clients set
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
@@ -189,8 +189,8 @@ class Engine:
         )
         self._stop_by: float | None = None
         self._stopped = False
-        #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``.
-        #: The runner sends these packets if the engine raises
+        #: zero and HOLD for every driven vehicle, as of the last ``take_packets``; the runner sends
+        #: them if the engine raises
         self.emergency_stop_packets: tuple[Outgoing, ...] = ()
 
     def __repr__(self) -> str:
@@ -257,7 +257,7 @@ class Engine:
         return None if due == inf else due
 
     def handle_deadline(self, *, now: float) -> None:
-        """Do what is due by ``now``. A late call and a call for nothing are both allowed."""
+        """Do everything due by ``now``; the call may be late, or needless."""
         self.signatures.now = now
         if self._timers.not_before + self._settings.watch.late_tick < now:
             self._vehicles.check_late(now=now)
@@ -273,8 +273,7 @@ class Engine:
     def take_events(self) -> list[Event]:
         """Return the events since the last call, to be made durable in this order.
 
-        Events are numbered from 1 over the life of the engine; ``Committed`` refers to these
-        numbers.
+        They are numbered from 1 over the life of the engine; ``Committed`` has such a number.
         """
         events, self._journal = self._journal, []
         return events
@@ -315,13 +314,13 @@ class Engine:
         self._publisher.send_statuses(now=now)
 
     def _note_unheard(self, *, now: float) -> None:
-        """Pause every vehicle, if configured so, because no ground station is heard any more."""
+        """Pause all vehicles, if configured so: no ground station is heard any more."""
         if self._settings.operator_lost == "pause":
             for vehicle in self._vehicles.addressed_by(0):
                 vehicle.joint.on(ControlEvent.OPERATOR_LOST, UNHEARD, now=now)
 
     def _settle(self, *, now: float) -> None:
-        """Send the vehicles' answers to clients, and pass new events to clients and the journal."""
+        """Pass the vehicles' answers to clients, and new events to clients and the journal."""
         room, signatures = self._fleet.room, self.signatures
         if self._parameters.is_changed:
             self._apply(self._parameters.take_change())

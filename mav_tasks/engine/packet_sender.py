@@ -54,7 +54,7 @@ class PacketSender:
         self._put(with_seq(packet, seq))
 
     def withhold(self, source: Address) -> None:
-        """Skip the number of a packet that is not forwarded, so that the receiver sees no gap."""
+        """Skip the number of a packet that is not forwarded, so that no gap shows."""
         self._sequence.withheld(source)
 
     def continue_numbers(self, packet: Packet) -> None:

@@ -1,4 +1,4 @@
-"""Routes incoming packets to the parts that handle them; packets that halt a rover come first."""
+"""Routes incoming packets to the parts that handle them; halts come first."""
 
 from collections.abc import Sequence
 
@@ -30,7 +30,7 @@ from mav_tasks.services.command_receiver import command_of
 
 
 class Reception:
-    """The input side of the engine: handles what all links deliver."""
+    """Handles what all links deliver."""
 
     def __init__(
         self,

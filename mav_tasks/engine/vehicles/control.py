@@ -1,9 +1,9 @@
 """Who may move a vehicle, and what follows from each event: the one table of joint control.
 
-The server, clients through it, and people at the vehicle all want to move it. Everything that
-happens is an ``Event``. ``effects_of`` returns the effects of an event in a ``State``, by name and
-in order; ``hands`` carries them out and decides nothing. The first row that fits counts. An event
-among the effects goes through the table again, in the state at that time.
+We, clients through us, and people at the vehicle want to move it. ``effects_of`` returns the
+effects of an ``Event`` in a ``State``, in order; ``hands`` carries them out and decides nothing.
+The first row that fits counts. An event among the effects goes through the table again, in the
+state at that time.
 
 ``tools/control_diagram.py`` draws the table. ``tests/unit/engine/vehicles/test_control.py`` walks
 through every state that can be reached.
@@ -34,9 +34,9 @@ class Event(Enum):
     LAPSED = auto()  # it shows HOLD while set-points stream: a failsafe's, or somebody's
     LATE_MODE = auto()  # it shows a mode that a client asked for before a halt
     LATE_ARMING = auto()  # it shows armed, by a request from before a disarming or STOP
-    EXPLAINED = auto()  # a failsafe turns out to have taken it
-    MODE_IN_STOP = auto()  # it shows a mode that we did not ask for, while STOP is latched
-    DISARMED = auto()  # it shows disarmed, and we did not disarm it
+    EXPLAINED = auto()  # it was its failsafe that has taken it
+    MODE_IN_STOP = auto()  # the same, while STOP is latched
+    DISARMED = auto()  # it shows that, and not by us
     PARKED = auto()  # somebody who was driving has set HOLD
     STICK = auto()  # a stick is off its centre, in our mode
     DRIVEN_BY_HAND = auto()  # a client sends manual control
@@ -121,7 +121,7 @@ Step = Effect | Event
 
 
 class Row(NamedTuple):
-    """The effects of an event in the states whose fields have the values that ``where`` allows."""
+    """The effects of an event in the states that ``where`` allows."""
 
     event: Event
     effects: tuple[Step, ...]
@@ -133,7 +133,7 @@ class Row(NamedTuple):
 
 
 def _row(event: Event, *effects: Step, **where: object) -> Row:
-    """Return a row; each keyword in ``where`` is one allowed value or a tuple of them."""
+    """Return a row; each of ``where`` is one value or a tuple of values."""
     values = {
         name: frozenset(value if isinstance(value, tuple) else (value,))
         for name, value in where.items()
@@ -194,7 +194,7 @@ TABLE = (
         *(_F.COUNT, *UNARMS, _F.ZERO_KEPT, _E.TAKEN),
         grip=ENGAGED,
     ),
-    # if the stream ended here, it would leave a velocity behind
+    # a stream that ends here would leave a velocity behind
     _row(
         _E.DISARM,
         *(_F.COUNT, *UNARMS, *TAKE_BACK, _F.ZERO),
@@ -206,7 +206,7 @@ TABLE = (
         _E.CANCEL,
         *(_F.FORGET_GO_TO, _F.FORGET_START, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
     ),
-    # a late set-point of the client would drive it on
+    # its late set-point would drive it on
     _row(
         _E.CLEAR,
         *(_F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.COUNT, *TAKE_BACK, _F.LET_GO),
@@ -238,7 +238,7 @@ TABLE = (
         *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
         work=GOES_ON,  # also a task that runs although the queue is paused
     ),
-    # it was being stopped: a waiting task must not drive it off from where somebody takes it
+    # it was being stopped: no waiting task may drive it off from where somebody takes it
     _row(
         _E.TAKEN,
         *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
@@ -257,7 +257,7 @@ TABLE = (
     # the next set-point under way would end a failsafe's HOLD
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
-    # something was let go since the halt: the mode is set by a person at the vehicle, or as good as
+    # something was let go since: it is a person at the vehicle, or as good as one
     _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.LOST)),
     _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # we are asking for HOLD
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
@@ -266,8 +266,7 @@ TABLE = (
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, work=Work.NONE),
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, _F.PAUSE),  # or a waiting task would arm it
     _row(_E.EXPLAINED, _F.TELL, _F.PAUSE_TAKEN),
-    # the request was sent before the STOP, and is late; a later mode is set by a person at the
-    # vehicle
+    # a late request from before the STOP; later, it is a person at the vehicle
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING, _F.BRAKE, is_late=True, grip=Grip.FREE),
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING),
     _row(_E.DISARMED, _F.WITHDRAW_ARMING, _F.OUTDATE_OUR_ARMING, _F.ZERO_KEPT, _E.TAKEN),
@@ -302,7 +301,7 @@ TABLE = (
     _row(_E.SECOND, _F.NOTE_OTHERS, _E.TAKEN, grip=Grip.FREE),
     _row(_E.SECOND, _F.NOTE_OTHERS, _F.ZERO_AND_HOLD, _E.TAKEN),
     _row(_E.REBOOTED, *TAKE_BACK, _F.TELL, queue=Queue.STOPPED),
-    # it may also be a late report of its start: HOLD does no harm to a restarted vehicle
+    # it may be a late report of its start: HOLD does no harm to a restarted vehicle
     _row(
         _E.REBOOTED,
         *(*TAKE_BACK, _F.DO),
@@ -372,7 +371,7 @@ _ROWS = {event: tuple(row for row in TABLE if row.event is event) for event in E
 
 
 def effects_of(event: Event, state: State) -> tuple[Step, ...]:
-    """Return what is done about an event in a state, in order. Raise LookupError if no row fits."""
+    """Return what is done about an event, in order. Raise LookupError if no row fits."""
     for row in _ROWS[event]:
         if row.fits(state):
             return row.effects

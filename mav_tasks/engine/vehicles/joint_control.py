@@ -1,7 +1,7 @@
 """Joint control of one vehicle: passes each request and each event through the control table once.
 
-Its priorities: STOP comes before everything. What somebody else did to the vehicle comes before
-what we want. A vehicle that is not ours gets no set-point at all.
+STOP comes first, then what somebody else did to the vehicle, then what we want. A vehicle that is
+not ours gets no set-point at all.
 """
 
 from collections.abc import Callable, Hashable
@@ -26,7 +26,7 @@ R = TaskReason
 
 
 class JointControl:
-    """The entry point for every request to one vehicle, and for every event seen on it."""
+    """The entry point for each request to one vehicle and each event seen on it."""
 
     def __init__(self, parts: Parts, pilot: Pilot, view: Callable[[float], VehicleView]) -> None:
         """``view`` returns a snapshot of the vehicle at a time."""
@@ -104,7 +104,7 @@ class JointControl:
         self.on(Event.DRIVEN_BY_HAND, word, now=now)
 
     def check_late(self, *, now: float) -> None:
-        """Stop a vehicle that drove on while the server was stalled, and hold its task.
+        """Stop a vehicle that drove on during a stall of the server, and hold its task.
 
         What arrived meanwhile looks fresh but is not, so it must not steer anything.
         """
@@ -119,7 +119,7 @@ class JointControl:
         self.on(Event.CLOSE, Word(), now=now)
 
     def note_rest(self, *, now: float) -> None:
-        """The server ends now: store where the vehicle of the interrupted task has come to rest."""
+        """The server ends now: store where the interrupted task has come to rest."""
         if self._stops_task:
             self._parts.tasks.rest(self._view(now), now=now)
 
@@ -145,7 +145,7 @@ class JointControl:
         self.on(Event.SKIP, Word(R.SKIPPED, actor, do=call_off), now=now)
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
-        """Cancel the waiting tasks; with ``begun_too`` also the suspended and the active one."""
+        """Cancel the waiting tasks; with ``begun_too`` also suspended and active ones."""
 
         def call_off() -> None:
             self._parts.tasks.clear(begun_too=begun_too, actor=actor, now=now)
@@ -195,9 +195,8 @@ class JointControl:
     ) -> None:
         """Let a held task resume. Raise Rejection if it could not take the vehicle now.
 
-        After a restart of the vehicle the release also restores the permission to arm, if the
-        person may give it (``may_continue``). If somebody disarmed the vehicle, it stays so until a
-        continue.
+        After a restart of the vehicle it restores the permission to arm, if the person may give
+        that (``may_continue``). A vehicle that somebody disarmed stays so until a continue.
         """
         authority = self._parts.authority
         restores = may_continue and authority.is_withdrawn_by_restart
@@ -225,15 +224,14 @@ class JointControl:
     def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
         """Note that a client's mode request goes to the vehicle through us.
 
-        A request for our own mode makes that mode count as set by us. A request for another mode is
-        a takeover once a heartbeat shows that mode. Until then, no request of ours may work against
-        it.
+        Our own mode then counts as set by us. Another mode is a takeover once a heartbeat shows it;
+        until then, no request of ours may work against it.
         """
         parts = self._parts
         authority, persona = parts.authority, parts.persona
         present_mode = parts.monitor.custom_mode
-        # The vehicle enters that mode only while setpoints stream, and it has not received any yet.
-        # The stream passes once the vehicle is armed, which no heartbeat may have shown yet.
+        # The vehicle enters that mode only while setpoints stream, and has not received any yet.
+        # They pass once it is armed, which no heartbeat may have shown yet.
         streams = persona.arms_in_hold and authority.streams(client, now=now)
         if mode != persona.control_mode:
             event = Event.ASK_OTHER_MODE

@@ -22,13 +22,13 @@ class Grip(Enum):
 
     #: we send nothing
     FREE = auto()
-    #: we ask for modes and arming; the vehicle does not move
+    #: we ask for modes and arming; it does not move
     TAKING = auto()
-    #: the vehicle follows our set-points
+    #: it follows our set-points
     DRIVING = auto()
-    #: the vehicle stands; we ask for HOLD, then for disarming
+    #: it stands; we ask for HOLD, then for disarming
     RELEASING = auto()
-    #: the stop ladder runs until the vehicle is seen to stand
+    #: the stop ladder, until it is seen to stand
     STOPPING = auto()
 
 
@@ -41,9 +41,9 @@ class Work(Enum):
     WAITS = auto()
     #: the active task starts or drives
     RUNS = auto()
-    #: the active task is being cancelled: the vehicle comes to a stop
+    #: the active task is being cancelled, and comes to a stop
     ENDS = auto()
-    #: the active task stands until the vehicle, or its position, is heard again
+    #: the active task waits until the vehicle, or its position, is heard again
     LOST = auto()
     #: the active task is paused or held
     STANDS = auto()
@@ -52,10 +52,10 @@ class Work(Enum):
 
 
 class Driver(Enum):
-    """The source, other than us, of the set-points or stick input seen just now."""
+    """Who else's set-points or stick input were seen just now."""
 
     NOBODY = auto()
-    #: a client that has the grant to drive through us
+    #: a client that was granted to drive through us
     CLIENT = auto()
     #: a person at the sticks, or a second controller
     OTHERS = auto()
@@ -95,5 +95,5 @@ class State(NamedTuple):
     is_late: bool = False  # packets sent before the last STOP may still arrive
     lingers: bool = False  # persona: a "go to" may follow HOLD and undo it
     has_failsafe: bool = False  # persona: it leaves our mode when set-points end
-    heeds_stick: bool = False  # persona: it takes the throttle stick as a speed, also in our mode
+    heeds_stick: bool = False  # persona: it takes a stick as a speed, also in our mode
     brakes: bool = False  # set-points stop it sooner than HOLD, also against a held stick
