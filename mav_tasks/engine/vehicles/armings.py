@@ -11,7 +11,7 @@ LATE = 3.5  # s after a request, in which packets sent before it may still reach
 SHOWN_LATE = LATE + 1.5
 RESENT = 1.0  # s in which an unanswered arming is sent again
 UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may still be from before it
-BY_CLIENT = 2.0  # s after a client's request to arm or for a mode, in which it causes that
+BY_CLIENT = 2.0  # s in which an arming or mode counts as the result of a client's request
 
 
 class Armings:

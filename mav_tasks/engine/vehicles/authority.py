@@ -13,7 +13,7 @@ from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
 
 STREAM_GAP = 0.5  # s between the setpoints of a stream: OFFBOARD needs at least 2 Hz
-ANY_MODE = -1  # for a command that may set a mode, which one is up to the vehicle
+ANY_MODE = -1  # key for commands by which the vehicle may choose any mode
 
 
 @dataclass(frozen=True, slots=True)

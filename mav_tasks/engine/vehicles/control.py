@@ -34,9 +34,9 @@ class Event(Enum):
     LAPSED = auto()  # it shows HOLD while set-points stream: a failsafe's, or somebody's
     LATE_MODE = auto()  # it shows a mode that a client asked for before a halt
     LATE_ARMING = auto()  # it shows armed, by a request from before a disarming or STOP
-    EXPLAINED = auto()  # it was its failsafe that has taken it
+    EXPLAINED = auto()  # a text explains the takeover: a failsafe's
     MODE_IN_STOP = auto()  # the same, while STOP is latched
-    DISARMED = auto()  # it shows that, and not by us
+    DISARMED = auto()  # it shows disarmed, not by us
     PARKED = auto()  # somebody who was driving has set HOLD
     STICK = auto()  # a stick is off its centre, in our mode
     DRIVEN_BY_HAND = auto()  # a client sends manual control

@@ -19,7 +19,7 @@ BUTTONS = '"Held: rest", "Held: again" or "Held: skip"'
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """The particulars of an event: reason and actor, the text to report, and the request itself."""
+    """An event's particulars: reason, actor, the text to report, and the request itself."""
 
     reason: TaskReason = TaskReason.OPERATOR
     actor: str = SERVER
@@ -74,13 +74,13 @@ def _let_go(on: Reach, _word: Word, now: float) -> None:
 
 @_does(Effect.STEP)
 def _step(on: Reach, _word: Word, now: float) -> None:
-    """Run the tasks, and carry out their demand, in this very step."""
+    """Run the tasks in this very step."""
     on.step(now)
 
 
 @_does(Effect.WATCH)
 def _watch(on: Reach, _word: Word, now: float) -> None:
-    """Run the stop ladder from here on until the vehicle stands."""
+    """Run the stop ladder from here on."""
     on.pilot.watch(now=now)
 
 
@@ -168,7 +168,7 @@ def _pause(on: Reach, word: Word, now: float) -> Any:
 
 @_does(Effect.PAUSE_TAKEN)
 def _pause_taken(on: Reach, word: Word, now: float) -> Any:
-    """Pause queue and active task, because somebody else has the vehicle; return its id."""
+    """Pause queue and task because somebody else has the vehicle; return the task's id."""
     reason = word.reason if word.reason in TAKEN else TaskReason.TAKEOVER
     return on.parts.tasks.pause(reason, actor=on.parts.actor, now=now)
 
@@ -278,19 +278,19 @@ def _left(on: Reach, _word: Word, now: float) -> None:
 
 @_does(Effect.TELL)
 def _tell(on: Reach, word: Word, now: float) -> None:
-    """Report the text to everybody."""
+    """Report the text."""
     on.parts.note(word.text, now=now)
 
 
 @_does(Effect.TELL_TAKEN)
 def _tell_taken(on: Reach, word: Word, now: float) -> None:
-    """Report to everybody what has taken the vehicle."""
+    """Report what has taken the vehicle."""
     on.parts.note(f"taken over: {word.text}", now=now)
 
 
 @_does(Effect.TELL_STICK)
 def _tell_stick(on: Reach, _word: Word, now: float) -> None:
-    """Report to everybody that a stick keeps the vehicle from driving."""
+    """Report that a stick keeps the vehicle from driving."""
     on.parts.note("has a stick off centre: HOLD. Centre it", now=now)
 
 

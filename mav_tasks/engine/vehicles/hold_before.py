@@ -1,4 +1,4 @@
-"""A HOLD that nobody may have meant: some clients send one before each "go to".
+"""A HOLD that nobody may have meant: some clients silently send one before each "go to".
 
 MAVSDK does so to a PX4 whenever the mode is another one. The vehicle still stops at once. But its
 mode is left alone for a while, and a "go to" in that time undoes the pause.

@@ -73,33 +73,33 @@ class JointControl:
     # requests that halt the vehicle
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
-        """STOP: send zero and HOLD in this very step. Return the task that was killed."""
+        """STOP: send zero and HOLD in this very step. Return the id of the killed task."""
         self.stopped_at = now
         killed: TaskId | None = self.on(Event.STOP, Word(R.STOPPED, actor, clear=clear), now=now)
         return killed
 
     def hold(self, *, sender: Hashable, actor: str, now: float) -> TaskId | None:
-        """A client asks for HOLD. Return the task that it pauses."""
+        """Handle a client's HOLD. Return the id of the task that it pauses."""
         paused: TaskId | None = self.on(Event.HOLD, Word(actor=actor, sender=sender), now=now)
         return paused
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
-        """Pause the queue and the active task, if there is one. Return that task."""
+        """Pause the queue and the active task, if there is one. Return its id."""
         paused: TaskId | None = self.on(Event.PAUSE, Word(actor=actor), now=now)
         return paused
 
     def disarm(self, *, actor: str, now: float) -> None:
-        """A client disarms the vehicle: only a newer request arms it again."""
+        """Handle a client's disarming: only a newer request arms the vehicle again."""
         word = Word(R.DISARMED, actor, "disarmed by a client")
         self.on(Event.DISARM, word, now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
-        """Setpoints, or our own address, come from elsewhere: send HOLD once, then let go."""
+        """Send HOLD once and let go: setpoints, or our own address, come from elsewhere."""
         word = Word(R.OTHER_CONTROLLER, str(who), f"second controller {who}")
         self.on(Event.SECOND, word, now=now)
 
     def sticks_moved(self, *, now: float) -> None:
-        """A client sends manual control input."""
+        """Let go: a client sends manual control input."""
         word = Word(R.TAKEOVER, self._parts.actor, "driven by hand")
         self.on(Event.DRIVEN_BY_HAND, word, now=now)
 
@@ -112,14 +112,14 @@ class JointControl:
             self.on(Event.LATE, Word(R.LATE), now=now)
 
     def shut_down(self, *, now: float) -> None:
-        """The server ends: pause the active task, stop what we drive, and start no more tasks."""
+        """Shut down: pause the active task, stop what we drive, and start no more tasks."""
         self._pilot.close()
         active = self._parts.tasks.active
         self._stops_task = active is not None and active.state in RUNNING
         self.on(Event.CLOSE, Word(), now=now)
 
     def note_rest(self, *, now: float) -> None:
-        """The server ends now: store where the interrupted task has come to rest."""
+        """Store where the interrupted task has come to rest: the server ends now."""
         if self._stops_task:
             self._parts.tasks.rest(self._view(now), now=now)
 
@@ -158,8 +158,8 @@ class JointControl:
     def proceed(self, *, actor: str, now: float) -> TaskId | None:
         """Release STOP, takeover and pause, and allow arming again. A held task stays held.
 
-        Return the task that resumes. Raise Rejection if the active task could not take the vehicle
-        now.
+        Return the id of the task that resumes. Raise Rejection if the active task could not take
+        the vehicle now.
         """
         authority = self._parts.authority
         may_arm = authority.may_arm_again
@@ -181,7 +181,7 @@ class JointControl:
         self.on(Event.GO_ON, Word(R.NONE, actor, do=go_on), now=now)
 
     def go_to_follows(self, number: int, *, actor: str, now: float) -> None:
-        """A client's "go to" is durable: undo the pause by the HOLD just before it."""
+        """Undo the pause by the HOLD just before a client's "go to", which is durable now."""
         is_still = self._parts.hold_before.is_still(number)
         if not is_still or self._parts.tasks.paused is not R.OPERATOR:
             return
@@ -245,7 +245,7 @@ class JointControl:
         self.on(event, Word(R.TAKEOVER, parts.actor, text, do=ask), now=now)
 
     def arm(self, *, now: float) -> None:
-        """A client's request to arm goes to the vehicle through us."""
+        """Handle a client's request to arm, which goes to the vehicle through us."""
 
         def ask() -> None:
             self._parts.armings.client_arms(now=now)
@@ -255,7 +255,7 @@ class JointControl:
     # the end of a client's own driving
 
     def end_driving_of(self, client: Hashable, *, now: float) -> None:
-        """A client asks for a return, a "go to" or a mission: end its own setpoints.
+        """End a client's own setpoints, because it asks for a return, a "go to" or a mission.
 
         The vehicle stops, so that neither the client's last velocity nor a failsafe for lost
         setpoints acts before the new request.
@@ -264,12 +264,12 @@ class JointControl:
             self.on(Event.DRIVING_ENDS, Word(), now=now)
 
     def client_is_gone(self, client: Hashable, *, now: float) -> None:
-        """A client's connection ended: stop what it drove, before the vehicle's own timeout."""
+        """Stop what a disconnected client drove, without waiting for the vehicle's timeout."""
         if self._parts.authority.forget(client):
             self.on(Event.GONE, Word(), now=now)
 
     def stand_down(self, client: Hashable, *, now: float) -> None:
-        """A client has landed the vehicle: disarm it once no task is left to drive.
+        """Disarm the vehicle, which a client has landed, once no task is left to drive.
 
         Raise Rejection under STOP, and while a person drives.
         """
@@ -280,7 +280,7 @@ class JointControl:
         self.on(Event.LANDED, Word(), now=now)
 
     def leave_manual(self, *, now: float) -> None:
-        """A client starts a mission: end manual control, as an autopilot would.
+        """End manual control, as an autopilot would: a client starts a mission.
 
         The vehicle goes to HOLD, from which tasks take it.
         """

@@ -1,4 +1,4 @@
-"""The state that decides who may move a vehicle: the state of its joint control, as one value."""
+"""The state of joint control, as one value: it decides who may move a vehicle."""
 
 from enum import Enum, Flag, auto
 from typing import NamedTuple
@@ -55,7 +55,7 @@ class Driver(Enum):
     """Who else's set-points or stick input were seen just now."""
 
     NOBODY = auto()
-    #: a client that was granted to drive through us
+    #: a client with a grant to drive through us
     CLIENT = auto()
     #: a person at the sticks, or a second controller
     OTHERS = auto()

@@ -14,9 +14,9 @@ from mav_tasks.engine.vehicles.stop_ladder import MOVES, NO_EFFECT, Step, StopLa
 from mav_tasks.settings import Watch
 
 NEARLY_STANDS = 0.1  # m/s; a vehicle that rolls on in HOLD from this speed rolls at most 5 cm
-SWINGS = 1.0  # s in which a car may swing back, at 0.15 m/s, after its task's zeros (ArduPilot)
+SWINGS = 1.0  # s in which a car may swing back, up to 0.15 m/s, after its task's zeros (ArduPilot)
 RUNS_ON = 0.4  # m/s on a task's zeros, more than a wound-up speed loop explains
-ROLLS = 0.03  # m/s above which a vehicle that rolls out still brakes; at 0.05 it rolled on for 9 cm
+ROLLS = 0.03  # m/s above which one that rolls out still brakes; with 0.05 it rolled on for 9 cm
 BRAKES_WITHIN = 2.0  # s to stop from 2 m/s at 1 m/s²; after that, HOLD takes over
 SPEED_WINDOW = 0.3  # s of positions from which its speed is computed
 

@@ -78,7 +78,7 @@ class Parts:
         return self.monitor.armed and not self.armings.do_not_count(ours=ours, now=now)
 
     def note(self, text: str, *, now: float) -> None:
-        """Send a text about the vehicle to everybody."""
+        """Report a text about the vehicle."""
         self.registry.record(VehicleNoted(self.system_id, text, now))
 
     def withdraw_arming(self, *, now: float) -> None:

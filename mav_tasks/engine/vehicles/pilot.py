@@ -56,7 +56,7 @@ class Pilot:
         self.guard.apply(settings.watch)
 
     def close(self) -> None:
-        """The server ends: from here on, only stop the vehicle."""
+        """Only stop the vehicle from here on: the server ends."""
         self._is_closing = True
 
     def follow(self, *, now: float) -> list[Seen]:
@@ -224,9 +224,9 @@ class Pilot:
         return None
 
     def _is_deaf(self, *, now: float) -> bool:
-        """Return whether a task stands by a gap, and no heartbeat since shows who drives.
+        """Return whether a task stands after a loss, and no heartbeat has come yet.
 
-        A person may have taken the vehicle over in the gap: HOLD would undo that, zeros would not.
+        A person may have taken the vehicle over meanwhile: HOLD would undo that, zeros would not.
         """
         parts = self._parts
         heard_at, lost_at = parts.monitor.heard_at, parts.tasks.lost_since

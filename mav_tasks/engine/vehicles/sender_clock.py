@@ -13,8 +13,8 @@ from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, LocalPositio
 Stamped = Attitude | GlobalPositionInt | LocalPositionNed
 
 OVERFLOW = 1 << 32  # ms; the field overflows after 49.7 days
-#: ms around the expected clock, within which a clock has overflowed: a copy may be 20 s late and
-#: its original 4 s
+#: ms behind and ahead of the expected clock, within which an overflowed clock lies: a copy may be
+#: 20 s late and its original 4 s
 LATEST, AHEAD = 25_000, 5_000
 REBOOT = 1000  # ms that a clock must go back to mean a restart, not reordering
 #: s by which a restart may seem to precede the last message before it, if delays shrink
@@ -47,7 +47,7 @@ class SenderClock:
         return f"SenderClock({self._newest} ms, {self.offset!r})"
 
     def hear(self, message: Stamped, *, now: float) -> Heard:
-        """Process the time stamp of a message, and classify the message."""
+        """Classify a message by its time stamp."""
         ms = self._counted_on(message.time_boot_ms, now=now)
         if self._newest is not None and self._newest - ms >= REBOOT:
             return self._went_back(ms, now=now)
@@ -60,7 +60,7 @@ class SenderClock:
         return Heard.NEWS
 
     def sent_at(self, time_boot_ms: int, *, now: float) -> float:
-        """Return when a message that comes now was sent, by our clock; now if that is unknown."""
+        """Return when a message that comes now was sent, by our clock; ``now`` if unknown."""
         made_at = self._counted_on(time_boot_ms, now=now) / 1000 + self.offset.at(now=now)
         return now if now - made_at < ROUNDING else made_at
 

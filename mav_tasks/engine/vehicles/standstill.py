@@ -24,8 +24,7 @@ WINDOW = 1.0  # s over which the displacement alone decides
 KEPT = 6.0  # s of samples, for the longest window and for learning
 SPACING = 0.035  # s between kept samples; positions come at 20 to 50 Hz
 COVERED = 0.15  # s by which the first sample may be younger than the start of its window
-#: m in a second; a rover with good sensors drifts 0.015 at rest (measured), less than one at 0.05
-#: m/s
+#: m in a second: more than the 0.015 measured at rest with good sensors, less than at 0.05 m/s
 LEAST_WAY = 0.03
 LEAST_SPEED = 0.09  # m/s reported at rest before anything was learnt; 0.07 was measured
 MOST_WAY = 0.25  # m in a second that count as noise at most; the most that was measured is 0.21

@@ -74,7 +74,7 @@ class Takeovers:
             self._taken(Event.PARKED, "", now=now)
 
     def look(self, *, was_mode: int, was_armed: bool, before: Before, now: float) -> None:
-        """Detect what a heartbeat shows that is new; ``before`` is the state just before it."""
+        """Detect what a heartbeat shows that is new; ``before`` is the state before it."""
         parts = self._parts
         armed, mode = parts.monitor.armed, parts.monitor.custom_mode
         if mode != was_mode:

@@ -142,7 +142,7 @@ class Vehicle:
         return self._monitor.heard_at
 
     def is_heard(self, *, now: float) -> bool:
-        """Return whether its heartbeats are coming."""
+        """Return whether its last heartbeat is recent."""
         return now - self._monitor.heard_at <= self._monitor.lost_after
 
     def count(self, seq: int, *, now: float) -> None:
@@ -259,7 +259,7 @@ class Vehicle:
             self.tasks.terms.set_home(place, frame, actor=SERVER, now=now)
 
     def home_was_set(self, command: m.Message, *, actor: str, now: float) -> None:
-        """A client's DO_SET_HOME was accepted: tasks return to the new home, too."""
+        """Store the home of a client's accepted DO_SET_HOME: tasks return there, too."""
         place, frame = home_meant(command) or self.where.here, self.where.frame.frame()
         if place and frame:
             self.tasks.terms.set_home(place, frame, actor=actor, now=now)

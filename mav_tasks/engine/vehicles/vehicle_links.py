@@ -146,8 +146,7 @@ class VehicleLinks:
     def moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
         """Move a vehicle that fell silent to the place of this heartbeat. Return whether it moved.
 
-        If its id was heard there while it was itself still heard, that is another vehicle, for
-        good.
+        An id that was heard there while the vehicle was still heard is another vehicle, for good.
         """
         rival = vehicle.system_id, link, peer
         if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:

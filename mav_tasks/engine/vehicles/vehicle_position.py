@@ -57,9 +57,8 @@ class VehiclePosition:
     def home(self) -> GlobalPlace | None:
         """The place to which the vehicle returns: the nearest rally point, else its home.
 
-        Home is where it was first armed, or what somebody set. The home that it reports itself is
-        the last resort: it moves with the vehicle while disarmed (ArduPilot), or at each arming
-        (PX4).
+        Home is where it was first armed, or what somebody set. Its own home is the last resort:
+        that moves with it while disarmed (ArduPilot), or at each arming (PX4).
         """
         motion = self.motion.latest() if self._bounds.rally else None
         rally = None if motion is None else self._bounds.refuge(motion.pose, self.frame.origin)

@@ -227,8 +227,7 @@ class VehicleRequests:
         setpoints = self.control.take_messages()
         outgoing, answers = self._sender.take()
         is_handed_back = self.control.phase is Phase.RELEASING and self._persona.has_loss_failsafe
-        # HOLD also stops a vehicle that ignores setpoints, and a zero before it would end a
-        # failsafe
+        # HOLD also stops one that ignores setpoints, and a zero before it would end a failsafe
         if is_handed_back or self.control.phase is Phase.STOPPING:
             outgoing += setpoints
         else:  # in our mode, a zero must come before arming

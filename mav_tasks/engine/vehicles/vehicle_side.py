@@ -159,7 +159,7 @@ class VehicleSide:
         return next((tasks for tasks in self.unheard if tasks.vehicle == system_id), None)
 
     def has_listened(self, *, now: float) -> bool:
-        """Return whether this run has lasted long enough to hear every vehicle that is there."""
+        """Return whether this run is old enough to have heard every vehicle that is there."""
         return now - self._fleet.began_at > self._settings.watch.heartbeat_lost
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
