@@ -1,1 +1,1 @@
-"""The whole server as one pure object: services and tasks composed."""
+"""The engine: the whole server as one pure object, composed of services and tasks."""

@@ -1,7 +1,7 @@
-"""What waits until all that was recorded is durable, each with its time limit: values, no code.
+"""Holds values back until all events recorded so far are durable, each with a time limit.
 
-Whoever makes a kind of them says once, at the start, how such a value is carried out, and how it is
-given up; here each is, in the order in which they came.
+``knows`` registers, once for each type, how such a value is carried out and how it is given up.
+Values leave in the order in which they came.
 """
 
 from collections import deque
@@ -16,19 +16,19 @@ Kind_contra = TypeVar("Kind_contra", contravariant=True)
 
 
 class Step(Protocol[Kind_contra]):
-    """What is done about a value when it is known."""
+    """A function that carries out, or gives up, one value."""
 
     def __call__(self, held: Kind_contra, /, *, now: float) -> None: ...
 
 
 class CommitGate:
-    """Values in the order of the events that they wait for."""
+    """A queue of values, in the order of the events that they wait for."""
 
     def __init__(self, registry: TaskRegistry, timers: Timers, *, within: float) -> None:
-        """``within``: so many seconds each waits at the most."""
+        """``within``: seconds that each value waits at most."""
         self._registry = registry
         self.within = within
-        #: number of the event that must be durable first, when it is given up, what it is
+        #: (number of the event that must be durable, when to give up, value)
         self._held: deque[tuple[int, float, Any]] = deque()
         self._accept: dict[type, Step[Any]] = {}
         self._give_up: dict[type, Step[Any]] = {}
@@ -38,11 +38,11 @@ class CommitGate:
         return len(self._held)
 
     def knows(self, kind: type[Kind], accept: Step[Kind], give_up: Step[Kind]) -> None:
-        """From here on values of this kind are carried out, and given up, in this way."""
+        """Register how values of a type are carried out, and given up."""
         self._accept[kind], self._give_up[kind] = accept, give_up
 
     def hold(self, what: object, *, now: float) -> None:
-        """Carry a value out when all that is recorded by now is durable, or give it up if late."""
+        """Carry out a value once all events recorded so far are durable, or give it up if late."""
         if self._registry.recorded <= self._registry.durable:
             self._accept[type(what)](what, now=now)
             return
@@ -51,14 +51,14 @@ class CommitGate:
         self._held.append((self._registry.recorded, now + self.within, what))
 
     def committed(self, through: int, *, now: float) -> None:
-        """Carry out all that waited for events up to ``through``."""
+        """Carry out all values that waited for events up to ``through``."""
         while self._held and self._held[0][0] <= through:
             _, _, what = self._held.popleft()
             self._accept[type(what)](what, now=now)
         self._plan()
 
     def _give_up_late(self, *, now: float) -> None:
-        """Give up what has waited too long."""
+        """Give up the values that have waited too long."""
         while self._held and self._held[0][1] <= now:
             _, _, what = self._held.popleft()
             self._give_up[type(what)](what, now=now)

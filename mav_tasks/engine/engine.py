@@ -1,8 +1,8 @@
-"""The whole server as one pure object with five methods. Composition only: decisions are elsewhere.
+"""The whole server as one pure object with five methods. It composes; its parts decide.
 
-``handle`` takes what came in, ``handle_deadline`` what the time asks for; ``take_events`` gives the
-journal what happened and ``take_packets`` the links what to send. Time comes in as ``now``,
-monotonic seconds, never going back.
+``handle`` takes an input and ``handle_deadline`` runs due timers. ``take_events`` returns what the
+store must write, ``take_packets`` what the links must send. ``now`` is in monotonic seconds and
+never goes back.
 """
 
 from math import inf
@@ -67,12 +67,12 @@ UNHEARD = Word(text="no ground station is heard: paused")
 
 
 class Engine:
-    """The task server without its sockets, its clock and its disk."""
+    """The task server without sockets, clock or disk."""
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
         kept = {} if restored is None else restored.parameters
         configured, (settings, why_not) = settings, with_all(settings, kept)
-        #: why parameters that were set before have no effect, as of the last settings
+        #: why the latest settings override parameters that clients set
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
@@ -84,13 +84,13 @@ class Engine:
             self._fleet.restore(restored, now=now)
         packer, timers = Packer(), Timers()
         self._timers = timers
-        self._keeping = timers.timer(Turn.SETTLING, self._settle)  # of signatures' times
+        self._keeping = timers.timer(Turn.SETTLING, self._settle)  # stores the times of signatures
         self._stopping = timers.timer(Turn.SETTLING, self._settle)
         self._starting = timers.timer(Turn.TASKS, self._fleet.room.handle_deadline)
         self._starting.set(self._fleet.room.times.next_at)
         self._telling = timers.timer(Turn.STATUSES, self._tell_statuses)
         seen = Restored() if restored is None else restored
-        #: who has signed what comes in, and the signatures of what goes out
+        #: verifies the signatures of incoming packets and signs outgoing ones
         self.signatures = Signatures(
             window=settings.signing.window,
             times=seen.signatures,
@@ -189,8 +189,8 @@ class Engine:
         )
         self._stop_by: float | None = None
         self._stopped = False
-        #: zero and HOLD for every vehicle that is being driven, as of the last ``take_packets``:
-        #: what the runner sends when the engine itself has failed
+        #: zero and HOLD for every driven vehicle, as of the last ``take_packets``; the runner sends
+        #: them if the engine raises
         self.emergency_stop_packets: tuple[Outgoing, ...] = ()
 
     def __repr__(self) -> str:
@@ -198,11 +198,11 @@ class Engine:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """What clients have set by parameter, by its name: it comes before what is configured."""
+        """Parameter values that clients have set, by name; they override the configuration."""
         return self._parameters.in_force
 
     def handle(self, item: Input, *, now: float) -> None:
-        """Take one input in."""
+        """Process one input."""
         self.signatures.now = now
         if self._timers.not_before + self._settings.watch.late_tick < now:
             self._vehicles.check_late(now=now)
@@ -250,14 +250,14 @@ class Engine:
         self._settle(now=now)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do; None: never, as things are."""
-        if self._vehicles.deadline_heap.touched:  # after they were settled: by what is told of them
+        """Return when ``handle_deadline`` must be called next, or None if no timer is set."""
+        if self._vehicles.deadline_heap.touched:  # by ``_settle``, after it settled them
             self._vehicles.deadline_heap.plan()
         due = self._timers.next_deadline()
         return None if due == inf else due
 
     def handle_deadline(self, *, now: float) -> None:
-        """Do what is due by now; may come late, or for nothing."""
+        """Do everything due by ``now``; the call may be late, or needless."""
         self.signatures.now = now
         if self._timers.not_before + self._settings.watch.late_tick < now:
             self._vehicles.check_late(now=now)
@@ -271,9 +271,9 @@ class Engine:
                 timer.do(now=now)
 
     def take_events(self) -> list[Event]:
-        """Return what happened since the last call, to be made durable in this order.
+        """Return the events since the last call, to be made durable in this order.
 
-        They are numbered from 1 over the life of the engine; ``Committed`` counts them.
+        They are numbered from 1 over the life of the engine; ``Committed`` has such a number.
         """
         events, self._journal = self._journal, []
         return events
@@ -282,11 +282,11 @@ class Engine:
         """Return the datagrams to send, in order."""
         self.emergency_stop_packets = self._vehicles.deadline_heap.emergency_stop_packets
         packets = self._packets.copy()
-        self._packets.clear()  # the list itself is shared with every outlet
+        self._packets.clear()  # clear in place: every PacketSender shares this list
         return packets
 
     def snapshot(self, *, now: float) -> Snapshot:
-        """Return an immutable view of everything."""
+        """Return an immutable view of the whole server."""
         return Snapshot(
             vehicles=tuple(
                 VehicleSnapshot(
@@ -314,13 +314,13 @@ class Engine:
         self._publisher.send_statuses(now=now)
 
     def _note_unheard(self, *, now: float) -> None:
-        """No ground station is there any more."""
+        """Pause all vehicles, if configured so: no ground station is heard any more."""
         if self._settings.operator_lost == "pause":
             for vehicle in self._vehicles.addressed_by(0):
                 vehicle.joint.on(ControlEvent.OPERATOR_LOST, UNHEARD, now=now)
 
     def _settle(self, *, now: float) -> None:
-        """Bring vehicles' answers to clients, and what happened to clients and the journal."""
+        """Pass the vehicles' answers to clients, and new events to clients and the journal."""
         room, signatures = self._fleet.room, self.signatures
         if self._parameters.is_changed:
             self._apply(self._parameters.take_change())

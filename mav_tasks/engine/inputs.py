@@ -1,4 +1,4 @@
-"""What can come into the engine, and what goes out of it: values, nothing else."""
+"""The engine's inputs and its output packets, as plain values."""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ from typing import NamedTuple
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings
 
-Peer = Hashable  # an endpoint on a link; what it is only the link knows
+Peer = Hashable  # an endpoint on a link; only the link knows what it is
 
 
 class LinkSide(Enum):
-    """Who is on the other end of a link."""
+    """What is on the other end of a link."""
 
     CLIENTS = auto()
     VEHICLES = auto()
@@ -21,10 +21,10 @@ class LinkSide(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Packets:
-    """Datagrams of one link, or pieces of its streams, in the order in which they came.
+    """Datagrams of one link, or pieces of its streams, in the order in which they arrived.
 
-    ``waited`` says of each for how long, in seconds, it lay on this machine before it was read, or
-    may have; empty: it was read as soon as it came.
+    ``waited`` has, for each of them, the seconds that it lay (or may have lain) on this machine
+    before it was read. It is empty if each was read on arrival.
     """
 
     link: str
@@ -34,16 +34,16 @@ class Packets:
 
 @dataclass(frozen=True, slots=True)
 class AtOnce:
-    """What was read of several links in one go: which of it came first nobody knows."""
+    """Packets of several links that were read in one go: their relative order is unknown."""
 
     packets: tuple[Packets, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Backlog:
-    """All that came on all links while the server stood still, clients' links first.
+    """Everything that arrived on all links while the server was stalled, clients' links first.
 
-    How late each piece is ``waited`` says: what came only just now is among it.
+    It may include packets that arrived just now. ``waited`` says how late each one is.
     """
 
     packets: tuple[Packets, ...]
@@ -53,12 +53,13 @@ class Backlog:
 class LinkChanged:
     """A link came up or went down.
 
-    ``peers`` are endpoints known beforehand: spoken to before they have been heard.
-    ``is_local``: nobody beyond this machine can be on it. ``is_stream``: what it gives may be cut
-    anywhere, and it tells by PeerChanged who is there. ``takes_unsigned``: so is what nobody has
-    signed; ``key`` is the name of the key that signs what goes to whoever has not signed yet, and
-    on a vehicle link the only one that counts. ``capacity``: bytes a second that it carries, None
-    where that is not known.
+    - ``peers``: endpoints known in advance; the server sends to them before it hears them.
+    - ``is_local``: nothing outside this machine can be on the link.
+    - ``is_stream``: data may be cut anywhere, and PeerChanged reports who is connected.
+    - ``takes_unsigned``: the link accepts unsigned packets.
+    - ``key``: name of the key that signs packets to a peer that has not signed yet. On a vehicle
+      link it is the only valid key.
+    - ``capacity``: bytes per second that the link carries, or None if that is unknown.
     """
 
     link: str
@@ -74,14 +75,14 @@ class LinkChanged:
 
 @dataclass(frozen=True, slots=True)
 class KeysChanged:
-    """The keys with which packets may be signed are these now; revoked ones have no secret."""
+    """The complete list of signing keys changed; a revoked key has no secret."""
 
     keys: tuple[Key, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class PeerChanged:
-    """Somebody is on a stream link now, and may be spoken to at once; or is there no more."""
+    """A peer of a stream link connected, and can be sent to at once, or it disconnected."""
 
     link: str
     peer: Peer
@@ -90,7 +91,7 @@ class PeerChanged:
 
 @dataclass(frozen=True, slots=True)
 class Congestion:
-    """The way out to a peer of a stream link does not take all that is sent, or does again."""
+    """A peer of a stream link does not accept everything that is sent, or accepts it again."""
 
     link: str
     peer: Peer
@@ -99,21 +100,21 @@ class Congestion:
 
 @dataclass(frozen=True, slots=True)
 class Committed:
-    """All events up to and with this number are durable."""
+    """All events up to and including this number are durable."""
 
     through: int
 
 
 @dataclass(frozen=True, slots=True)
 class StoreFailed:
-    """The store could not make events durable; it goes on trying."""
+    """The store could not make events durable; it keeps trying."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class HaltNotStored:
-    """What makes a vehicle stand is stored nowhere so far: a restart would lose it."""
+    """The halt of a vehicle is not durable yet: a restart of the server would lose it."""
 
     vehicle: int
 
@@ -127,14 +128,14 @@ class SettingsChanged:
 
 @dataclass(frozen=True, slots=True)
 class WallClock:
-    """UTC = monotonic time + ``offset`` seconds; sent at start and at each step of the clock."""
+    """UTC = monotonic time + ``offset`` seconds; sent at start and after each clock step."""
 
     offset: float
 
 
 @dataclass(frozen=True, slots=True)
 class Shutdown:
-    """The server is to end: stop what it drives."""
+    """The server is to end: stop the vehicles that it drives."""
 
 
 Input = (
@@ -155,10 +156,10 @@ Input = (
 
 
 class Outgoing(NamedTuple):
-    """One datagram to send; ``is_first``: before everything that waits for its turn.
+    """One datagram to send; ``is_first`` puts it before everything that is queued.
 
-    What has not left ``until`` then, monotonic seconds, must not leave any more: a process that was
-    not given time would move a vehicle by what it knew long ago.
+    ``until``, in monotonic seconds, is the last time at which it may leave. Otherwise a process
+    that got no CPU time would move a vehicle on outdated data.
     """
 
     link: str

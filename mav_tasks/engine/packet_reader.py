@@ -1,4 +1,4 @@
-"""From what links give to packets: a datagram stands alone, a stream goes on where it stopped."""
+"""Splits what links deliver into packets. A datagram stands alone; a stream is continued."""
 
 from itertools import repeat
 
@@ -7,7 +7,7 @@ from mav_tasks.mavlink.codec import DecodeCounts
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.stream import StreamSplitter
 
-MAX_STREAMS = 256  # of one link; one more takes the place of the oldest
+MAX_STREAMS = 256  # per link; one more replaces the oldest
 
 
 class PacketReader:
@@ -20,22 +20,23 @@ class PacketReader:
         return f"PacketReader({self._streams})"
 
     def change_link(self, change: LinkChanged) -> None:
-        """Take note of how a link gives what it hears."""
+        """Note whether a link delivers datagrams or streams."""
         if change.up and change.is_stream:
             self._streams[change.link] = {}
         else:
             self._streams.pop(change.link, None)
 
     def change_peer(self, change: PeerChanged) -> None:
-        """What a peer left unfinished has nothing to do with what comes next."""
+        """Drop what a peer left unfinished: a new connection starts a new packet."""
         self._streams.get(change.link, {}).pop(change.peer, None)
 
     def packets(
         self, item: Packets, counts: DecodeCounts, *, now: float
     ) -> list[tuple[Peer, Packet, float | None]]:
-        """Return the packets in order, each with its sender; counts what belongs to none.
+        """Return (sender, packet, seconds that it waited) for each packet, in order.
 
-        And for how long each has waited, in seconds; None: that was not measured.
+        The seconds are None if they were not measured. Bytes that belong to no packet go to
+        ``counts``.
         """
         streams = self._streams.get(item.link)
         taken: list[tuple[Peer, Packet, float | None]] = []

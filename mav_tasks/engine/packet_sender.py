@@ -1,4 +1,4 @@
-"""The way out to one endpoint: numbering per source, packing, and the shared queue of packets."""
+"""Output to one endpoint: sequence numbers per source, packing, and the shared packet queue."""
 
 from math import inf
 
@@ -12,7 +12,7 @@ from mav_tasks.mavlink.sequence import SequenceKeeper
 
 
 class PacketSender:
-    """Sends to one endpoint of one link, signed where that is due."""
+    """Sends to one endpoint of one link, and signs if the endpoint expects it."""
 
     def __init__(
         self,
@@ -33,32 +33,32 @@ class PacketSender:
         return f"PacketSender({self.link}, {self.peer})"
 
     def sibling(self, queue: list[Outgoing]) -> "PacketSender":
-        """Return an outlet to the same endpoint that fills another queue, and signs nothing."""
+        """Return a sender to the same endpoint that fills another queue and does not sign."""
         return PacketSender(self.link, self.peer, queue, self._packer)
 
     def send(
         self, message: Message, source: Address, *, first: bool = False, until: float = inf
     ) -> None:
-        """Send a message of our own in the name of ``source``; as ``Outgoing`` has it."""
+        """Send a message of our own in the name of ``source``; see ``Outgoing`` for the options."""
         raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
         self._put(raw, first=first, until=until)
 
     def forward(self, packet: Packet) -> None:
-        """Pass a packet on; a gap in its source's numbers stays one."""
+        """Forward a packet; a gap in its source's sequence numbers stays visible."""
         seq = self._sequence.forwarded(packet.source, packet.seq)
         self._put(with_seq(packet, seq))
 
     def inject(self, packet: Packet) -> None:
-        """Pass a packet on under the next number: where sources from several places meet."""
+        """Forward a packet under our next number, for a source that is heard in several places."""
         seq = self._sequence.injected(packet.source)
         self._put(with_seq(packet, seq))
 
     def withhold(self, source: Address) -> None:
-        """Note that a packet of the source is not passed on, so that no gap shows."""
+        """Skip the number of a packet that is not forwarded, so that no gap shows."""
         self._sequence.withheld(source)
 
     def continue_numbers(self, packet: Packet) -> None:
-        """Note that a packet's source counts from 0 again: what was sent goes on with it."""
+        """Continue our numbering although the packet's source has restarted its own at 0."""
         self._sequence.continued(packet.source, packet.seq)
 
     def _put(self, raw: bytes, *, first: bool = False, until: float = inf) -> None:

@@ -1,4 +1,4 @@
-"""What comes in, in the order in which it counts, to whoever sees to it."""
+"""Routes incoming packets to the parts that handle them; halts come first."""
 
 from collections.abc import Sequence
 
@@ -30,7 +30,7 @@ from mav_tasks.services.command_receiver import command_of
 
 
 class Reception:
-    """Takes in what links bring."""
+    """Handles what all links deliver."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class Reception:
         return f"Reception({self._intake!r})"
 
     def receive(self, items: Sequence[Packets], *, now: float) -> None:
-        """Take in what came at one moment: what makes a rover stand comes first."""
+        """Handle packets that arrived at one moment; those that halt a rover come first."""
         received: list[Received] = []
         others: list[Packets] = []
         for item in items:
@@ -118,9 +118,9 @@ class Reception:
                     self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
 
     def _halts_first(self, received: list[Received]) -> list[Received]:
-        """Put what lets a rover go, or drives it, behind what makes one stand.
+        """Move packets that start or drive a rover behind those that halt one.
 
-        All else keeps its order.
+        The order is otherwise kept.
         """
         kinds = [self._kind_of(each.message) for each in received]
         if Kind.HALT not in kinds or (Kind.GO not in kinds and Kind.MOTION not in kinds):

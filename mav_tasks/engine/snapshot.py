@@ -1,4 +1,4 @@
-"""An immutable view of the whole server, for command line, logs and tests."""
+"""An immutable view of the whole server, for the command line, logs and tests."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from mav_tasks.tasks.task import Task, TaskId
 
 @dataclass(frozen=True, slots=True)
 class VehicleSnapshot:
-    """One vehicle."""
+    """The state of one vehicle."""
 
     system_id: int
     persona: str
     armed: bool
     heard: bool
-    control: str  # how far our control has come
+    control: str  # phase of our offboard control
     paused: TaskReason
     active: Task | None
     waiting: tuple[TaskId, ...]
@@ -22,9 +22,9 @@ class VehicleSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The server at one moment."""
+    """The state of the server at one moment."""
 
     vehicles: tuple[VehicleSnapshot, ...]
     clients: tuple[str, ...]
     tasks: tuple[Task, ...]
-    decoded: str  # counts of what came in, vehicle side and client side
+    decoded: str  # packet counts of the vehicle side and the client side

@@ -1,7 +1,7 @@
-"""When each part of the engine is to be called next: one heap, of which the first is looked at.
+"""One heap of timers says when each part of the engine must run next.
 
-A part sets its timer at the moment at which its need changes; nobody is asked. Most needs are only
-put off, by each packet: such a timer comes up too early, and is entered anew then.
+A part sets its timer when its need changes; no part is polled. Most packets only postpone a timer.
+A postponed timer keeps its early heap entry, which is replaced when it reaches the top.
 """
 
 from enum import IntEnum, auto
@@ -11,17 +11,17 @@ from math import inf
 from operator import attrgetter
 from typing import Protocol
 
-SPARE = 64  # entries out of date in the heap, beyond which it is built anew
+SPARE = 64  # outdated entries in the heap, beyond which the heap is rebuilt
 
 
 class Effect(Protocol):
-    """What is done when its time has come."""
+    """What a timer calls when it is due."""
 
     def __call__(self, *, now: float) -> None: ...
 
 
 class Turn(IntEnum):
-    """Who comes first of those that are due at one moment: what makes a rover stand, above all."""
+    """The order of timers that are due at one moment: what halts a rover comes first."""
 
     LINKS = auto()
     VEHICLES = auto()
@@ -29,7 +29,7 @@ class Turn(IntEnum):
     UPLOADS = auto()
     TASKS = auto()
     OPERATOR = auto()
-    #: looking at what became of all that: done once, whether anybody is due or not
+    #: processing the results of the turns above; done once per call, whether a timer is due or not
     SETTLING = auto()
     STATUSES = auto()
     HEARTBEATS = auto()
@@ -41,7 +41,7 @@ _of_turn = attrgetter("turn")
 
 
 class Timer:
-    """When one part is to be called; made by ``Timers``."""
+    """The next call of one part; made by ``Timers``."""
 
     __slots__ = ("_timers", "at", "do", "entered", "number", "period", "turn")
 
@@ -52,18 +52,18 @@ class Timer:
         self.turn = turn
         self.number = number
         self.do = do
-        #: s, after which it comes again by itself; inf: not
+        #: s from one call to the next, or inf if it does not repeat
         self.period = period
-        #: when it comes; inf: never, as things are
+        #: when it is due, or inf if it is not set
         self.at = inf
-        #: of its entries in the heap this one counts
+        #: the time of its valid heap entry; its other entries are outdated
         self.entered = inf
 
     def __repr__(self) -> str:
         return f"Timer({self.turn.name} {self.number}, at {self.at})"
 
     def set(self, at: float) -> None:
-        """Come at that time instead; inf: not at all."""
+        """Set the due time; inf cancels it."""
         self.at = at
         if at < self.entered:
             self.entered = at
@@ -72,7 +72,7 @@ class Timer:
             heappush(timers.heap, (at, self.turn, self.number, self))
 
     def bring_forward(self, at: float) -> None:
-        """Come at that time, if it is not to come before."""
+        """Set the due time unless the timer is due earlier."""
         if at < self.at:
             self.set(at)
 
@@ -82,7 +82,7 @@ class Timers:
 
     def __init__(self) -> None:
         self.heap: list[_Entry] = []
-        #: no timer comes before this; the first may come later
+        #: no timer is due before this time; the first one may be due later
         self.not_before = inf
         self._numbers = count()
         self._most = SPARE
@@ -91,18 +91,18 @@ class Timers:
         return f"Timers({len(self.heap)} entries, none before {self.not_before})"
 
     def timer(self, turn: Turn, do: Effect, *, number: int | None = None) -> Timer:
-        """Return a timer that is not set yet; timers due in the same turn run by their number."""
+        """Return a timer that is not set; timers due in the same turn run by ``number``."""
         number = next(self._numbers) if number is None else number
         return Timer(self, turn, number, do, inf)
 
     def rhythm(self, turn: Turn, do: Effect, *, period: float, now: float) -> Timer:
-        """Return a timer that comes at once, and again each ``period``; late, without a burst."""
+        """Return a timer that is due now and each ``period``; missed calls are not made up for."""
         timer = Timer(self, turn, next(self._numbers), do, period)
         timer.set(now)
         return timer
 
     def next_deadline(self) -> float:
-        """Return when the first timer comes; inf: none does."""
+        """Return when the first timer is due, or inf if none is set."""
         heap = self.heap
         while heap:
             at, _, _, timer = heap[0]
@@ -114,7 +114,7 @@ class Timers:
         return inf
 
     def take_due(self, *, now: float) -> list[Timer]:
-        """Return the timers that come by now, in the order of their turns."""
+        """Return the timers that are due by ``now``, in the order of their turns."""
         heap, due = self.heap, list[Timer]()
         while heap and heap[0][0] <= now:
             entry = at, _, _, timer = heappop(heap)
@@ -128,11 +128,11 @@ class Timers:
                 heappush(heap, (timer.at, timer.turn, timer.number, timer))
         if len(heap) > self._most:
             self._forget_outdated()
-        due.sort(key=_of_turn)  # of one turn whose time came first, and then by number
+        due.sort(key=_of_turn)  # stable: within a turn by due time, then by number
         return due
 
     def _renew(self, entry: _Entry) -> None:
-        """Enter a timer anew that was put off; forget an entry that does not count any more."""
+        """Re-enter a timer that was postponed; drop an outdated entry."""
         at, _, _, timer = entry
         if timer.entered == at:
             timer.entered = timer.at

@@ -1,1 +1,1 @@
-"""The rovers: what each says, and how each is made to do what is wanted."""
+"""The rovers: what each one reports, and how the server controls it."""

@@ -1,81 +1,81 @@
-"""What was to arm a vehicle, and which of it counts: what holds it may have come since.
+"""Who asked to arm a vehicle, and which requests still count: a halt may have come since.
 
-A word that arms may be late on the net, or come twice: then a vehicle shows armed whose disarming,
-or whose STOP, is the newer word.
+A request to arm may be late, or arrive twice. Then a vehicle shows armed although the request to
+disarm or stop it is newer.
 """
 
 from math import inf
 
-LATE = 3.5  # s after a word, in which what had left before it may still come to the vehicle
-#: s after a word, in which a heartbeat each second shows what had left before it
+LATE = 3.5  # s after a request, in which packets sent before it may still reach the vehicle
+#: s after a request, in which a 1 Hz heartbeat shows the effect of such packets
 SHOWN_LATE = LATE + 1.5
-RESENT = 1.0  # s in which an arming that is not answered is sent again
-UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may be from before it
-BY_CLIENT = 2.0  # s after a client has asked for arming or a mode, in which that is its doing
+RESENT = 1.0  # s in which an unanswered arming is sent again
+UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may still be from before it
+BY_CLIENT = 2.0  # s in which an arming or mode counts as the result of a client's request
 
 
 class Armings:
     """The memory of who wanted one vehicle armed or disarmed."""
 
     def __init__(self) -> None:
-        self._client_at = -inf  # a client's wish to arm went to it
-        self._outdated_at = -inf  # what was to arm it before that counts no more
-        self._may_show_until = -inf  # s, that it is armed by that
-        self._was_disarmed = False  # then, or since
-        self._is_to_be_disarmed = False  # by a client's word, and it does not show that yet
+        self._client_at = -inf  # when a client last asked to arm it
+        self._outdated_at = -inf  # requests to arm from before this time do not count
+        self._may_show_until = -inf  # s, that such a request shows as armed
+        self._was_disarmed = False  # at that time, or since
+        self._is_to_be_disarmed = False  # a client asked for it, and it shows armed still
 
     def __repr__(self) -> str:
         return f"Armings(outdated at {self._outdated_at})"
 
     def client_arms(self, *, now: float) -> None:
-        """A client's wish to arm goes to the vehicle through us."""
+        """Note that a client's request to arm goes to the vehicle through us."""
         self._client_at = now
         self.forget_halts()
 
     def are_by_client(self, *, now: float) -> bool:
-        """Whether that the vehicle is armed now is a client's doing, through us."""
+        """Return whether a client, through us, has armed the vehicle just now."""
         return self._client_at > self._outdated_at and now - self._client_at <= BY_CLIENT
 
     def outdate(self, *, ours: float, armed: bool, now: float) -> None:
-        """It is to be disarmed, or stopped: what was to arm it before that does not count.
+        """Outdate earlier requests to arm, because the vehicle is to be disarmed or stopped.
 
         ``ours`` is when we last asked for arming ourselves.
         """
         self._outdate(max(ours, self._client_at), armed=armed, now=now)
 
     def outdate_ours(self, *, ours: float, armed: bool, now: float) -> None:
-        """What we wanted to arm it for is over: the same, of our own arming alone."""
+        """Outdate our own request to arm, if it is the latest: we need it armed no more."""
         if self._client_at < ours:
             self._outdate(ours, armed=armed, now=now)
 
     def outdate_earlier(self, *, armed: bool, until: float, now: float) -> None:
-        """An earlier run has ended just after that: what it sent may show ``until`` then."""
+        """Outdate the requests of an earlier run; their effect may show ``until`` then."""
         self._outdated_at, self._was_disarmed = now, not armed
         self._may_show_until = until
 
     def expect_disarmed(self, *, armed: bool) -> None:
-        """A client's disarming goes to it: until it shows that, it is as good as disarmed."""
+        """Note a client's disarming: until the vehicle shows it, the vehicle counts as disarmed."""
         self._is_to_be_disarmed = armed
 
     def shows(self, *, armed: bool) -> None:
-        """Take note of what a heartbeat shows."""
+        """Note the armed state in a heartbeat."""
         self._was_disarmed |= not armed
         self._is_to_be_disarmed &= armed
 
     def was_answered(self) -> None:
-        """A disarming was acknowledged: the answer may be an older one's, until it shows."""
+        """Note an acknowledged disarming; the acknowledgement may belong to an older one."""
         self._was_disarmed = True
 
     def are_older(self, *, ours: float, now: float) -> bool:
-        """Whether, where it shows armed, that is by a word from before it was to be disarmed."""
+        """Return whether, if it shows armed, that is by an outdated request."""
         return self._may_be_older(ours, now) and now >= self._outdated_at + UNSHOWN
 
     def do_not_count(self, *, ours: float, now: float) -> bool:
-        """Whether that it shows armed means nothing to a task that waits."""
+        """Return whether a task must ignore that the vehicle shows armed."""
         return self._is_to_be_disarmed or self._may_be_older(ours, now)
 
     def forget_halts(self) -> None:
-        """Whatever arms it from here on is meant."""
+        """Forget the halts: any arming from here on counts."""
         self._may_show_until, self._is_to_be_disarmed = -inf, False
 
     def _outdate(self, asked_at: float, *, armed: bool, now: float) -> None:

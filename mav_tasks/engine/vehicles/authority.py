@@ -1,5 +1,6 @@
-"""Who has a vehicle: ourselves, a client through us, or somebody else. What follows is decided
-elsewhere; this is the memory of who did what to it.
+"""Who has a vehicle: we, a client through us, or somebody else.
+
+This module only remembers who did what to the vehicle; other modules decide what follows.
 """
 
 from collections.abc import Hashable
@@ -11,84 +12,84 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
 
-STREAM_GAP = 0.5  # s between setpoints that are a stream: the least for OFFBOARD is 2 Hz
-ANY_MODE = -1  # that a command may bring about: the vehicle's own affair which
+STREAM_GAP = 0.5  # s between the setpoints of a stream: OFFBOARD needs at least 2 Hz
+ANY_MODE = -1  # key for commands by which the vehicle may choose any mode
 
 
 @dataclass(frozen=True, slots=True)
 class Before:
-    """How things were when a heartbeat came that shows the vehicle disarmed."""
+    """The state when a heartbeat came that shows the vehicle disarmed."""
 
     at: float
     may_arm: bool
-    paused: TaskReason  # why the queue stood
+    paused: TaskReason  # why the queue was paused
 
 
 class Authority:
-    """Permission to arm, whose doing the present mode is, and who else has been driving."""
+    """The permission to arm, who set the present mode, and who else has been driving."""
 
     def __init__(self, persona: Persona, *, may_arm: bool) -> None:
         self._persona = persona
-        self._arming_allowed = may_arm  # by setting
-        self._asked_mode = -1  # by a client, through us
+        self._arming_allowed = may_arm  # by the settings
+        self._asked_mode = -1  # the mode that a client last asked for through us
         self._asked_at = -inf
-        self._passed_on: dict[int, float] = {}  # when each mode was last asked for by a client
+        self._passed_on: dict[int, float] = {}  # when a client last asked for each mode
         self._mode_is_ours = False
         self._granted: set[Hashable] = set()
-        self._other_at = -inf  # sticks, or a second controller
-        self._by_client: tuple[Hashable, float] = (None, -inf)  # the last that drove through us
-        self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message, of whom
-        #: until somebody disarms or changes the mode
+        self._other_at = -inf  # manual control, or a second controller
+        self._by_client: tuple[Hashable, float] = (None, -inf)  # the last one that drove through us
+        self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message's sender
+        #: whether we may arm it; withdrawn when somebody disarms it or changes its mode
         self.may_arm = may_arm
-        #: whether a restart of the vehicle has withdrawn the permission, and nobody has
+        #: whether a vehicle restart, and nobody, has withdrawn the permission
         self.is_withdrawn_by_restart = False
-        self._before: Before | None = None  # the last disarming; None: somebody has acted since
+        self._before: Before | None = None  # at the last disarming; None: somebody has acted since
 
     def __repr__(self) -> str:
         return f"Authority(may_arm={self.may_arm}, mode_is_ours={self._mode_is_ours})"
 
     @property
     def may_arm_again(self) -> bool:
-        """Whether we may arm once a person has said that all is well."""
+        """Whether we may arm it once a person allows that again."""
         return self._arming_allowed
 
     def withdraw_arming(self) -> None:
-        """Somebody else has a hand on the vehicle: arm it no more."""
+        """Stop arming the vehicle, because somebody else controls it."""
         self.may_arm = self.is_withdrawn_by_restart = False
         self._before = None
 
     def note_disarmed(self, before: Before) -> None:
-        """The vehicle shows that it is disarmed, not by us: by somebody, or by a restart."""
+        """Remember the state before a disarming that was not ours."""
         self._before = before
 
     def take_disarmed(self, *, since: float) -> Before | None:
-        """Return how things were before the vehicle was seen disarmed, if that was after ``since``.
+        """Return the state before the disarming, if that was seen after ``since``, else None.
 
-        A restart at that time explains it, unless somebody has acted after it.
+        A restart at that time explains the disarming, unless somebody has acted after it.
         """
         before, self._before = self._before, None
         return before if before is not None and before.at >= since else None
 
     def restarted(self, *, was_allowed: bool) -> None:
-        """The vehicle has restarted under us: arm it only after a person's word, any person's."""
+        """Withdraw the permission to arm after a vehicle restart; any person may restore it."""
         self.is_withdrawn_by_restart = was_allowed
         self.may_arm = False
 
     def moved(self, *, may_arm: bool) -> None:
-        """The vehicle is at another place: what may be armed there is another question."""
+        """Apply the permission to arm of the link on which the vehicle is now."""
         self._arming_allowed = may_arm
         self.may_arm = self.may_arm and may_arm
 
     def restore_arming(self) -> None:
-        """A person said that all is well."""
+        """Allow arming again, as a person asked."""
         self.may_arm = self._arming_allowed
         self.is_withdrawn_by_restart = False
         self._before = None
 
     def client_asks(self, mode: int, client: Hashable, *, present_mode: int, now: float) -> None:
-        """A client's mode request goes to the vehicle; our own mode counts as set by us then.
+        """Note a client's mode request to the vehicle; our own mode then counts as set by us.
 
-        Whoever has asked last may drive: of two at once the vehicle would obey neither.
+        Only the last client that asked may drive: the vehicle would obey neither of two at once.
         """
         self._asked_mode, self._asked_at = mode, now
         self._passed_on[mode] = now
@@ -97,9 +98,9 @@ class Authority:
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
 
     def mode_changed(self, mode: int, *, by_us: bool, is_late: bool, now: float) -> bool:
-        """The vehicle shows another mode; gives whether it is our, or our clients', doing.
+        """Note that the vehicle shows another mode. Return whether we or a client set it.
 
-        ``is_late``: it was asked for before a halt, and is nobody's any more.
+        ``is_late``: it was asked for before a halt, so it counts as set by nobody.
         """
         by_client = (
             mode == self._asked_mode == self._persona.control_mode
@@ -110,20 +111,20 @@ class Authority:
         return self._mode_is_ours
 
     def note_passed_on(self, *, now: float) -> None:
-        """A client's command goes to the vehicle that may make it drive, in a mode of its own."""
+        """Note a client's command to the vehicle that may make it drive, in a mode of its own."""
         self._passed_on[ANY_MODE] = now
 
     def was_asked_before(self, mode: int, *, ours: float, halt: float) -> bool:
-        """Whether a mode that is shown now was asked for shortly before a halt, and not since.
+        """Return whether a mode shown now was asked for shortly before a halt, and not since.
 
-        Also where it was shown before the halt: the net may have a copy of the word for it.
-        ``ours`` is when we last asked for our mode.
+        Also if it was shown before the halt: the network may hold a copy of the request. ``ours``
+        is when we last asked for our mode.
         """
         asked = self._asked_for(mode, ours=ours)
         return asked < halt <= asked + LATE
 
     def was_asked(self, mode: int, *, ours: float) -> bool:
-        """Whether a mode was asked for at all, by a client through this server, or by us."""
+        """Return whether a client through us, or we, ever asked for a mode."""
         return self._asked_for(mode, ours=ours) > -inf
 
     def _asked_for(self, mode: int, *, ours: float) -> float:
@@ -131,15 +132,15 @@ class Authority:
         return max(asked, ours) if mode == self._persona.control_mode else asked
 
     def moves_by_older(self, *, halt: float) -> bool:
-        """Whether what a client had sent before a halt may move the vehicle in any mode."""
+        """Return whether a client's command from before a halt may move the vehicle in any mode."""
         asked = self._passed_on.get(ANY_MODE, -inf)
         return asked < halt <= asked + LATE
 
     def kind_of(self, mode: int, *, armed: bool) -> ModeKind:
         """Return what the present mode means for taking control.
 
-        A PX4 that has driven home by its failsafe disarms itself and shows our mode, or the return:
-        nothing drives it, and it is put to HOLD before it is armed.
+        A PX4 that has driven home by its failsafe disarms itself and shows our mode, or the return
+        mode. Nothing drives it, and it is put in HOLD before it is armed.
         """
         at_rest = (self._persona.control_mode, self._persona.return_mode)
         is_home = self._persona.arms_in_hold and not armed and mode in at_rest
@@ -151,49 +152,49 @@ class Authority:
 
     @property
     def has_any_grant(self) -> bool:
-        """Whether any client may drive, as far as that is the client's doing."""
+        """Whether any client has a grant to drive."""
         return bool(self._granted)
 
     def has_granted(self, client: Hashable) -> bool:
-        """Whether this client has asked for our mode since the last task or STOP."""
+        """Return whether this client has asked for our mode since the last task or STOP."""
         return client in self._granted
 
     def note_withheld(self, client: Hashable, *, now: float) -> None:
-        """A motion message of a client did not pass."""
+        """Note that a client's motion message did not pass."""
         self._withheld = client, now
 
     def streams(self, client: Hashable, *, now: float) -> bool:
-        """Whether a client would drive now, if it might."""
+        """Return whether a client streams motion messages that do not pass."""
         who, at = self._withheld
         return who == client and now - at <= STREAM_GAP
 
     def revoke(self) -> None:
-        """A task has ended, or a halt: a client that wants to drive must ask again.
+        """Revoke all grants after a task or a halt: a client that wants to drive must ask again.
 
-        Nothing of any client passes from here on, so that no client drives any more.
+        No client's motion messages pass from here on, so no client drives any more.
         """
         self._granted.clear()
         self._by_client = (None, -inf)
 
     def forget(self, client: Hashable) -> bool:
-        """A client is gone; gives whether it had control. Who comes to its place must ask."""
+        """Forget a client that is gone. Return whether it had a grant. A successor must ask."""
         had_control = client in self._granted
         self._granted.discard(client)
         return had_control
 
     def note_client(self, client: Hashable, *, now: float) -> None:
-        """A client's motion message goes to the vehicle: the client is driving just now."""
+        """Note that a client's motion message goes to the vehicle: it is driving."""
         self._by_client = client, now
 
     def driver(self, *, within: float, now: float) -> Hashable:
-        """Return the client that was driving in the last so many seconds, None if none was."""
+        """Return the client that was driving in the last ``within`` seconds, or None."""
         client, at = self._by_client
         return client if now - at < within else None
 
     def note_other(self, *, now: float) -> None:
-        """Somebody who is no client of ours is driving just now."""
+        """Note that somebody who is not our client is driving."""
         self._other_at = now
 
     def since_other(self, *, now: float) -> float:
-        """Return the seconds since somebody else was driving, clients included."""
+        """Return the seconds since somebody else, or a client, was driving."""
         return now - max(self._other_at, self._by_client[1])

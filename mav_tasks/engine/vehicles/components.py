@@ -1,12 +1,12 @@
-"""The components inside one vehicle's system, and which of the numbers is left for the server."""
+"""The components inside one vehicle's system, and the id that is left for the server."""
 
 from mav_tasks.mavlink.address import Address
 
-PLACES = 4  # numbers from the configured one on that the server may have
+PLACES = 4  # component ids that the server may use, from the configured one on
 
 
 class Components:
-    """What was heard of, besides the autopilot."""
+    """The components heard in one vehicle's system, besides the autopilot."""
 
     def __init__(self, system_id: int, *, first: int) -> None:
         self._system_id = system_id
@@ -22,7 +22,7 @@ class Components:
         return component_id in self._own
 
     def note(self, component_id: int) -> bool:
-        """Note one that was heard; gives whether the server has another number now."""
+        """Note a component that was heard. Return whether the server's address changes by it."""
         before = self.server
         self._own.add(component_id)
         self.server = self._free()

@@ -1,12 +1,12 @@
 """Who may move a vehicle, and what follows from each event: the one table of joint control.
 
-Ourselves, clients through us, and somebody at the vehicle want to move it. Whatever happens is an
-``Event``; ``effects_of`` gives what is done about it in a ``State``, by name and in order. Who
-carries that out (``hands``) decides nothing. Rows are looked through from the top, the first that
-fits counts; an event among the effects goes through the table again, in the state as it is then.
+We, clients through us, and people at the vehicle want to move it. ``effects_of`` returns the
+effects of an ``Event`` in a ``State``, in order; ``hands`` carries them out and decides nothing.
+The first row that fits counts. An event among the effects goes through the table again, in the
+state at that time.
 
-The drawing of it is made by ``tools/control_diagram.py``; ``tests/unit/engine/vehicles/
-test_control.py`` walks through every state that can be reached.
+``tools/control_diagram.py`` draws the table. ``tests/unit/engine/vehicles/test_control.py`` walks
+through every state that can be reached.
 """
 
 from enum import Enum, auto
@@ -16,92 +16,92 @@ from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Wo
 
 
 class Event(Enum):
-    """What may happen to a vehicle's control."""
+    """What may happen to the control of a vehicle."""
 
-    # words that let it stand
+    # requests that halt it
     STOP = auto()
-    HOLD = auto()  # the mode, asked for by a client
+    HOLD = auto()  # a client asks for the mode
     PAUSE = auto()
-    PAUSE_TASKS = auto()  # a key counts no more: its tasks stand
-    DISARM = auto()  # asked for by a client
-    CANCEL = auto()  # the task that has the vehicle
-    CLEAR = auto()  # whatever has begun, too
+    PAUSE_TASKS = auto()  # a key was revoked: pause the queue with its tasks
+    DISARM = auto()  # a client asks for it
+    CANCEL = auto()  # of the active task
+    CLEAR = auto()  # cancel everything, also the active task
     OPERATOR_LOST = auto()
-    CLOSE = auto()  # the server ends
-    # what was seen, and lets it stand
+    CLOSE = auto()  # the server shuts down
+    # observations that halt it
     TAKEN = auto()  # somebody else has it, in whatever way
-    MODE = auto()  # it shows a mode that we have not asked for
-    LAPSED = auto()  # it shows HOLD while set-points stream: its failsafe's, or somebody's
-    LATE_MODE = auto()  # it shows a mode that a client has asked for before a halt
-    LATE_ARMING = auto()  # it shows armed, by what has left before it was to be disarmed or stopped
-    EXPLAINED = auto()  # it was its failsafe that has taken it
+    MODE = auto()  # it shows a mode that we did not ask for
+    LAPSED = auto()  # it shows HOLD while set-points stream: a failsafe's, or somebody's
+    LATE_MODE = auto()  # it shows a mode that a client asked for before a halt
+    LATE_ARMING = auto()  # it shows armed, by a request from before a disarming or STOP
+    EXPLAINED = auto()  # a text explains the takeover: a failsafe's
     MODE_IN_STOP = auto()  # the same, while STOP is latched
-    DISARMED = auto()  # it shows that it is, and not by us
+    DISARMED = auto()  # it shows disarmed, not by us
     PARKED = auto()  # somebody who was driving has set HOLD
-    STICK = auto()  # off its centre, in our mode
-    DRIVEN_BY_HAND = auto()  # sticks of a client
+    STICK = auto()  # a stick is off its centre, in our mode
+    DRIVEN_BY_HAND = auto()  # a client sends manual control
     SECOND = auto()  # a second controller
     REBOOTED = auto()
-    LATE = auto()  # we were: it drove on without us
+    LATE = auto()  # our tick was late: it drove on without us
     TOO_FAST = auto()
-    NOT_STANDING = auto()  # though a task lets it stand
+    NOT_STANDING = auto()  # it moves although a task tells it to stand
     HEARD_AGAIN = auto()
-    # words that let it go
+    # requests that let it go
     CONTINUE = auto()
-    GO_ON = auto()  # a "go to" shows that a HOLD just before was none, or a mission is started
+    GO_ON = auto()  # a "go to" revokes the HOLD just before it, or a mission is started
     RELEASE = auto()  # of a held task
-    RESTORE = auto()  # of a held task, by who may also say that all is well
+    RESTORE = auto()  # of a held task, by somebody who may also allow arming again
     RUN_NOW = auto()
-    ASK_OUR_MODE = auto()  # a client, to drive through us
-    ASK_OUR_MODE_STREAMING = auto()  # the same; it is entered in a stream, which waits here
+    ASK_OUR_MODE = auto()  # a client asks for it, to drive through us
+    ASK_OUR_MODE_STREAMING = auto()  # the same; the mode needs a set-point stream, which waits here
     ASK_OTHER_MODE = auto()
-    ARM = auto()  # asked for by a client
-    # what moves nothing by itself
-    UNQUEUE = auto()  # a task that waits is called off
+    ARM = auto()  # a client asks for it
+    # events that move nothing by themselves
+    UNQUEUE = auto()  # a waiting task is cancelled
     CLEAR_WAITING = auto()
     SKIP = auto()  # a held task
     DRIVING_ENDS = auto()  # a client that drove asks for something else
-    GONE = auto()  # a client that drove
-    LANDED = auto()  # a client has: disarm it once nothing is left to do
-    LEAVE_MANUAL = auto()  # a client starts a mission while nobody is at the sticks
-    COME_BACK = auto()  # the vehicle of an earlier run, that we left standing
-    COME_BACK_DRIVEN = auto()  # the same, left driving, and it may follow set-points still
-    COME_BACK_HALTED = auto()  # the same, told to stand just before
-    COME_BACK_LED_AWAY = auto()  # the same, in a mode in which it does not
+    GONE = auto()  # a client that drove has disconnected
+    LANDED = auto()  # a client has landed it: disarm it once no task is left
+    LEAVE_MANUAL = auto()  # a client starts a mission while nobody uses the sticks
+    COME_BACK = auto()  # a vehicle of an earlier run is found; that run left it standing
+    COME_BACK_DRIVEN = auto()  # the same, left driving, and it may still follow set-points
+    COME_BACK_HALTED = auto()  # the same, told to stand just before that run ended
+    COME_BACK_LED_AWAY = auto()  # left driving, and in a mode that does not follow set-points
 
 
 class Effect(Enum):
     """What is done; ``hands`` has a function of the same name for each."""
 
-    # how it stands
-    BRAKE = auto()  # the stop ladder: set-points as long as they brake, HOLD, disarming
+    # how it is stopped
+    BRAKE = auto()  # the stop ladder: set-points while they brake, then HOLD, then disarming
     HOLD_AT_ONCE = auto()  # the stop ladder without set-points
     LET_GO = auto()  # one zero and HOLD, repeated until it shows
-    STEP = auto()  # what the tasks demand, now: zeros of a task that stands
-    WATCH = auto()  # climb the stop ladder from here on
+    STEP = auto()  # run the tasks now: a task that stands sends zeros
+    WATCH = auto()  # run the stop ladder from here on
     ZERO = auto()  # one zero
     ZERO_KEPT = auto()  # one zero if it may keep a velocity of ours
-    ZERO_AND_HOLD = auto()  # once, and nothing after it
-    STAY = auto()  # HOLD is shown: ask for it all the same
-    LOSE = auto()  # not one thing more is sent of ours
-    # what was asked for before does not come true later
+    ZERO_AND_HOLD = auto()  # once each, and nothing after them
+    STAY = auto()  # ask for HOLD although it shows HOLD
+    LOSE = auto()  # send nothing more of ours
+    # earlier requests must not take effect later
     FORGET_GO_TO = auto()
     FORGET_START = auto()
     FORGET_RELEASE = auto()
     REVOKE = auto()
     DROP_WAITING = auto()
     # the tasks
-    COUNT = auto()  # a halt, so that older words do not count
+    COUNT = auto()  # count a halt, so that older requests do not count
     PAUSE = auto()
     PAUSE_TAKEN = auto()
     LATCH = auto()
     HOLD_TASK = auto()
-    DO = auto()  # what the word itself asks for; it may be refused, and then nothing follows
-    WAKE = auto()  # look at the tasks: one may be ready
-    # permissions, and what is told
+    DO = auto()  # the request itself; if it raises Rejection, nothing follows
+    WAKE = auto()  # run the tasks: one may be ready
+    # permissions and reports
     WITHDRAW_ARMING = auto()
     RESTORE_ARMING = auto()
-    OUTDATE_ARMING = auto()  # what left before, ours or a client's
+    OUTDATE_ARMING = auto()  # requests sent earlier, ours or a client's
     OUTDATE_OUR_ARMING = auto()
     EXPECT_DISARMED = auto()
     DISARM = auto()
@@ -121,19 +121,19 @@ Step = Effect | Event
 
 
 class Row(NamedTuple):
-    """What follows from an event where all that ``where`` names is so."""
+    """The effects of an event in the states that ``where`` allows."""
 
     event: Event
     effects: tuple[Step, ...]
     where: dict[str, frozenset[object]]
 
     def fits(self, state: State) -> bool:
-        """Whether it is about this state."""
+        """Return whether the row applies to this state."""
         return all(getattr(state, name) in values for name, values in self.where.items())
 
 
 def _row(event: Event, *effects: Step, **where: object) -> Row:
-    """Make a row; each of ``where`` is one value or several."""
+    """Return a row; each of ``where`` is one value or a tuple of values."""
     values = {
         name: frozenset(value if isinstance(value, tuple) else (value,))
         for name, value in where.items()
@@ -143,13 +143,13 @@ def _row(event: Event, *effects: Step, **where: object) -> Row:
 
 _E, _F = Event, Effect
 ENGAGED = (Grip.TAKING, Grip.DRIVING, Grip.RELEASING)
-HAS_IT = (Work.RUNS, Work.ENDS, Work.LOST, Work.STANDS, Work.TAKEN)  # a task has the vehicle
-GOES_ON = (Work.RUNS, Work.ENDS, Work.LOST)  # by itself
-STANDS = (Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN)  # and goes on standing
+HAS_IT = (Work.RUNS, Work.ENDS, Work.LOST, Work.STANDS, Work.TAKEN)  # a task is active
+GOES_ON = (Work.RUNS, Work.ENDS, Work.LOST)  # the active task continues without a request
+STANDS = (Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN)  # it stands, and stays standing
 NO_TASK_HAS_IT = (Work.NONE, Work.WAITS)
 IS_LET_RUN = (Queue.RUNS, Queue.PAUSED)
 
-#: nothing that was asked for before moves the vehicle later
+#: no earlier request moves the vehicle later
 TAKE_BACK = (
     _F.FORGET_GO_TO,
     _F.FORGET_START,
@@ -161,7 +161,7 @@ BUT_GO_TO = TAKE_BACK[1:]
 UNARMS = (_F.OUTDATE_ARMING, _F.EXPECT_DISARMED, _F.WITHDRAW_ARMING)
 
 TABLE = (
-    # words that let it stand
+    # requests that halt it
     _row(_E.STOP, *TAKE_BACK, _F.OUTDATE_ARMING, _F.LATCH, _F.BRAKE),
     _row(_E.HOLD, _F.COUNT, _F.BRAKE, queue=Queue.STOPPED),
     _row(
@@ -179,7 +179,7 @@ TABLE = (
     ),
     _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.LET_GO, work=Work.NONE),
     _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.PAUSE, _F.LET_GO),
-    # one that moves without a task is stopped as by HOLD; so is one that was taken over
+    # a vehicle that moves without a task is stopped as by HOLD; so is one that was taken over
     _row(
         _E.PAUSE,
         *(*TAKE_BACK, _F.PAUSE, _E.HOLD),
@@ -206,7 +206,7 @@ TABLE = (
         _E.CANCEL,
         *(_F.FORGET_GO_TO, _F.FORGET_START, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
     ),
-    # a set-point of it that comes late would drive it on
+    # its late set-point would drive it on
     _row(
         _E.CLEAR,
         *(_F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.COUNT, *TAKE_BACK, _F.LET_GO),
@@ -231,14 +231,14 @@ TABLE = (
     _row(_E.CLOSE, grip=Grip.FREE),
     _row(_E.CLOSE, _F.PAUSE, _F.BRAKE, work=HAS_IT),
     _row(_E.CLOSE, _F.BRAKE),
-    # what was seen, and lets it stand
+    # observations that halt it
     _row(_E.TAKEN, _F.COUNT, queue=Queue.STOPPED),
     _row(
         _E.TAKEN,
         *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=GOES_ON,  # also one that was to run though the queue is paused
+        work=GOES_ON,  # also a task that runs although the queue is paused
     ),
-    # it was being stopped: what waits does not drive it off from where somebody takes it
+    # it was being stopped: no waiting task may drive it off from where somebody takes it
     _row(
         _E.TAKEN,
         *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
@@ -254,29 +254,29 @@ TABLE = (
     ),
     _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE),
     _row(_E.MODE, _F.WITHDRAW_ARMING, _E.TAKEN),
-    # a failsafe's HOLD ends with the next set-point that is under way
+    # the next set-point under way would end a failsafe's HOLD
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
-    # since then something was let go: it is a person at the vehicle, or as good as one
+    # something was let go since: it is a person at the vehicle, or as good as one
     _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.LOST)),
-    _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # HOLD is being asked for
+    _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # we are asking for HOLD
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
-    _row(_E.LATE_ARMING, grip=Grip.RELEASING),  # by which it is disarmed, if it was armed for us
+    _row(_E.LATE_ARMING, grip=Grip.RELEASING),  # the release disarms it, if it was armed for us
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, queue=Queue.STOPPED),
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, work=Work.NONE),
-    _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, _F.PAUSE),  # or it would be armed for what waits
+    _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, _F.PAUSE),  # or a waiting task would arm it
     _row(_E.EXPLAINED, _F.TELL, _F.PAUSE_TAKEN),
-    # a request from before the STOP was late; later, it is a person at the vehicle
+    # a late request from before the STOP; later, it is a person at the vehicle
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING, _F.BRAKE, is_late=True, grip=Grip.FREE),
     _row(_E.MODE_IN_STOP, _F.WITHDRAW_ARMING),
     _row(_E.DISARMED, _F.WITHDRAW_ARMING, _F.OUTDATE_OUR_ARMING, _F.ZERO_KEPT, _E.TAKEN),
     _row(_E.PARKED, _F.PAUSE_TAKEN, work=(Work.WAITS, *HAS_IT), queue=IS_LET_RUN),
     _row(_E.PARKED),
-    # zeros do not stop it, nor can anybody steer it by the stick
+    # zeros do not stop it, and nobody can steer it by the stick
     _row(_E.STICK, grip=Grip.FREE),
     _row(_E.STICK, _F.FORGET_RELEASE, grip=(Grip.RELEASING, Grip.STOPPING), work=STANDS),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, grip=Grip.STOPPING),
-    # it is being stopped for that
+    # it is already being stopped because of the stick
     _row(_E.STICK, _F.FORGET_RELEASE, queue=Queue.TAKEN, is_stopping=True, work=STANDS),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, _F.STEP, _F.WATCH, brakes=True),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, _F.LET_GO, _F.WATCH),
@@ -301,7 +301,7 @@ TABLE = (
     _row(_E.SECOND, _F.NOTE_OTHERS, _E.TAKEN, grip=Grip.FREE),
     _row(_E.SECOND, _F.NOTE_OTHERS, _F.ZERO_AND_HOLD, _E.TAKEN),
     _row(_E.REBOOTED, *TAKE_BACK, _F.TELL, queue=Queue.STOPPED),
-    # it may as well be late news of its start: HOLD does no harm to one that has restarted
+    # it may be a late report of its start: HOLD does no harm to a restarted vehicle
     _row(
         _E.REBOOTED,
         *(*TAKE_BACK, _F.DO),
@@ -309,15 +309,15 @@ TABLE = (
         work=(Work.NONE, Work.WAITS, Work.STANDS),
     ),
     _row(_E.REBOOTED, *TAKE_BACK, _F.LOSE, _F.DO),
-    _row(_E.LATE, _F.LET_GO, _F.LEFT, _F.HOLD_TASK, has_failsafe=True),  # which a zero would end
+    _row(_E.LATE, _F.LET_GO, _F.LEFT, _F.HOLD_TASK, has_failsafe=True),  # a zero would end it
     _row(_E.LATE, _F.ZERO, _F.LEFT, _F.HOLD_TASK),
     _row(_E.TOO_FAST, _F.TELL, _F.HOLD_TASK, _F.HOLD_AT_ONCE),  # a held stick defeats set-points
     _row(_E.NOT_STANDING, _F.TELL, _F.HOLD_TASK, _F.BRAKE),
     _row(_E.HEARD_AGAIN, _F.BRAKE, grip=Grip.STOPPING),
     _row(_E.HEARD_AGAIN),
-    # words that let it go
+    # requests that let it go
     _row(_E.CONTINUE, _F.FORGET_GO_TO, _F.DO, _F.RESTORE_ARMING, _F.TELL_HELD, _F.WAKE),
-    # what a pause ends, and nobody has said that it may be armed again
+    # ends a pause; nobody has said that it may be armed again
     _row(_E.GO_ON, _F.DO, _F.WAKE, queue=Queue.PAUSED),
     _row(_E.GO_ON),
     _row(_E.RELEASE, _F.DO, _F.WAKE),
@@ -334,7 +334,7 @@ TABLE = (
     _row(_E.ASK_OTHER_MODE, _F.FORGET_START, _F.DO, _F.HAND_OVER, _E.TAKEN, grip=Grip.TAKING),
     _row(_E.ASK_OTHER_MODE, _F.FORGET_START, _F.DO, _F.HAND_OVER),
     _row(_E.ARM, _F.DO, _F.KEEP_ARMED),
-    # what moves nothing by itself
+    # events that move nothing by themselves
     _row(_E.UNQUEUE, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO),
     _row(_E.CLEAR_WAITING, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO),
     _row(_E.SKIP, _F.DO, _F.REVOKE, _F.WAKE),
@@ -342,7 +342,7 @@ TABLE = (
     _row(_E.DRIVING_ENDS, _F.REVOKE, grip=(*ENGAGED, Grip.STOPPING)),
     _row(_E.DRIVING_ENDS, _F.REVOKE, _F.LET_GO, has_failsafe=True),
     _row(_E.DRIVING_ENDS, _F.REVOKE, _F.ZERO, _F.ZERO),  # one may be lost
-    # it stands, and does not wait for its own watch
+    # stop it without waiting for its own timeout
     _row(
         _E.GONE,
         _F.ZERO,
@@ -363,7 +363,7 @@ TABLE = (
     _row(_E.COME_BACK_HALTED, _F.BRAKE, queue=Queue.STOPPED),
     _row(_E.COME_BACK_HALTED, _F.LET_GO),
     _row(_E.COME_BACK_LED_AWAY, _F.BRAKE, queue=Queue.STOPPED),
-    _row(_E.COME_BACK_LED_AWAY, _F.TELL, has_failsafe=True),  # a zero would have it lose us again
+    _row(_E.COME_BACK_LED_AWAY, _F.TELL, has_failsafe=True),  # a zero would renew its failsafe
     _row(_E.COME_BACK_LED_AWAY, _F.ZERO),
 )
 
@@ -371,7 +371,7 @@ _ROWS = {event: tuple(row for row in TABLE if row.event is event) for event in E
 
 
 def effects_of(event: Event, state: State) -> tuple[Step, ...]:
-    """Return what is done about an event, in order."""
+    """Return what is done about an event, in order. Raise LookupError if no row fits."""
     for row in _ROWS[event]:
         if row.fits(state):
             return row.effects

@@ -1,7 +1,7 @@
-"""Which vehicles have something to do, and when, without asking every one of them each time.
+"""Which vehicles have something to do, and when, without asking each vehicle each time.
 
-A vehicle that nothing has touched has nothing new to say: what comes in costs the same whether
-there are two rovers or two hundred.
+Only the deadlines of changed vehicles are planned again, so that an input costs the same with two
+rovers as with two hundred.
 """
 
 from functools import partial
@@ -13,11 +13,11 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 
 
 class DeadlineHeap:
-    """The timers of all vehicles, and which of them have been touched since the last look."""
+    """The timers of all vehicles, and the vehicles that have changed since they were settled."""
 
     def __init__(self, timers: Timers) -> None:
         self._timers = timers
-        #: those to which something was done since they were settled
+        #: vehicles that may have changed since they were settled
         self.touched: dict[int, Vehicle] = {}
         self._due: dict[int, Timer] = {}
         self._awaiting: dict[int, Vehicle] = {}
@@ -29,11 +29,11 @@ class DeadlineHeap:
         return f"DeadlineHeap({len(self._due)} vehicles, next at {self.next_deadline()})"
 
     def mark_dirty(self, vehicle: Vehicle) -> None:
-        """Note that something is being done to a vehicle."""
+        """Note that a vehicle may be changing."""
         self.touched[vehicle.system_id] = vehicle
 
     def plan(self) -> None:
-        """Have those that were touched come when they have something to do."""
+        """Set the timers of the changed vehicles."""
         for system_id, vehicle in self.touched.items():
             timer = self._due.get(system_id)
             if timer is None:
@@ -41,7 +41,7 @@ class DeadlineHeap:
             timer.set(vehicle.next_deadline())
 
     def settle(self) -> list[Vehicle]:
-        """Look at those that were touched; gives them."""
+        """Plan the changed vehicles, update what is kept of them, and return them."""
         self.plan()
         touched = list(self.touched.values())
         self.touched.clear()
@@ -55,11 +55,11 @@ class DeadlineHeap:
         return touched
 
     def awaiting_commit(self) -> list[Vehicle]:
-        """Return the vehicles whose next task waits for nothing but being durable."""
+        """Return the vehicles whose next task waits only for its events to be durable."""
         return list(self._awaiting.values())
 
     def next_deadline(self) -> float:
-        """Return when the first vehicle has something to do; inf: none has."""
+        """Return when the first vehicle has something to do, or inf."""
         return min((timer.at for timer in self._due.values()), default=inf)
 
     def _timer_of(self, vehicle: Vehicle) -> Timer:

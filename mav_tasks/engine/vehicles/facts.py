@@ -1,4 +1,4 @@
-"""What the table of joint control goes by, put together of what the parts of a vehicle know."""
+"""Builds the state that the table of joint control uses, from the parts of a vehicle."""
 
 from collections.abc import Hashable
 
@@ -25,7 +25,7 @@ GRIPS = {
 
 
 def state_of(parts: Parts, pilot: Pilot, *, is_late: bool, now: float) -> State:
-    """Return the state; ``is_late``: what left before the last STOP may still arrive."""
+    """Return the state; ``is_late``: packets from before the last STOP may still arrive."""
     persona, tasks, authority = parts.persona, parts.tasks, parts.authority
     kind = authority.kind_of(parts.monitor.custom_mode, armed=parts.monitor.armed)
     return State(

@@ -1,8 +1,8 @@
 """Which local frame a vehicle's positions are in, and where its home is.
 
-The origin is what GPS_GLOBAL_ORIGIN says. A vehicle that never says it has its origin worked out
-from GLOBAL_POSITION_INT and LOCAL_POSITION_NED of nearly the same instant. Home alone says nothing:
-it is a place, and no autopilot promises that its frame begins there.
+The origin is what GPS_GLOBAL_ORIGIN says. If a vehicle never sends it, the origin is computed from
+GLOBAL_POSITION_INT and LOCAL_POSITION_NED of nearly the same instant. Home does not define it: home
+is a place, and no autopilot promises that its frame begins there.
 """
 
 from math import hypot
@@ -12,9 +12,9 @@ from mav_tasks.tasks.frames import origin_of, to_local
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from mav_tasks.tasks.task import Frame
 
-MOVED_SAID = 0.05  # m between two origins that a vehicle says, that are not the same
-MOVED_WORKED_OUT = 1.0  # m, the same where positions were rounded and filtered in between
-#: s between two messages of which the origin is worked out: a PX4 1.17 sends them 24 to 80 ms apart
+MOVED_SAID = 0.05  # m between two reported origins that count as different
+MOVED_WORKED_OUT = 1.0  # m, the same for computed ones: positions are rounded and filtered
+#: s between two messages that give the origin: a PX4 1.17 sends them 24 to 80 ms apart
 APART = 0.1
 MAX_LATITUDE_DEGE7 = 900_000_000
 MAX_LONGITUDE_DEGE7 = 1_800_000_000
@@ -23,17 +23,17 @@ Seen = m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt | m.LocalPositio
 
 
 class FrameMonitor:
-    """What one vehicle says of its frame."""
+    """What one vehicle reports about its local frame."""
 
     def __init__(self) -> None:
         self._origin: GlobalPlace | None = None
         self._is_said = False
         self._booted_at: float | None = None
-        self._heard_at = 0.0  # when that was worked out
+        self._heard_at = 0.0  # when the boot time was determined
         self._global: m.GlobalPositionInt | None = None
         self._local: m.LocalPositionNed | None = None
         self.home: GlobalPlace | None = None
-        #: the origin is another one than before; whoever reads it sets it back
+        #: the origin has changed; the reader resets this flag
         self.changed = False
 
     def __repr__(self) -> str:
@@ -41,15 +41,15 @@ class FrameMonitor:
 
     @property
     def origin(self) -> GlobalPlace | None:
-        """Where the frame begins on earth, if that is known."""
+        """The global position of the frame's origin, or None if it is unknown."""
         return self._origin
 
     def boot(self, booted_at: float, *, now: float) -> None:
-        """Take note of when the vehicle was started, by its clock."""
+        """Note when the vehicle booted."""
         self._booted_at, self._heard_at = booted_at, now
 
     def receive(self, message: Seen) -> None:
-        """Take a message in; one with an impossible place is dropped."""
+        """Process a message; an impossible place is ignored."""
         match message:
             case m.GpsGlobalOrigin():
                 self._set_origin(_place(message), is_said=True)
@@ -63,7 +63,7 @@ class FrameMonitor:
                 self._work_out()
 
     def frame(self) -> Frame | None:
-        """Return the frame, or None before anything was heard of it."""
+        """Return the frame, or None before the boot time is known."""
         if self._booted_at is None:
             return None
         if self._origin is None:
@@ -72,7 +72,7 @@ class FrameMonitor:
         return Frame(latitude, longitude, self._booted_at, self._heard_at)
 
     def forget(self) -> None:
-        """Start afresh, as after a restart of the vehicle."""
+        """Forget the frame, as after a restart of the vehicle."""
         self._origin = self._global = self._local = None
         self._is_said = False
         self._booted_at = None
@@ -83,7 +83,7 @@ class FrameMonitor:
         if self._is_said or where is None or local is None:
             return
         later = (where.time_boot_ms - local.time_boot_ms) / 1000
-        # between two instants a position may have been corrected: that is no other origin
+        # between two instants a position may have been corrected, which does not change the origin
         if abs(later) > (APART if self._origin is None else 0.0):
             return
         place = _place(where)
@@ -106,12 +106,12 @@ class FrameMonitor:
 
 
 def _place(message: m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt) -> GlobalPlace | None:
-    """Return the place that a message names; None if there is none such, or it is not known."""
+    """Return the place that a message names, or None if it is impossible or unknown."""
     if isinstance(message, m.GlobalPositionInt):
         latitude, longitude = message.lat, message.lon
     else:
         latitude, longitude = message.latitude, message.longitude
-    if latitude == longitude == 0:  # "not known" of many autopilots
+    if latitude == longitude == 0:  # many autopilots send this for "unknown"
         return None
     if abs(latitude) > MAX_LATITUDE_DEGE7 or abs(longitude) > MAX_LONGITUDE_DEGE7:
         return None

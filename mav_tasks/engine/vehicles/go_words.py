@@ -1,7 +1,7 @@
-"""What was to let one vehicle go, by the bytes of its packets: the net may bring one twice.
+"""Recent packets that let one vehicle go, by their bytes: the network may deliver one twice.
 
-Each endpoint of a client has its own memory of what came there. A station that is heard by two
-links, or from another port than before, is several endpoints; a copy is the same bytes.
+Each endpoint of a client remembers what came there. A station that is heard on two links, or from a
+new port, is several endpoints; a copy has the same bytes.
 """
 
 from collections import OrderedDict
@@ -11,23 +11,23 @@ from mav_tasks.mavlink.number_line import NumberLine
 from mav_tasks.services.command_receiver import COPIED, DOUBLED
 
 REMEMBERED = 1024  # packets
-PRESENT = 3.0  # s since anything of it came, in which a sender is there
+PRESENT = 3.0  # s since its last packet, in which a sender counts as present
 
 
 class Sender(Protocol):
-    """Who has sent a packet, at one endpoint."""
+    """The sender of a packet, at one endpoint."""
 
     line: NumberLine
 
 
 class _Said(NamedTuple):
     sender: Sender
-    epoch: int  # of the vehicle, when the first copy came
-    at: float  # s, of the last copy
+    epoch: int  # the vehicle's halt epoch when the first copy came
+    at: float  # s, when the last copy came
 
 
 class GoWords:
-    """The memory of them."""
+    """The memory of such packets."""
 
     def __init__(self) -> None:
         self._said: OrderedDict[bytes, _Said] = OrderedDict()
@@ -36,10 +36,10 @@ class GoWords:
         return f"GoWords({len(self._said)})"
 
     def first_epoch(self, packet: bytes, sender: Sender, *, now: float) -> int | None:
-        """Return the epoch at which this packet came first, elsewhere; None: it did not.
+        """Return the halt epoch at which this packet first came elsewhere, or None if it did not.
 
-        Of a sender that is not there any more it is a copy for COPIED s only: a program that is run
-        again sends the same bytes from another port.
+        If its first sender is gone, the packet counts as a copy for COPIED s only: a restarted
+        program sends the same bytes from another port.
         """
         said = self._said.get(packet)
         if said is None or said.sender is sender:
@@ -49,7 +49,7 @@ class GoWords:
         return said.epoch if now - said.at <= within else None
 
     def says(self, packet: bytes, sender: Sender, *, epoch: int, now: float) -> None:
-        """Remember a packet; the first who has sent it stays its sender."""
+        """Remember a packet; its first sender stays its sender."""
         before = self._said.pop(packet, None)
         is_known = before is not None and now - before.at <= DOUBLED
         who = before.sender if before is not None and is_known else sender

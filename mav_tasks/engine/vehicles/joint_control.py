@@ -1,7 +1,7 @@
-"""Joint control of one vehicle: each word and each event goes through the table, once.
+"""Joint control of one vehicle: passes each request and each event through the control table once.
 
-Its rule of order: STOP before everything; what somebody else did to the vehicle before what we
-want; and no set-point at all to a vehicle that is not ours.
+STOP comes first, then what somebody else did to the vehicle, then what we want. A vehicle that is
+not ours gets no set-point at all.
 """
 
 from collections.abc import Callable, Hashable
@@ -26,24 +26,24 @@ R = TaskReason
 
 
 class JointControl:
-    """Everything that is asked of one vehicle, or happens to it, in the order of the table."""
+    """The entry point for each request to one vehicle and each event seen on it."""
 
     def __init__(self, parts: Parts, pilot: Pilot, view: Callable[[float], VehicleView]) -> None:
-        """``view`` gives one look at the vehicle at a time."""
+        """``view`` returns a snapshot of the vehicle at a time."""
         self._parts = parts
         self._pilot = pilot
         self._view = view
         self._reach = Reach(parts, pilot, self.step)
-        self._stops_task = False  # which the end of the server has interrupted
-        self.stopped_at = -inf  #: s, the last STOP
+        self._stops_task = False  # whether the shutdown of the server interrupted a task
+        self.stopped_at = -inf  #: s, time of the last STOP
 
     def __repr__(self) -> str:
         return f"JointControl({self._parts.control!r}, {self._parts.tasks!r})"
 
     def on(self, event: Event, word: Word, *, now: float) -> Any:
-        """Do what the table says of an event; gives what that comes to, if anything.
+        """Carry out the table's effects for an event; return the last result that is not None.
 
-        Rejection: the word was refused; what the table has before that was done.
+        Raise Rejection if the request is refused. The effects before the refusal remain in force.
         """
         result = None
         for effect in effects_of(event, self.state(now=now)):
@@ -55,78 +55,78 @@ class JointControl:
         return result
 
     def step(self, now: float) -> None:
-        """Let the tasks say what they demand, do it, and see to what is found by that."""
+        """Run the tasks, carry out their demand, and handle the events that this reveals."""
         for event, reason, text in self._pilot.follow(now=now):
             self.on(event, Word(reason, text=text), now=now)
         self._pilot.send(now=now)
 
     def wake(self, *, now: float) -> None:
-        """Look at the tasks unless that is about to be done: another may be ready now."""
+        """Run the tasks, because one may be ready, unless a tick is about to do so."""
         if not self._pilot.clock.is_running:
             self.step(now)
 
     def state(self, *, now: float) -> State:
-        """Return what decides about the next event."""
+        """Return the state that decides about the next event."""
         is_late = now - self.stopped_at <= SHOWN_LATE
         return state_of(self._parts, self._pilot, is_late=is_late, now=now)
 
-    # words that let it stand
+    # requests that halt the vehicle
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
-        """STOP: zero and HOLD leave in this very step; gives the task that was killed."""
+        """STOP: send zero and HOLD in this very step. Return the id of the killed task."""
         self.stopped_at = now
         killed: TaskId | None = self.on(Event.STOP, Word(R.STOPPED, actor, clear=clear), now=now)
         return killed
 
     def hold(self, *, sender: Hashable, actor: str, now: float) -> TaskId | None:
-        """A client wants HOLD; gives the task that stands by it."""
+        """Handle a client's HOLD. Return the id of the task that it pauses."""
         paused: TaskId | None = self.on(Event.HOLD, Word(actor=actor, sender=sender), now=now)
         return paused
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
-        """Let task and queue stand, also when there is no task; gives the task that stands."""
+        """Pause the queue and the active task, if there is one. Return its id."""
         paused: TaskId | None = self.on(Event.PAUSE, Word(actor=actor), now=now)
         return paused
 
     def disarm(self, *, actor: str, now: float) -> None:
-        """A client disarms it: nothing arms it again but a word that is newer."""
+        """Handle a client's disarming: only a newer request arms the vehicle again."""
         word = Word(R.DISARMED, actor, "disarmed by a client")
         self.on(Event.DISARM, word, now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
-        """Setpoints or an address like ours, not from us: HOLD once, then let go."""
+        """Send HOLD once and let go: setpoints, or our own address, come from elsewhere."""
         word = Word(R.OTHER_CONTROLLER, str(who), f"second controller {who}")
         self.on(Event.SECOND, word, now=now)
 
     def sticks_moved(self, *, now: float) -> None:
-        """A person drives by the sticks of a client."""
+        """Let go: a client sends manual control input."""
         word = Word(R.TAKEOVER, self._parts.actor, "driven by hand")
         self.on(Event.DRIVEN_BY_HAND, word, now=now)
 
     def check_late(self, *, now: float) -> None:
-        """What drove on without us for too long stops, and somebody looks at it first.
+        """Stop a vehicle that drove on during a stall of the server, and hold its task.
 
-        What came in meanwhile looks fresh and is not, so nothing is steered by it.
+        What arrived meanwhile looks fresh but is not, so it must not steer anything.
         """
         if self._pilot.is_late(now=now):
             self.on(Event.LATE, Word(R.LATE), now=now)
 
     def shut_down(self, *, now: float) -> None:
-        """The server ends: pause what is begun and stop what we drive; nothing begins any more."""
+        """Shut down: pause the active task, stop what we drive, and start no more tasks."""
         self._pilot.close()
         active = self._parts.tasks.active
         self._stops_task = active is not None and active.state in RUNNING
         self.on(Event.CLOSE, Word(), now=now)
 
     def note_rest(self, *, now: float) -> None:
-        """The server ends now: keep where what it has stopped has come to."""
+        """Store where the interrupted task has come to rest: the server ends now."""
         if self._stops_task:
             self._parts.tasks.rest(self._view(now), now=now)
 
-    # calling off
+    # cancelling
 
     def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
-        """Call a task off; if it is the begun one, zeros leave in this very step."""
+        """Cancel a task; if it is the active one, zeros leave in this very step."""
         tasks = self._parts.tasks
         active = tasks.active
         event = Event.CANCEL if active is not None and active.id == task.id else Event.UNQUEUE
@@ -145,7 +145,7 @@ class JointControl:
         self.on(Event.SKIP, Word(R.SKIPPED, actor, do=call_off), now=now)
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
-        """Call off what waits, or everything."""
+        """Cancel the waiting tasks; with ``begun_too`` also suspended and active ones."""
 
         def call_off() -> None:
             self._parts.tasks.clear(begun_too=begun_too, actor=actor, now=now)
@@ -153,13 +153,13 @@ class JointControl:
         event = Event.CLEAR if begun_too else Event.CLEAR_WAITING
         self.on(event, Word(R.CLEARED, actor, do=call_off), now=now)
 
-    # words that let it go
+    # requests that let the vehicle go
 
     def proceed(self, *, actor: str, now: float) -> TaskId | None:
-        """Release STOP, takeover and pause; arming is allowed again. A held task stays held.
+        """Release STOP, takeover and pause, and allow arming again. A held task stays held.
 
-        Raise Rejection while the active task could not take the vehicle. Return the task that goes
-        on.
+        Return the id of the task that resumes. Raise Rejection if the active task could not take
+        the vehicle now.
         """
         authority = self._parts.authority
         may_arm = authority.may_arm_again
@@ -173,7 +173,7 @@ class JointControl:
         return going
 
     def go_on(self, *, actor: str, now: float) -> None:
-        """End a pause, as ``proceed``, but nobody has said that the vehicle may be armed again."""
+        """End a pause like ``proceed``, but do not allow arming again: nobody asked for that."""
 
         def go_on() -> None:
             self._parts.tasks.proceed(self._view(now), actor=actor, now=now)
@@ -181,7 +181,7 @@ class JointControl:
         self.on(Event.GO_ON, Word(R.NONE, actor, do=go_on), now=now)
 
     def go_to_follows(self, number: int, *, actor: str, now: float) -> None:
-        """A client's "go to" is stored: a HOLD of it just before was none."""
+        """Undo the pause by the HOLD just before a client's "go to", which is durable now."""
         is_still = self._parts.hold_before.is_still(number)
         if not is_still or self._parts.tasks.paused is not R.OPERATOR:
             return
@@ -193,11 +193,10 @@ class JointControl:
     def release(
         self, task: Task, *, again: bool, may_continue: bool, actor: str, now: float
     ) -> None:
-        """Let a held task go on; raise Rejection while it could not take the vehicle.
+        """Let a held task resume. Raise Rejection if it could not take the vehicle now.
 
-        After a restart of the vehicle this is a person's word that all is well, and restores
-        the permission to arm if the person may give it (``may_continue``). What somebody has
-        disarmed stays so until a continue.
+        After a restart of the vehicle it restores the permission to arm, if the person may give
+        that (``may_continue``). A vehicle that somebody disarmed stays so until a continue.
         """
         authority = self._parts.authority
         restores = may_continue and authority.is_withdrawn_by_restart
@@ -214,7 +213,7 @@ class JointControl:
         self.on(event, Word(R.NONE, actor, do=let_go_on), now=now)
 
     def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
-        """Take a task in that runs at once, before what runs and what waits. Rejection."""
+        """Submit a task that runs before all others, at once. Raise Rejection if refused."""
 
         def take_in() -> Task:
             return self._parts.tasks.run_now(draft, self._view(now), actor=actor, now=now)
@@ -225,14 +224,14 @@ class JointControl:
     def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
         """Note that a client's mode request goes to the vehicle through us.
 
-        Our own mode then counts as set by us. Any other one is a takeover, believed when a
-        heartbeat shows it; but nothing that we still ask for may work against it.
+        Our own mode then counts as set by us. Another mode is a takeover once a heartbeat shows it;
+        until then, no request of ours may work against it.
         """
         parts = self._parts
         authority, persona = parts.authority, parts.persona
         present_mode = parts.monitor.custom_mode
-        # the vehicle enters that mode only in a stream, of which it has not heard yet; that it is
-        # armed may not have been heard yet either: the stream passes when it is
+        # The vehicle enters that mode only while setpoints stream, and has not received any yet.
+        # They pass once it is armed, which no heartbeat may have shown yet.
         streams = persona.arms_in_hold and authority.streams(client, now=now)
         if mode != persona.control_mode:
             event = Event.ASK_OTHER_MODE
@@ -246,31 +245,31 @@ class JointControl:
         self.on(event, Word(R.TAKEOVER, parts.actor, text, do=ask), now=now)
 
     def arm(self, *, now: float) -> None:
-        """A client's wish to arm goes to the vehicle through us."""
+        """Handle a client's request to arm, which goes to the vehicle through us."""
 
         def ask() -> None:
             self._parts.armings.client_arms(now=now)
 
         self.on(Event.ARM, Word(do=ask), now=now)
 
-    # what ends a client's own driving
+    # the end of a client's own driving
 
     def end_driving_of(self, client: Hashable, *, now: float) -> None:
-        """A client asks for a return, a place or a mission: its own setpoints end with that.
+        """End a client's own setpoints, because it asks for a return, a "go to" or a mission.
 
-        What it drove stands, so that neither its last velocity nor a failsafe for lost setpoints
-        comes before what it asks for now.
+        The vehicle stops, so that neither the client's last velocity nor a failsafe for lost
+        setpoints acts before the new request.
         """
         if client is not None and client_driving(self._parts, now=now) == client:
             self.on(Event.DRIVING_ENDS, Word(), now=now)
 
     def client_is_gone(self, client: Hashable, *, now: float) -> None:
-        """Its connection has ended: what it drove stands, and does not wait for its own watch."""
+        """Stop what a disconnected client drove, without waiting for the vehicle's timeout."""
         if self._parts.authority.forget(client):
             self.on(Event.GONE, Word(), now=now)
 
     def stand_down(self, client: Hashable, *, now: float) -> None:
-        """A client has landed it: disarm it once no task is left to drive.
+        """Disarm the vehicle, which a client has landed, once no task is left to drive.
 
         Raise Rejection under STOP, and while a person drives.
         """
@@ -281,9 +280,9 @@ class JointControl:
         self.on(Event.LANDED, Word(), now=now)
 
     def leave_manual(self, *, now: float) -> None:
-        """A client starts a mission: as on an autopilot, that ends driving by hand.
+        """End manual control, as an autopilot would: a client starts a mission.
 
-        By way of HOLD, from which tasks take the vehicle.
+        The vehicle goes to HOLD, from which tasks take it.
         """
         if self._parts.is_manual:
             self.on(Event.LEAVE_MANUAL, Word(), now=now)

@@ -1,76 +1,76 @@
-"""What decides who may move a vehicle: the state of its joint control, as one value."""
+"""The state of joint control, as one value: it decides who may move a vehicle."""
 
 from enum import Enum, Flag, auto
 from typing import NamedTuple
 
 
 class Queue(Enum):
-    """Whether waiting tasks begin."""
+    """Whether waiting tasks start."""
 
-    #: they do, one after the other
+    #: tasks start, one after the other
     RUNS = auto()
-    #: somebody has paused it, or a restart has
+    #: paused by somebody, or by a restart
     PAUSED = auto()
-    #: somebody else has the vehicle, or its failsafe
+    #: somebody else, or a failsafe, has the vehicle
     TAKEN = auto()
     #: STOP is latched
     STOPPED = auto()
 
 
 class Grip(Enum):
-    """How far our own hold on the vehicle goes."""
+    """How far our control of the vehicle goes."""
 
-    #: nothing of ours is sent
+    #: we send nothing
     FREE = auto()
-    #: modes and arming are asked for; it does not move
+    #: we ask for modes and arming; it does not move
     TAKING = auto()
     #: it follows our set-points
     DRIVING = auto()
-    #: it stands, HOLD is asked for, then disarming
+    #: it stands; we ask for HOLD, then for disarming
     RELEASING = auto()
     #: the stop ladder, until it is seen to stand
     STOPPING = auto()
 
 
 class Work(Enum):
-    """What there is to do."""
+    """What the tasks of the vehicle are doing."""
 
     #: no task
     NONE = auto()
-    #: some wait, none has the vehicle
+    #: tasks wait, none is active
     WAITS = auto()
-    #: one starts, or is driven
+    #: the active task starts or drives
     RUNS = auto()
-    #: one is being cancelled: it comes to stand
+    #: the active task is being cancelled, and comes to a stop
     ENDS = auto()
-    #: one stands as long as the vehicle, or its position, is not heard of
+    #: the active task waits until the vehicle, or its position, is heard again
     LOST = auto()
-    #: one is paused or held
+    #: the active task is paused or held
     STANDS = auto()
-    #: one stands because somebody else has the vehicle
+    #: the active task stands because somebody else has the vehicle
     TAKEN = auto()
 
 
 class Driver(Enum):
-    """Whose set-points or sticks were seen just now, beside our own."""
+    """Who else's set-points or stick input were seen just now."""
 
     NOBODY = auto()
-    #: one that was granted, through us
+    #: a client with a grant to drive through us
     CLIENT = auto()
     #: a person at the sticks, or a second controller
     OTHERS = auto()
 
 
 class Waits(Flag):
-    """What was asked for, and moves the vehicle later by itself."""
+    """Earlier requests that may still move the vehicle later."""
 
-    #: a "go to", by which a HOLD just before is undone
+    #: a "go to" that may follow a HOLD and undo it
     GO_TO = auto()
-    #: the mission, with the arming
+    #: the mission, which starts when the vehicle is armed
     START = auto()
     #: a held task that was released
     RELEASE = auto()
-    #: a client that was granted the mode in which it drives
+    #: a client's grant of the mode in which it drives
     GRANT = auto()
 
 
@@ -85,15 +85,15 @@ class State(NamedTuple):
     work: Work = Work.NONE
     driver: Driver = Driver.NOBODY
     armed: bool = False
-    may_be_armed: bool = False  # also by a client that has asked for that, and it is not shown yet
-    may_arm: bool = True  # we may, of our own accord
+    may_be_armed: bool = False  # or a client asked for arming, which no heartbeat shows yet
+    may_arm: bool = True  # we may arm it without a client's request
     waits: Waits = NOTHING
-    is_led: bool = False  # in a mode of somebody else's, in which no task begins
-    is_urgent: bool = False  # a task is to run though the queue is paused
-    is_idle: bool = True  # no task has begun, and none could begin now
-    is_stopping: bool = False  # it is not known yet that it stands, as it was told to
-    is_late: bool = False  # what left before the last STOP may still arrive
-    lingers: bool = False  # by its make: a "go to" may follow HOLD, and undo it
-    has_failsafe: bool = False  # by its make: it leaves our mode when set-points end
-    heeds_stick: bool = False  # by its make: it takes a stick for a speed, in our mode too
+    is_led: bool = False  # in a mode set by somebody else, in which no task starts
+    is_urgent: bool = False  # a task must run although the queue is paused
+    is_idle: bool = True  # no task is active, and none could start now
+    is_stopping: bool = False  # it was told to stand and is not yet seen to stand
+    is_late: bool = False  # packets sent before the last STOP may still arrive
+    lingers: bool = False  # persona: a "go to" may follow HOLD and undo it
+    has_failsafe: bool = False  # persona: it leaves our mode when set-points end
+    heeds_stick: bool = False  # persona: it takes a stick as a speed, also in our mode
     brakes: bool = False  # set-points stop it sooner than HOLD, also against a held stick

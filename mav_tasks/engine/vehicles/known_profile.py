@@ -1,6 +1,7 @@
-"""What was measured of a vehicle beforehand, as far as it is this very vehicle.
+"""The measured profile of a vehicle, if it belongs to this very vehicle.
 
-A profile is of one unique id and one firmware: any other is told, and not used.
+A profile is valid for one unique id and one firmware. A profile that does not match is reported,
+and not used.
 """
 
 from mav_tasks.services.identity import VehicleIdentity
@@ -9,28 +10,28 @@ from mav_tasks.settings import Turning, VehicleProfile
 
 
 class KnownProfile:
-    """Chooses among the profiles that there are for one system id."""
+    """Chooses among the profiles for one system id."""
 
     def __init__(self, persona: Persona) -> None:
         self._by_default = persona
         self._profiles: tuple[VehicleProfile, ...] = ()
         self._identity: VehicleIdentity | None = None
-        #: what is known of this vehicle; None: nothing
+        #: the profile of this vehicle, or None
         self.chosen: VehicleProfile | None = None
         self._told = ""
-        self._said: tuple[Turning | None, float | None] = None, None  # by its parameters
+        self._said: tuple[Turning | None, float | None] = None, None  # from its parameters
 
     def __repr__(self) -> str:
         return f"KnownProfile({self.chosen})"
 
     @property
     def persona(self) -> Persona:
-        """How it wants to be spoken to, as far as that is known."""
+        """The persona, as far as the profile and parameters refine it."""
         return self._turning_as_known(self._read_as_known())
 
     @property
     def stop(self) -> tuple[float, float] | None:
-        """A stop that was measured: m/s, and the metres that it took."""
+        """A measured stop: speed in m/s, and stopping distance in m."""
         if self.chosen is None or self.chosen.speed is None:
             return None
         if self.chosen.stopping_distance is None:
@@ -39,22 +40,22 @@ class KnownProfile:
 
     @property
     def why_drives_on(self) -> str:
-        """Return in words why it would go on without setpoints; "": it stops, or is not known."""
+        """Why it would not stop when setpoints end, in words; "" if it stops or is unknown."""
         is_off = self.chosen is not None and self.chosen.loss_stop == "no"
         return "its profile says that it does not stop by itself" if is_off else ""
 
     def identify(self, identity: VehicleIdentity) -> None:
-        """The vehicle has said which one it is."""
+        """Note the identity of the vehicle."""
         self._identity = identity
         self._choose()
 
     def apply(self, profiles: tuple[VehicleProfile, ...], system_id: int) -> None:
-        """Take the profiles that there are now."""
+        """Apply the present list of profiles."""
         self._profiles = tuple(each for each in profiles if each.system_id == system_id)
         self._choose()
 
     def take_news(self) -> str:
-        """Return in words what is used, or why nothing is; "" if that is no news."""
+        """Return which profile is used, or why none is, in words; "" if that has not changed."""
         words = self._words()
         if words == self._told:
             return ""
@@ -68,11 +69,11 @@ class KnownProfile:
         return with_yaw_rate(self._by_default, is_honoured=known == "honoured")
 
     def turns(self, turning: Turning | None, radius: float | None) -> None:
-        """Note how the vehicle's parameters say that it turns; None: they do not say."""
+        """Note how the vehicle turns by its parameters; None if they do not say."""
         self._said = turning, radius
 
     def _turning_as_known(self, persona: Persona) -> Persona:
-        """A profile was measured, and comes before what parameters say."""
+        """Prefer the profile, which was measured, to the parameters."""
         if self.chosen is None or not self.chosen.turning:
             turning, said = self._said
             return persona if turning is None else with_turning(persona, turning, radius=said)

@@ -1,7 +1,7 @@
-"""What the way to the vehicles behind one endpoint carries, and what observers may ask over it.
+"""What the link to one endpoint of vehicles carries, and what observers may request over it.
 
-An observer's questions are answered by the vehicle, over its link: a list of all parameters, or a
-hundred small questions a second, would delay the telemetry that a task is driven by.
+The vehicle answers an observer's requests over its own link. A list of all parameters, or a hundred
+small requests a second, would delay the telemetry that a task is driven by.
 """
 
 from collections.abc import Hashable
@@ -14,20 +14,20 @@ from mav_tasks.services.rate_budget import OBSERVERS_SHARE, size_of, spare_of
 from mav_tasks.services.token_bucket import TokenBucket
 
 LIST = 37_000.0  # bytes: a thousand parameters, as an ArduPilot has
-LIST_SHARE = 0.3  # of the link, that an ArduPilot uses for a list
-SLOW_LIST = 5.0  # s; a link that takes longer for one is narrow
-LEAST = 100.0  # bytes/s for questions on the narrowest link: one or two
-WITHIN = 5.0  # s, of which the questions may come at once
-OWN_SHARE = 0.25  # of them, that one client has: the others are answered beside a flood of its
-MOST_CLIENTS = 64  # of whom is known what they have asked
+LIST_SHARE = 0.3  # of the link, which an ArduPilot uses for a list
+SLOW_LIST = 5.0  # s; a link that takes longer for a list is narrow
+LEAST = 100.0  # bytes/s for requests on the narrowest link: one or two
+WITHIN = 5.0  # s of requests that may come in a burst
+OWN_SHARE = 0.25  # of the requests, for one client: its flood leaves room for the others
+MOST_CLIENTS = 64  # whose requests are counted
 
 
 class LinkBudget:
-    """The way to one endpoint; ``budget`` as configured and ``capacity`` in bytes a second."""
+    """The budget of one endpoint; ``budget`` as configured, ``capacity`` in bytes/s."""
 
     def __init__(self, *, budget: float, capacity: float | None, vehicles: int, now: float) -> None:
         self._carries = budget if capacity is None else min(budget, capacity)
-        #: bytes a second that each vehicle may be asked for beyond the server's own needs
+        #: bytes/s that may be requested of each vehicle beyond the server's own needs
         self.spare = spare_of(budget, capacity, vehicles=vehicles)
         rate = max(LEAST, OBSERVERS_SHARE * self.spare * vehicles)
         self._questions = TokenBucket(rate=rate, burst=WITHIN * rate, now=now)
@@ -47,7 +47,7 @@ class LinkBudget:
         is_driven: bool,
         now: float,
     ) -> str | None:
-        """Return why an observer's question may not be passed on now, None if it may."""
+        """Return why an observer's request may not be forwarded now, or None if it may."""
         if not _asks_for_much(message):
             size = len(packet.raw) + _size_of_answer(message)
             may_ask = self._of(who, now=now).take(tokens=size, now=now)
@@ -62,7 +62,7 @@ class LinkBudget:
         return None
 
     def _of(self, who: Hashable, *, now: float) -> TokenBucket:
-        """Return what one client may still ask."""
+        """Return the token bucket of one client."""
         bucket = self._own.pop(who, None)
         if bucket is None:
             bucket = TokenBucket(rate=self._rate, burst=WITHIN * self._rate, now=now)
@@ -78,7 +78,7 @@ def _asks_for_much(message: m.Message) -> bool:
 
 
 def _size_of_answer(message: m.Message) -> int:
-    """Return the bytes of what a vehicle says to a question, at the most."""
+    """Return the bytes of a vehicle's answer to a request, at most."""
     match message:
         case m.CommandLong() | m.CommandInt():
             shown = message.param1

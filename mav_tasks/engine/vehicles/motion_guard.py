@@ -1,8 +1,7 @@
-"""Whether a vehicle moves as it was told to: what is to be done about it when it does not.
+"""Detects that a vehicle does not move as it was told to, and decides what to do about it.
 
-It measures and decides; the vehicle carries out. Two things are looked at with each setpoint: that
-a vehicle that was told to stand does (``stop_ladder``), and that one that was told to drive is not
-faster than that (``overspeed``).
+It checks with each setpoint that a vehicle told to stand does so (``stop_ladder``), and that one
+told to drive is not faster than asked (``overspeed``).
 """
 
 from enum import Enum, auto
@@ -14,45 +13,45 @@ from mav_tasks.engine.vehicles.overspeed import Overspeed
 from mav_tasks.engine.vehicles.stop_ladder import MOVES, NO_EFFECT, Step, StopLadder
 from mav_tasks.settings import Watch
 
-NEARLY_STANDS = 0.1  # m/s, from which one that rolls on in HOLD rolls no further than 5 cm
-SWINGS = 1.0  # s in which a car may swing back after its task's own zeros: to 0.15 m/s (ArduPilot)
-RUNS_ON = 0.4  # m/s on those, that are more than a speed loop that has wound up
-ROLLS = 0.03  # m/s, at which one that rolls out still brakes; with 0.05 it went on for 9 cm
-BRAKES_WITHIN = 2.0  # s; from 2 m/s at 1 m/s², and what takes longer is HOLD's
-SPEED_WINDOW = 0.3  # s, over which its speed is taken from where it was
+NEARLY_STANDS = 0.1  # m/s; a vehicle that rolls on in HOLD from this speed rolls at most 5 cm
+SWINGS = 1.0  # s in which a car may swing back, up to 0.15 m/s, after its task's zeros (ArduPilot)
+RUNS_ON = 0.4  # m/s on a task's zeros, more than a wound-up speed loop explains
+ROLLS = 0.03  # m/s above which one that rolls out still brakes; with 0.05 it rolled on for 9 cm
+BRAKES_WITHIN = 2.0  # s to stop from 2 m/s at 1 m/s²; after that, HOLD takes over
+SPEED_WINDOW = 0.3  # s of positions from which its speed is computed
 
 
 class Measure(Enum):
-    """What is to be done."""
+    """What the guard demands."""
 
-    #: it stands so nearly that HOLD does not let it roll
+    #: HOLD: it is so slow that HOLD does not let it roll
     HOLD_NOW = auto()
-    #: setpoints do not stop it: HOLD
+    #: HOLD: setpoints do not stop it
     HOLD = auto()
-    #: HOLD does not stop it either
+    #: disarm: HOLD does not stop it either
     DISARM = auto()
-    #: it is faster than it was told to be
+    #: stop the task: it is faster than it was told to be
     STOP_TASK = auto()
 
 
 class Found(NamedTuple):
-    """What is to be done, and what was seen, in words for the operator."""
+    """A measure, and the observation in words for the operator."""
 
     measure: Measure
     words: str = ""
 
 
 class Told(NamedTuple):
-    """What the vehicle is told, and by whom it is driven."""
+    """What the vehicle is told, and who controls it."""
 
-    forward: float  # m/s that are asked for now
-    moves: bool  # a velocity other than zero is asked for, and it is in our control
+    forward: float  # m/s asked for now
+    moves: bool  # we ask for a velocity other than zero, and it is in our control
     is_ours: bool  # we drive it, hand it back or stop it
-    is_stopping: bool  # STOP, or what is like it
-    rolls_out: bool  # in our mode, such a vehicle rolls on or swings back before it stands
-    may_drive: bool  # in our control, and STOP is not latched
-    goes_on: bool  # it stands for a task that goes on, or begins
-    is_released: bool  # we do nothing to it any more
+    is_stopping: bool  # by STOP, or by a halt like it
+    rolls_out: bool  # in our mode, it rolls on or swings back before it stands
+    may_drive: bool  # it is in our control, and STOP is not latched
+    goes_on: bool  # it stands for a task that continues or starts
+    is_released: bool  # we send it nothing any more
     is_held: bool  # it shows HOLD
     armed: bool
     still: bool
@@ -60,7 +59,7 @@ class Told(NamedTuple):
 
 
 class MotionGuard:
-    """Guards one vehicle."""
+    """Guards the motion of one vehicle."""
 
     def __init__(self, motion: MotionMonitor, watch: Watch) -> None:
         self._motion = motion
@@ -73,19 +72,18 @@ class MotionGuard:
         return f"MotionGuard({self.ladder!r}, {self._overspeed!r})"
 
     def apply(self, watch: Watch) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._watch = watch
 
     def is_fresh(self, *, now: float) -> bool:
-        """Return whether it is known how the vehicle moves now."""
+        """Return whether there is fresh data on how the vehicle moves."""
         motion = self._motion.latest()
         return motion is not None and now - motion.at <= self._watch.motion_fresh
 
     def brakes(self, *, rolls_out: bool, now: float) -> bool:
-        """Return whether it was told to move a moment ago, and still rolls on along its heading.
+        """Return whether it was told to move a moment ago, and still rolls along its heading.
 
-        At rest an estimate wanders, too, but for longer; and it is the speed that is reported or
-        the way that was made, not both.
+        At rest an estimate drifts for longer, and in the reported speed or the position, not both.
         """
         motion = self._motion.latest()
         if motion is None or now - self._told_to_move_at > BRAKES_WITHIN:
@@ -96,7 +94,7 @@ class MotionGuard:
         return is_known and min(abs(forward or 0.0), abs(motion.forward)) > least
 
     def look(self, told: Told, *, now: float) -> list[Found]:
-        """Return what is to be done now, in order."""
+        """Return the measures that are due now, in order."""
         found = []
         if told.may_drive:
             too_fast = self._is_too_fast(told.forward, now=now)
@@ -117,7 +115,7 @@ class MotionGuard:
             return []
         speed = self._speed(now=now)
         if speed is None and not told.is_stopping:
-            return []  # zeros go on, and HOLD follows them: nobody knows of a car that HOLD rolls
+            return []  # keep sending zeros, then HOLD: a car might roll on in HOLD
         is_own = told.goes_on and not told.is_stopping
         step = self.ladder.climb(
             speed=speed,
@@ -145,7 +143,7 @@ class MotionGuard:
         return f"drives {speed:.1f} m/s, asked for {most:.1f}: stopped. Is a stick off its centre?"
 
     def _speed(self, *, now: float) -> float | None:
-        """Return m/s by displacement, None while nothing fresh is known."""
+        """Return the speed by displacement, m/s, or None without fresh data."""
         return (
             self._motion.standstill.speed(SPEED_WINDOW, now=now) if self.is_fresh(now=now) else None
         )

@@ -1,6 +1,6 @@
 """A vehicle's own position, heading and standstill, from LOCAL_POSITION_NED and ATTITUDE.
 
-All of it is as old as the vehicle's own clock says, however long it was under way.
+Data is as old as the vehicle's own clock says, however long the network delayed it.
 """
 
 from math import cos, hypot, inf, isfinite, sin
@@ -14,7 +14,7 @@ from mav_tasks.tasks.task import Pose
 
 
 class MotionMonitor:
-    """What one vehicle measures of its motion."""
+    """The motion that one vehicle reports."""
 
     def __init__(self, watch: Watch) -> None:
         self._watch = watch
@@ -23,23 +23,23 @@ class MotionMonitor:
         self._attitude: Attitude | None = None
         self._attitude_at = 0.0
         self._moved_at: float | None = None
-        self._latest: Motion | None = None  # made of what came last, when it is asked for
-        #: what its messages say of when they were made
+        self._latest: Motion | None = None  # computed from the last messages when needed
+        #: when its messages were sent, by their time stamps
         self.clock = SenderClock()
-        #: where it was lately, and what it does at rest
+        #: its recent positions, and its noise at rest
         self.standstill = Standstill()
         self._doubted_until = -inf
 
     def apply(self, watch: Watch) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._watch = watch
 
     def receive(
         self, message: Attitude | LocalPositionNed, *, now: float, not_after: float = inf
     ) -> Heard:
-        """Take a message in, and return what it is; one that is not finite is dropped, too.
+        """Process a message and return its classification; one that is not finite counts as old.
 
-        What is read late counts as if it had been made at ``not_after`` at the latest.
+        A message that is read late counts as sent at ``not_after`` at the latest.
         """
         if not is_finite(message):
             return Heard.OLD
@@ -81,14 +81,14 @@ class MotionMonitor:
         )
 
     def is_still(self, *, now: float) -> bool:
-        """Whether fresh data say that the vehicle has stood for a while.
+        """Return whether fresh data shows that the vehicle has stood for a while.
 
-        That nothing was heard since it moved is no standstill, however long data count as fresh.
+        Silence since it moved is no standstill, however long data counts as fresh.
         """
         motion, watch = self.latest(), self._watch
         if motion is None or now - motion.at > watch.motion_fresh or now < self._doubted_until:
             return False
-        if abs(motion.yaw_rate) >= watch.still_turn_rate:  # at rest 1.4 deg/s was the most measured
+        if abs(motion.yaw_rate) >= watch.still_turn_rate:  # at rest, 1.4 deg/s at most was measured
             return False
         says_so = (
             self._is_slow()
@@ -100,20 +100,20 @@ class MotionMonitor:
         return self.standstill.has_stood(watch, now=now)
 
     def doubt(self, *, until: float) -> None:
-        """Do not believe before then that it stands, whatever it says."""
+        """Do not believe a standstill before ``until``."""
         self._doubted_until = until
 
     def forget(self) -> None:
-        """Start afresh, as after a restart of the vehicle."""
+        """Forget everything, as after a restart of the vehicle."""
         self._position = self._attitude = self._latest = None
         self._moved_at = None
         self.standstill.forget()
         self.clock = SenderClock()
 
     def _is_frozen(self, message: LocalPositionNed) -> bool:
-        """Whether it says that it moves, and yet is where it was: an estimator that stands still.
+        """Return whether it reports a speed but an unchanged position: its estimator is frozen.
 
-        Such a position is as old as the first of its kind.
+        Such a position is as old as the first one with the same coordinates.
         """
         last = self._position
         return (
@@ -134,7 +134,7 @@ class MotionMonitor:
 
 
 def is_finite(message: Attitude | LocalPositionNed) -> bool:
-    """Whether all numbers of it that are used are numbers."""
+    """Return whether all fields that are used are finite."""
     if isinstance(message, LocalPositionNed):
         return all(map(isfinite, (message.x, message.y, message.vx, message.vy)))
     return isfinite(message.yaw) and isfinite(message.yawspeed)

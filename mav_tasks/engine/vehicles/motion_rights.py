@@ -7,7 +7,7 @@ from mav_tasks.services.phase import Phase
 
 
 class MotionRights:
-    """Whom a vehicle would follow, of the clients that want to drive it."""
+    """Decides which client, if any, may move one vehicle."""
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
@@ -16,9 +16,9 @@ class MotionRights:
         return f"MotionRights({self._parts.authority!r})"
 
     def why_not_moved(self, client: Hashable, *, takes_over: bool = False) -> str:
-        """Return in words what keeps a client's motion message from passing, "" if nothing does.
+        """Return why a client's motion message may not pass, in words, or "" if it may.
 
-        ``takes_over``: it asks for the mode in which clients drive as well.
+        ``takes_over``: the client also asks for the mode in which clients drive.
         """
         parts = self._parts
         why_not = self.why_no_motion(takes_over=takes_over)
@@ -33,9 +33,9 @@ class MotionRights:
         return ""
 
     def why_no_motion(self, *, takes_over: bool = False) -> str:
-        """Return in words why nobody else may have it move now, "" if somebody may.
+        """Return why no client may move it now, in words, or "" if one may.
 
-        Who ``takes_over`` goes on from where we hand the vehicle back.
+        With ``takes_over``, the client may continue from where we hand the vehicle back.
         """
         parts = self._parts
         if parts.tasks.is_stopped:
@@ -48,17 +48,17 @@ class MotionRights:
         return ""
 
     def withheld(self, client: Hashable, *, now: float) -> None:
-        """A client's motion message does not go to it."""
+        """Note that a client's motion message does not go to the vehicle."""
         self._parts.authority.note_withheld(client, now=now)
 
     def passed(self, client: Hashable, *, now: float) -> None:
-        """A client's motion message goes to it: tasks wait."""
+        """Note that a client's motion message goes to the vehicle, so that tasks wait."""
         self._parts.authority.note_client(client, now=now)
 
     def has_granted(self, client: Hashable) -> bool:
-        """Whether a client may move it, as far as that is the client's doing."""
+        """Return whether a client has the grant to drive."""
         return self._parts.authority.has_granted(client)
 
     def is_armed_by_client(self, *, now: float) -> bool:
-        """Whether a client has asked for arming, through us, just now."""
+        """Return whether a client has asked for arming, through us, just now."""
         return self._parts.armings.are_by_client(now=now)

@@ -1,4 +1,4 @@
-"""What the parts of one vehicle share: what is known of it, its tasks, and the way to it."""
+"""What the parts of one vehicle share: its state, its tasks, and the way to send to it."""
 
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ REFUSALS = {
 
 @dataclass(slots=True)
 class Parts:
-    """One vehicle, as those see it who decide about it."""
+    """The shared state of one vehicle."""
 
     system_id: int
     persona: Persona
@@ -46,48 +46,48 @@ class Parts:
     armings: Armings = field(default_factory=Armings)
     failsafes: OwnFailsafes = field(default_factory=OwnFailsafes)
     sticks: StickWatch = field(default_factory=StickWatch)
-    #: a HOLD that a "go to" may undo
+    #: the last HOLD that a "go to" may undo
     hold_before: HoldBefore = field(default_factory=HoldBefore)
-    #: whether its mission begins when it is armed
+    #: whether its mission starts when it is armed
     start_mark: StartMark = field(default_factory=StartMark)
-    #: what its heartbeats say towards clients
+    #: its heartbeats as clients see them
     shown: ShownHeartbeat = field(default_factory=ShownHeartbeat)
 
     @property
     def control(self) -> OffboardControl:
-        """Our hold on it."""
+        """Our offboard control of the vehicle."""
         return self.requests.control
 
     @property
     def actor(self) -> str:
-        """Who it is in the journal, where it was the vehicle itself, or somebody at it."""
+        """The actor in the journal for what the vehicle itself, or somebody at it, did."""
         return f"vehicle {self.system_id}"
 
     @property
     def is_manual(self) -> bool:
-        """Whether it is in a mode in which a person drives."""
+        """Whether it is in a manual mode."""
         return self.monitor.custom_mode in self.persona.manual_modes
 
     def is_driven_by_others(self, *, now: float) -> bool:
-        """Whether a client, or somebody else, was driving it just now."""
+        """Return whether a client, or somebody else, was driving it just now."""
         return self.authority.since_other(now=now) < self.settings.watch.other_controller
 
     def is_armed(self, *, now: float) -> bool:
-        """Whether it shows armed, by a word that counts."""
+        """Return whether it shows armed, by a request that no halt has outdated."""
         ours = self.control.arming_asked_at
         return self.monitor.armed and not self.armings.do_not_count(ours=ours, now=now)
 
     def note(self, text: str, *, now: float) -> None:
-        """Tell everybody."""
+        """Report a text about the vehicle."""
         self.registry.record(VehicleNoted(self.system_id, text, now))
 
     def withdraw_arming(self, *, now: float) -> None:
-        """Somebody else has a hand on it: it is armed no more, also after a restart of ours."""
+        """Withdraw the permission to arm, also across a restart of the server."""
         self.authority.withdraw_arming()
         self.tasks.terms.let_arm(may_be_armed=False, now=now)
 
     def forget_answers(self) -> None:
-        """It has restarted: what it has said of itself may not be so any more."""
+        """Forget everything that the vehicle said of itself before its restart."""
         requests = self.requests
         requests.ask_which_again()
         requests.intervals.ask_all_again()
@@ -99,18 +99,18 @@ class Parts:
         self.sticks.forget()
 
     def forget_start(self) -> None:
-        """The mission that was to begin when it is armed is another one now, or is not wanted."""
+        """Forget that a mission starts with the arming: it changed, or is unwanted."""
         self.start_mark.remove()
         self.shown.forget()
 
     def forget_start_of(self, keys: AbstractSet[str]) -> None:
-        """What such a key wanted to begin with the arming is not wanted any more."""
+        """Forget that a mission starts with the arming if one of these keys asked for it."""
         marker = self.start_mark.marker
         if marker is not None and marker.submitter.key in keys:
             self.forget_start()
 
     def check_not_manual(self, *, now: float) -> None:
-        """Raise Rejection while a person drives: in the mode for that, armed, and moving."""
+        """Raise Rejection while a person drives: manual mode, armed, and moving or stick input."""
         if not (self.monitor.armed and self.is_manual):
             return
         if self.is_driven_by_others(now=now):
@@ -119,9 +119,9 @@ class Parts:
             raise Rejection(TaskReason.WRONG_MODE, "driven by hand: it must stand first")
 
     def view(self, *, drives_on: bool, now: float) -> VehicleView:
-        """Return one look at the vehicle for the task domain.
+        """Return a snapshot of the vehicle for the task domain.
 
-        ``drives_on``: it is not known to stand when nothing is asked of it, and must.
+        ``drives_on``: it might not stop when setpoints end, although the settings demand that.
         """
         watch, monitor, persona, where = self.settings.watch, self.monitor, self.persona, self.where
         control, mode = self.control, monitor.custom_mode

@@ -1,6 +1,6 @@
-"""What is sent to a vehicle to drive it, or to have it stand: what its tasks demand, tick by tick.
+"""Carries out what the tasks of a vehicle demand, tick by tick: driving it or stopping it.
 
-It sees to it that the vehicle does so: what it finds is an event for the table of joint control.
+It checks that the vehicle obeys. A finding about a task is an event for the control table.
 """
 
 from collections.abc import Callable
@@ -19,15 +19,15 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.view import STOP, Demand, DemandKind, VehicleView
 
-#: s in which a vehicle that was told to move and says that it stands may be stopping all the same
+#: s after a stuck task, in which the vehicle may still be stopping although it reports standstill
 UNSEEN_STOP = 3.0
-SHOWS_AGAIN = 1.5  # s after a gap, in which a heartbeat each second comes
-BRAKES_FOR = 8.0  # s of set-points before a STOP's HOLD at the most; the longest stop took 4
+SHOWS_AGAIN = 1.5  # s after a gap, within which the next 1 Hz heartbeat comes
+BRAKES_FOR = 8.0  # s of set-points before the HOLD of a STOP, at most; the longest stop took 4 s
 GOES_ON = (DemandKind.TAKE, DemandKind.DRIVE)
 
 
 class Seen(NamedTuple):
-    """What was found that the table decides about."""
+    """A finding that the control table decides about."""
 
     event: Event
     reason: TaskReason
@@ -38,29 +38,29 @@ class Pilot:
     """Drives one vehicle as its tasks demand."""
 
     def __init__(self, parts: Parts, view: Callable[[float], VehicleView]) -> None:
-        """``view`` gives one look at the vehicle at a time."""
+        """``view`` returns a snapshot of the vehicle at a time."""
         self._parts = parts
         self._view = view
         #: when the next set-point is due
         self.clock = SetpointClock(parts.system_id, period=parts.settings.watch.setpoint_period)
-        #: whether it moves as it was told to
+        #: checks that it moves as it was told to
         self.guard = MotionGuard(parts.where.motion, parts.settings.watch)
         self._is_closing = False
-        self._is_back_home = False  # by its last task; it is disarmed also where others wait
+        self._is_back_home = False  # its last task returned home: disarm it even if others wait
 
     def __repr__(self) -> str:
         return f"Pilot({self.clock!r}, {self.guard.ladder!r})"
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self.guard.apply(settings.watch)
 
     def close(self) -> None:
-        """The server ends: from here on the tasks demand nothing but that it stands."""
+        """Only stop the vehicle from here on: the server ends."""
         self._is_closing = True
 
     def follow(self, *, now: float) -> list[Seen]:
-        """Let the tasks say what they demand, and do it; gives what was found. ``send`` follows."""
+        """Run the tasks and carry out their demand. Return the findings; call ``send`` next."""
         parts = self._parts
         tasks = parts.tasks
         self._face(now=now)
@@ -84,13 +84,13 @@ class Pilot:
         return found
 
     def send(self, *, now: float) -> None:
-        """Send what is to be sent in this tick, and plan the next."""
+        """Send what is queued in this tick, and plan the next tick."""
         if self._parts.requests.flush(now=now):
             self._parts.tasks.setpoint_left(now=now)
         self.plan_tick(now=now)
 
     def plan_tick(self, *, now: float) -> None:
-        """Tick as long as there is anything to drive, or to watch."""
+        """Plan the next tick if there is anything to drive or to watch."""
         is_engaged = self._parts.control.is_engaged
         if is_engaged or self._parts.tasks.active is not None or self.guard.ladder.is_on:
             self.clock.plan(now=now)
@@ -100,7 +100,7 @@ class Pilot:
     def begin_stop(self, *, brakes: bool, now: float) -> None:
         """Begin the stop ladder; zero and HOLD leave in this very step.
 
-        ``brakes``: by set-points first, on a vehicle that they stop sooner than HOLD does.
+        ``brakes``: start with set-points if they stop this vehicle sooner than HOLD does.
         """
         parts = self._parts
         self._face(now=now)
@@ -112,19 +112,19 @@ class Pilot:
         self._send_at_once(now=now)
 
     def let_go(self, *, now: float) -> None:
-        """Zero and HOLD at once, HOLD until it shows."""
+        """Send zero and HOLD at once, and repeat HOLD until it shows."""
         self._parts.control.begin_release(now=now)
         self._send_at_once(now=now)
 
     def watch(self, *, now: float) -> None:
-        """See from here on that it stands."""
+        """Watch from here on that it comes to stand."""
         self.guard.ladder.begin(now=now)
         self._send_at_once(now=now)
 
     def brakes_against_stick(self, *, now: float) -> bool:
-        """Whether set-points stop it, of which a stick is held, before HOLD is asked for.
+        """Return whether set-points stop it before HOLD is asked for, although a stick is held.
 
-        HOLD stops it in any case; but some roll on in it.
+        HOLD stops every vehicle, but some roll on in it.
         """
         throttle = self._parts.sticks.throttle(now=now)
         is_known = bool(throttle) and self.guard.is_fresh(now=now)
@@ -135,13 +135,13 @@ class Pilot:
         self._parts.requests.flush(now=now)
 
     def is_late(self, *, now: float) -> bool:
-        """Whether what is driven went on without us for too long."""
+        """Return whether a tick came so late that the vehicle drove on without us."""
         active = self._parts.tasks.active
         late = self.clock.lateness(now=now) > self._parts.settings.watch.late_tick
         return late and active is not None and active.state is TaskState.EXECUTING
 
     def _face(self, *, now: float) -> None:
-        """Tell its control what decides how it is asked to stand."""
+        """Tell the offboard control what decides how the vehicle is asked to stand."""
         parts = self._parts
         motion = parts.where.motion.latest()
         is_known = motion is not None and now - motion.at <= parts.settings.watch.position_lost
@@ -182,7 +182,7 @@ class Pilot:
                 control.stop(still=seen.still, heard=seen.heard, now=now)
 
     def _told(self, demand: Demand, seen: VehicleView) -> Told:
-        """What it is told, for who sees to it that it does so."""
+        """Return what the vehicle is told, for the motion guard."""
         parts, wanted = self._parts, ZERO
         control, persona = parts.control, parts.persona
         if demand.kind is DemandKind.DRIVE:
@@ -203,7 +203,7 @@ class Pilot:
         )
 
     def _take_measure(self, found: Found, demand: Demand, *, now: float) -> Seen | None:
-        """Climb the stop ladder; what concerns a task is for the table to decide."""
+        """Climb the stop ladder. Return an event if a task is concerned, for the control table."""
         control, active = self._parts.control, self._parts.tasks.active
         match found.measure:
             case Measure.STOP_TASK if active is not None and active.state is TaskState.EXECUTING:
@@ -224,9 +224,9 @@ class Pilot:
         return None
 
     def _is_deaf(self, *, now: float) -> bool:
-        """Whether a task stands by a gap, since which no heartbeat has shown who has the vehicle.
+        """Return whether a task stands after a loss, and no heartbeat has come yet.
 
-        A person may have taken it over in the gap, whom HOLD would undo; zeros do nothing then.
+        A person may have taken the vehicle over meanwhile: HOLD would undo that, zeros would not.
         """
         parts = self._parts
         heard_at, lost_at = parts.monitor.heard_at, parts.tasks.lost_since
@@ -234,7 +234,7 @@ class Pilot:
         return lost_at is not None and heard_at < lost_at and is_soon
 
     def _note_end(self, ended: Task) -> None:
-        """A return has ended: as on an autopilot that has landed, whoever armed it is done."""
+        """After a completed return, disarm it, whoever armed it, as a landed autopilot does."""
         self._is_back_home = ended.state is TaskState.COMPLETED and ends_at_home(ended.goal)
         if self._is_back_home:
             self._parts.control.disarm_at_end()

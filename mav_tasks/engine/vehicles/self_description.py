@@ -1,6 +1,6 @@
-"""What a vehicle says of itself: which one it is, how it stops, turns and drives, what is on board.
+"""What a vehicle reports about itself: its identity, how it stops, turns and drives, its mission.
 
-How it is spoken to follows from that, and whether it would stand when nothing is asked of it.
+From this follow the persona that is used, and whether it would stop when setpoints end.
 """
 
 from mav_tasks.engine.vehicles.known_profile import KnownProfile
@@ -14,38 +14,38 @@ NO_MISSION = (0, 0xFFFF)  # MISSION_CURRENT.total: it does not say; there is non
 
 
 class SelfDescription:
-    """What one vehicle has said of itself so far."""
+    """What one vehicle has reported about itself so far."""
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
-        self._known = KnownProfile(parts.persona)  # what was measured of it beforehand
-        self._own_items = 0  # of a mission on board
+        self._known = KnownProfile(parts.persona)  # from measurements by ``mav-tasks probe``
+        self._own_items = 0  # of the mission stored on board
         self.apply(parts.settings)
 
     def __repr__(self) -> str:
         return f"SelfDescription({self._known!r})"
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings; a profile is used from the next heartbeat on."""
+        """Apply new settings; a profile is used from the next heartbeat on."""
         self._known.apply(settings.profiles, self._parts.system_id)
 
     @property
     def may_drive_on(self) -> bool:
-        """Whether it might not stand without setpoints, though it must; unsaid, it is believed."""
+        """Whether it might not stop when setpoints end, as it must; False if it never answers."""
         if self._parts.settings.loss_failsafe != "must_stand":
             return False
         failsafe = self._parts.requests.loss_failsafe
         return bool(failsafe.awaits_answer or failsafe.why_off or self._known.why_drives_on)
 
     def receive_identity(self, identity: VehicleIdentity, *, now: float) -> None:
-        """Take in which one it is."""
+        """Process the identity of the vehicle."""
         self._parts.tasks.identified(identity.uid, now=now)
         self._parts.requests.is_identified = True
         self._known.identify(identity)
         self._use_profile(now=now)
 
     def receive_own_mission(self, total: int, *, now: float) -> None:
-        """What is on board is none of ours: its mission mode would drive it, and nobody sees it."""
+        """Report a mission stored on board: clients cannot see it, but its mode would drive it."""
         items = total if total not in NO_MISSION else 0
         if items and items != self._own_items and self._parts.settings.claim:
             self._parts.note(
@@ -54,7 +54,7 @@ class SelfDescription:
         self._own_items = items
 
     def receive_parameter(self, message: m.ParamValue, *, now: float) -> None:
-        """Take in a parameter of it, whatever it is about."""
+        """Process any parameter of the vehicle."""
         self._parts.requests.loss_failsafe.receive(message)
         self._parts.requests.cruise.receive(message)
         self._parts.tasks.terms.cruises(self._parts.requests.cruise.speed)
@@ -69,7 +69,7 @@ class SelfDescription:
             self._parts.registry.record(VehicleSeen(self._parts.system_id, "steers as a car", now))
 
     def look(self, *, now: float) -> None:
-        """See what is news, with each heartbeat."""
+        """Report and apply what has changed; called with each heartbeat."""
         self._note_failsafe(now=now)
         self._use_profile(now=now)
 
@@ -84,7 +84,7 @@ class SelfDescription:
             self._parts.registry.record(VehicleSeen(self._parts.system_id, news, now))
 
     def _use_profile(self, *, now: float) -> None:
-        """Go by what was measured of it; setpoints do not change their kind while it is driven."""
+        """Use its measured profile; the kind of setpoint does not change while it is driven."""
         news = self._known.take_news()
         if news and self._known.chosen is None:
             self._parts.note(news, now=now)

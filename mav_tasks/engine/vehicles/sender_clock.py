@@ -1,8 +1,8 @@
-"""A vehicle's own clock, ``time_boot_ms``: how old what it sends is, and whether it has restarted.
+"""A vehicle's own clock, ``time_boot_ms``: how old its messages are, and whether it has restarted.
 
-A clock that goes back is a restart, or a copy of something old that came late. They are told apart
-by what a restart cannot do: say that it has been up for longer than the vehicle has been unheard.
-What is neither news nor a restart is dropped, so that nothing is steered by it.
+A clock that goes back means a restart, or a delayed copy of an old message. A restarted vehicle
+cannot have an uptime longer than the time since it was last heard. A message that is neither news
+nor a restart is dropped, so that it steers nothing.
 """
 
 from enum import Enum, auto
@@ -12,24 +12,24 @@ from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, LocalPositio
 
 Stamped = Attitude | GlobalPositionInt | LocalPositionNed
 
-OVERFLOW = 1 << 32  # ms, the field begins anew after 49.7 days
-#: ms from where a clock is to be by now, within which one that has overflowed is: a copy may be
+OVERFLOW = 1 << 32  # ms; the field overflows after 49.7 days
+#: ms behind and ahead of the expected clock, within which an overflowed clock lies: a copy may be
 #: 20 s late and its original 4 s
 LATEST, AHEAD = 25_000, 5_000
-REBOOT = 1000  # ms that a vehicle's clock must go back to mean a restart, not reordering
-#: s by which a vehicle may have restarted before the last that was heard of it: delays that shrink
+REBOOT = 1000  # ms that a clock must go back to mean a restart, not reordering
+#: s by which a restart may seem to precede the last message before it, if delays shrink
 SHRINKS = 5.0
-GONE = 5.0  # s in which nothing but what is older comes: the clock before is not there any more
-ROUNDING = 0.005  # s; stamps are whole ms, and a vehicle makes several messages of one moment
+GONE = 5.0  # s in which only older messages come: the clock before does not exist any more
+ROUNDING = 0.005  # s; stamps are whole ms, and a vehicle sends several messages of one moment
 
 
 class Heard(Enum):
-    """What a message is, by its time."""
+    """The classification of a message by its time stamp."""
 
     NEWS = auto()
-    #: older than what is known, or the same again
+    #: older than the last message of its kind, or a copy of it
     OLD = auto()
-    #: the first of a vehicle that has restarted
+    #: the first message after a restart
     RESTART = auto()
 
 
@@ -38,16 +38,16 @@ class SenderClock:
 
     def __init__(self) -> None:
         self.offset = ClockOffset()
-        self._newest: int | None = None  # ms of all messages, counted on over overflows
-        self._newest_at = 0.0  # when that came
-        self._latest: dict[int, int] = {}  # the same by message id
-        self._back_since: float | None = None  # only what is older has come since then
+        self._newest: int | None = None  # ms over all messages, counted on over overflows
+        self._newest_at = 0.0  # when that message came
+        self._latest: dict[int, int] = {}  # the newest ms by message id
+        self._back_since: float | None = None  # only older messages have come since then
 
     def __repr__(self) -> str:
         return f"SenderClock({self._newest} ms, {self.offset!r})"
 
     def hear(self, message: Stamped, *, now: float) -> Heard:
-        """Take in the time of a message."""
+        """Classify a message by its time stamp."""
         ms = self._counted_on(message.time_boot_ms, now=now)
         if self._newest is not None and self._newest - ms >= REBOOT:
             return self._went_back(ms, now=now)
@@ -60,16 +60,16 @@ class SenderClock:
         return Heard.NEWS
 
     def sent_at(self, time_boot_ms: int, *, now: float) -> float:
-        """Return when what comes now was made, by our clock: now, if nothing tells."""
+        """Return when a message that comes now was sent, by our clock; ``now`` if unknown."""
         made_at = self._counted_on(time_boot_ms, now=now) / 1000 + self.offset.at(now=now)
         return now if now - made_at < ROUNDING else made_at
 
     def booted_at(self, *, now: float) -> float:
-        """Return when the vehicle was started, by our clock; a message must have been heard."""
+        """Return when the vehicle booted, by our clock. Call it only after a message was heard."""
         return self.offset.at(now=now)
 
     def _counted_on(self, time_boot_ms: int, *, now: float) -> int:
-        """Return ms that do not begin anew where the field overflows."""
+        """Return the ms counted on over overflows of the field."""
         if self._newest is None:
             return time_boot_ms
         expected = self._expected(now)
@@ -84,7 +84,7 @@ class SenderClock:
 
     def _went_back(self, ms: int, *, now: float) -> Heard:
         assert self._newest is not None
-        is_near = self._expected(now) - ms <= LATEST  # also where it has just overflowed
+        is_near = self._expected(now) - ms <= LATEST  # also if it has just overflowed
         uptime = (ms if is_near else ms % OVERFLOW) / 1000
         unheard = now - self._newest / 1000 - self.offset.at(now=now)
         if 0 <= uptime <= unheard + SHRINKS:

@@ -1,17 +1,17 @@
-"""When the next setpoint to a vehicle is due: at a steady rate, at other times than to others."""
+"""When the next setpoint to a vehicle is due: at a steady rate, in its own phase."""
 
 from math import inf
 
-GOLDEN = 0.6180339887  # its multiples are never close together, modulo 1
+GOLDEN = 0.6180339887  # its multiples, modulo 1, are never close together
 
 
 class SetpointClock:
-    """Ticks of one vehicle. Times are monotonic seconds."""
+    """The setpoint ticks of one vehicle. Times are monotonic seconds."""
 
     def __init__(self, system_id: int, *, period: float) -> None:
-        self._phase = system_id * GOLDEN % 1.0 * period  # evenly spread, however many there are
+        self._phase = system_id * GOLDEN % 1.0 * period  # evenly spread for any number of vehicles
         self._period = period
-        #: inf while nothing is sent
+        #: when the next tick is due; inf while nothing is sent
         self.next_at = inf
 
     def __repr__(self) -> str:
@@ -19,15 +19,15 @@ class SetpointClock:
 
     @property
     def is_running(self) -> bool:
-        """Whether a tick is to come."""
+        """Whether a tick is planned."""
         return self.next_at < inf
 
     def restart(self, *, now: float) -> None:
-        """A setpoint has just been sent, whatever was planned: the next within a period."""
+        """Note that a setpoint was just sent out of turn; the next follows within a period."""
         self.next_at = now + self._period - (now - self._phase) % self._period
 
     def plan(self, *, now: float) -> None:
-        """Plan the next tick, unless one is to come; those missed are not made up for."""
+        """Plan the next tick, unless one is planned; missed ticks are not made up for."""
         if now < self.next_at < inf:
             return
         following = self.next_at + self._period
@@ -37,9 +37,9 @@ class SetpointClock:
             self.restart(now=now)
 
     def stop(self) -> None:
-        """Tick no more."""
+        """Cancel the next tick."""
         self.next_at = inf
 
     def lateness(self, *, now: float) -> float:
-        """Return the seconds by which a tick is late; below 0: none is."""
+        """Return the seconds by which the planned tick is late; negative if it is not late."""
         return now - self.next_at

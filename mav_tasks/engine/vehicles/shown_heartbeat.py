@@ -1,8 +1,9 @@
-"""The heartbeats of one vehicle as clients are shown them: its own, but for two things.
+"""The heartbeats of one vehicle as clients see them: its own, with two changes.
 
-For a moment another mode: a ground station that asks for a mode waits until a heartbeat shows it,
-and what the server does itself instead, a mission or a return, the vehicle would never show. And
-armed is active: an ArduPilot that stands armed in HOLD says that it is on standby, and ground
+The mode may differ for a moment. A ground station that asks for a mode waits until a heartbeat
+shows it. If the server does the job itself, a mission or a return, the vehicle would never show it.
+
+Armed is shown as active. An ArduPilot that stands armed in HOLD reports standby, and ground
 stations then hide what an operator may have it do next.
 """
 
@@ -13,13 +14,13 @@ from mav_tasks.mavlink.enums import MavModeFlag, MavState
 from mav_tasks.mavlink.messages import Heartbeat
 from mav_tasks.mavlink.packet import Packet, with_payload
 
-#: where they are in HEARTBEAT's payload
+#: offsets in the payload of HEARTBEAT
 CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
-BYTES = 4  # of the custom_mode
+BYTES = 4  # of custom_mode
 
 
 class ShownHeartbeat:
-    """What the heartbeats of one vehicle say towards clients."""
+    """Rewrites the heartbeats of one vehicle for clients."""
 
     def __init__(self) -> None:
         self._mode = 0
@@ -29,15 +30,15 @@ class ShownHeartbeat:
         return f"ShownHeartbeat({self._mode}, until={self._until:.2f})"
 
     def show(self, mode: int, *, until: float) -> None:
-        """Show a custom_mode for a while."""
+        """Show a custom_mode until then."""
         self._mode, self._until = mode, until
 
     def forget(self) -> None:
-        """Show the vehicle's own again."""
+        """Show the vehicle's own mode again."""
         self._until = -inf
 
     def in_message(self, heartbeat: Heartbeat, *, now: float) -> Heartbeat:
-        """Return a copy of a heartbeat's message as clients are to see it."""
+        """Return a copy of a heartbeat message as clients see it."""
         mode = self._mode if now < self._until else heartbeat.custom_mode
         return Heartbeat(
             type=heartbeat.type,
@@ -49,7 +50,7 @@ class ShownHeartbeat:
         )
 
     def applied(self, packet: Packet, *, now: float) -> Packet:
-        """Return a packet of the vehicle as clients are to see it."""
+        """Return a packet of the vehicle as clients see it."""
         if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
             return packet
         payload = packet.payload

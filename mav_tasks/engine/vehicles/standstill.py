@@ -1,15 +1,15 @@
-"""Whether a vehicle stands, by where it was lately, against a noise floor that is learnt.
+"""Whether a vehicle stands, by its recent positions, against a noise floor that is learnt.
 
-The speed that a standing rover reports is an offset that wanders over seconds: 0.03 m/s on an
-ArduPilot with perfect sensors, 0.07 with noisy ones, for minutes 0.2 to 0.6 on a PX4 that has
-pushed against something (measured on both). Averaging does not help, and one threshold on the
-speed is too high for one rover and too low for another. What a standing rover does not do is get
-anywhere. So it stands
+The speed that a standing rover reports is an offset that drifts over seconds: 0.03 m/s on an
+ArduPilot with perfect sensors, 0.07 with noisy ones, and 0.2 to 0.6 for minutes on a PX4 that has
+pushed against something (measured on both). Averaging does not help, and one threshold on the speed
+is too high for one rover and too low for another. But a standing rover does not get anywhere. So it
+stands
 
 - at once, if for ``still_time`` both the reported speed and the displacement were small; or
-- after a second in which it got no further than a rover of this kind does at rest.
+- after a second in which it got no further than such a rover does at rest.
 
-How far that is, and what it reports meanwhile, is learnt while it is known to be told to stand, and
+Its displacement and reported speed at rest are learnt while it is known to be told to stand, and
 gets nowhere in the long run.
 """
 
@@ -20,23 +20,23 @@ from typing import NamedTuple
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.guidance import Motion, wrap
 
-WINDOW = 1.0  # s, over which displacement alone decides
+WINDOW = 1.0  # s over which the displacement alone decides
 KEPT = 6.0  # s of samples, for the longest window and for learning
-SPACING = 0.035  # s between samples that are kept; positions come at 20 to 50 Hz
-COVERED = 0.15  # s by which a window's first sample may be younger than the window is long
-#: m in a second: a rover with good sensors gets 0.015 at rest (measured), one at 0.05 m/s further
+SPACING = 0.035  # s between kept samples; positions come at 20 to 50 Hz
+COVERED = 0.15  # s by which the first sample may be younger than the start of its window
+#: m in a second: more than the 0.015 measured at rest with good sensors, less than at 0.05 m/s
 LEAST_WAY = 0.03
 LEAST_SPEED = 0.09  # m/s reported at rest before anything was learnt; 0.07 was measured
-MOST_WAY = 0.25  # m in a second that count as noise at the most; 0.21 was the most measured
-MOST_SPEED = 0.7  # m/s, the same of the reported speed; 0.67 was the most measured
+MOST_WAY = 0.25  # m in a second that count as noise at most; the most that was measured is 0.21
+MOST_SPEED = 0.7  # m/s, the same for the reported speed; the most that was measured is 0.67
 MARGIN = 1.5  # times what was learnt
-REST = 5.0  # s of being told to stand after which it is learnt from; the longest stop takes 4
-DRIFT = 0.1  # m/s over that time; faster than this nothing is learnt: it rolls
-FORGETS = 60.0  # s in which what was learnt fades to a third, when less is seen
+REST = 5.0  # s of being told to stand before learning starts; the longest stop takes 4
+DRIFT = 0.1  # m/s over that time; nothing is learnt above it, because the rover rolls
+FORGETS = 60.0  # s in which a learnt value fades to a third, if smaller ones are seen
 
 
 class Sample(NamedTuple):
-    """What was measured at one moment: s, m north and east, rad, m/s."""
+    """One measurement: s, m north and east, rad, m/s."""
 
     at: float
     north: float
@@ -46,11 +46,11 @@ class Sample(NamedTuple):
 
 
 class Standstill:
-    """The last seconds of one vehicle's motion, and what it does at rest."""
+    """The last seconds of one vehicle's motion, and its noise at rest."""
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque()
-        self._rests_since: float | None = None  # told to stand all the time since then
+        self._rests_since: float | None = None  # told to stand without a break since then
         self._way = 0.0  # m in a second, learnt at rest
         self._speed = 0.0  # m/s reported, learnt at rest
         self._learnt_at = 0.0
@@ -60,16 +60,16 @@ class Standstill:
 
     @property
     def least_way(self) -> float:
-        """Return the metres in a second that a standing vehicle may seem to move."""
+        """The metres in a second that a standing vehicle may seem to move."""
         return min(MOST_WAY, max(LEAST_WAY, MARGIN * self._way))
 
     @property
     def least_speed(self) -> float:
-        """Return the m/s that a standing vehicle may report."""
+        """The speed that a standing vehicle may report, m/s."""
         return min(MOST_SPEED, max(LEAST_SPEED, MARGIN * self._speed))
 
     def forget(self) -> None:
-        """Start afresh, as after a restart of the vehicle: its positions may be others."""
+        """Forget the positions, as after a restart of the vehicle; the noise is kept."""
         self._samples.clear()
         self._rests_since = None
 
@@ -79,11 +79,11 @@ class Standstill:
             self._rests_since = now
 
     def may_move(self) -> None:
-        """Note that somebody may have told the vehicle to move: nothing is learnt for a while."""
+        """Note that somebody may have told the vehicle to move: learning pauses."""
         self._rests_since = None
 
     def receive(self, motion: Motion, *, now: float) -> None:
-        """Take in where the vehicle is now."""
+        """Note where the vehicle is now."""
         samples = self._samples
         if samples and now - samples[-1].at < SPACING:
             return
@@ -95,7 +95,7 @@ class Standstill:
             self._learn(now)
 
     def has_stood(self, watch: Watch, *, now: float) -> bool:
-        """Return whether it got nowhere for a second, though it may report a speed."""
+        """Return whether it got nowhere for a second, although it may report a speed."""
         window = max(WINDOW, watch.still_time)
         samples = self._samples
         if not samples or samples[-1].speed > self.least_speed:
@@ -105,13 +105,13 @@ class Standstill:
         )
 
     def confirms(self, watch: Watch, *, now: float) -> bool:
-        """Return whether displacement agrees with reports that it stood for ``still_time``."""
+        """Return whether the displacement agrees with reports that it stood for ``still_time``."""
         window = watch.still_time
         way = 1.2 * max(watch.still_speed, self.least_way) * window
         return self._is_within(window, way=way, turn=2 * watch.still_turn_rate * window, now=now)
 
     def speed(self, window: float, *, now: float) -> float | None:
-        """Return m/s by displacement over a window up to now, or None while it is not covered."""
+        """Return m/s by displacement over a window up to now, or None if it is not covered."""
         first = self._first_within(window, now=now)
         if first is None:
             return None
@@ -120,7 +120,7 @@ class Standstill:
         return hypot(last.north - first.north, last.east - first.east) / took if took > 0 else None
 
     def forward(self, window: float, *, now: float) -> float | None:
-        """Return m/s along its heading by displacement; None while the window is not covered."""
+        """Return m/s along its heading by displacement, or None if the window is not covered."""
         first = self._first_within(window, now=now)
         if first is None:
             return None
@@ -134,7 +134,7 @@ class Standstill:
             return None
         since = now - window
         first = None
-        for sample in reversed(self._samples):  # most windows are much shorter than what is kept
+        for sample in reversed(self._samples):  # most windows are much shorter than KEPT
             if sample.at < since - 1e-9:
                 return first
             first = sample
@@ -146,7 +146,7 @@ class Standstill:
             return False
         last = self._samples[-1]
         if _apart(first, last) > way or abs(wrap(first.yaw - last.yaw)) > turn:
-            return False  # so it is nearly always while a vehicle drives
+            return False  # nearly always the case while a vehicle drives
         since = first.at
         return all(
             _apart(sample, last) <= way and abs(wrap(sample.yaw - last.yaw)) <= turn

@@ -1,7 +1,7 @@
-"""A mission that begins when its vehicle is armed: PX4's way to start one, in two steps.
+"""A mission that starts when its vehicle is armed: PX4's way to start one, in two steps.
 
-A ground station asks for the mission mode, waits until a heartbeat shows it, and arms. Armed first,
-the mode alone starts it, and there is nothing to remember.
+A ground station asks for the mission mode, waits until a heartbeat shows it, and arms. If it arms
+first, the mode alone starts the mission, and there is nothing to remember.
 """
 
 from collections.abc import Hashable
@@ -11,23 +11,23 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.tasks.task import Submitter
 
-WAITS = 10.0  # s for the arming
+WAITS = 10.0  # s in which the arming must come
 
 
 class Marker(NamedTuple):
-    """Who wants the mission to begin."""
+    """The client that asked for it."""
 
     client: Hashable
     submitter: Submitter
     rights: Rights
-    plan_id: int  # as clients knew it then
+    plan_id: int  # as clients knew it at that time
 
 
 class StartMark:
-    """Whether a vehicle's mission begins when it is armed."""
+    """Whether a vehicle's mission starts when it is armed."""
 
     def __init__(self) -> None:
-        self.marker: Marker | None = None  #: who wants it, if anybody does
+        self.marker: Marker | None = None  #: the client that wants it, or None
         self._until = -inf
 
     def __repr__(self) -> str:
@@ -42,19 +42,19 @@ class StartMark:
         plan_id: int,
         now: float,
     ) -> None:
-        """A client wants it, and has not armed yet."""
+        """Remember that a client wants it, and has not armed yet."""
         self.marker = Marker(client, submitter, rights, plan_id)
         self._until = now + WAITS
 
     def is_put(self, *, now: float) -> bool:
-        """Whether somebody wants it still."""
+        """Return whether a client still wants it."""
         return self.marker is not None and now < self._until
 
     def remove(self) -> None:
-        """Something else was wished for since."""
+        """Forget it, because something else was requested since."""
         self.marker = None
 
     def take(self) -> Marker | None:
-        """The vehicle is armed: give who wanted the mission to begin then, once."""
+        """Return who wants the mission to start, and forget it: the vehicle is armed."""
         marker, self.marker = self.marker, None
         return marker

@@ -1,37 +1,37 @@
-"""How a vehicle that is told to stand is made to: set-points, then HOLD, then disarming.
+"""How a vehicle is made to stand: set-points, then HOLD, then disarming.
 
-One ladder for everything that ends motion: STOP, cancel, pause, a task that is starting, the
-server's end. Its steps, and what leads from one to the next:
+The same ladder serves everything that ends motion: STOP, cancel, pause, a task that is starting,
+the end of the server. Its steps, and when the next one is due:
 
-1. SETPOINTS: the set-point that means "stand", for as long as the vehicle measurably slows down.
-   They do nothing where somebody holds the throttle stick, in a mode of the vehicle's own, or on an
+1. SETPOINTS: the set-point that means "stand", while the vehicle measurably slows down. They have
+   no effect if somebody holds the throttle stick, in a mode of the vehicle's own, or on an
    autopilot that has stopped listening.
-2. HOLD, as soon as set-points have no effect. An ArduPilot that steers as a car rolls on freely in
-   it (2.2 m from 1 m/s were measured, 1.0 m with set-points): so it is not always the first step.
-3. DISARM, when it still moves, and no slower, 2 s after HOLD was seen: a frozen output drives a
-   rover in circles in HOLD. A setting switches this step off.
+2. HOLD, as soon as set-points have no effect. It is not always the first step, because an ArduPilot
+   that steers as a car rolls freely in HOLD: 2.2 m from 1 m/s were measured, 1.0 m with set-points.
+3. DISARM, if the vehicle still moves, and gets no slower, 2 s after HOLD was seen: a frozen output
+   drives a rover in circles in HOLD. A setting switches this step off.
 
-The ladder only says which step it is; it goes by displacement, for the reported speed of a standing
-vehicle is off by up to 0.6 m/s. It ends when the vehicle stands, or when
-somebody else drives it.
+The ladder only says which step it is. It uses the displacement, because the reported speed of a
+standing vehicle is off by up to 0.6 m/s. It ends when the vehicle stands, or when somebody else
+drives it.
 """
 
 from collections import deque
 from enum import IntEnum
 
 REACTION = (
-    0.3  # s until a rover is a tenth slower: 0.06 to 0.28 were measured, and what is read lags
+    0.3  # s until a rover is a tenth slower: 0.06 to 0.28 were measured, and readings lag behind it
 )
 NO_EFFECT = 0.3  # s without getting slower, after which the next step is due
-SLOWER = 0.03  # m/s less in that time is slower: 0.1 m/s², less than the weakest brakes did
-ROLLS_OUT = 1.0  # s without getting slower in HOLD; one that rolls out freely loses 0.14 m/s in it
-MOVES = 0.15  # m/s; slower than this is not told from the noise of an estimator at rest
+SLOWER = 0.03  # m/s less in that time counts as slower: 0.1 m/s², less than the weakest brakes gave
+ROLLS_OUT = 1.0  # s without getting slower in HOLD; a freely rolling one loses 0.14 m/s in it
+MOVES = 0.15  # m/s; a slower vehicle cannot be told from estimator noise at rest
 
 
 class Step(IntEnum):
-    """How far the ladder has been climbed."""
+    """The step that the ladder has reached."""
 
-    #: nothing is told to stand, or it does
+    #: the vehicle is not told to stand, or it stands
     OFF = 0
     SETPOINTS = 1
     HOLD = 2
@@ -39,12 +39,12 @@ class Step(IntEnum):
 
 
 class StopLadder:
-    """The ladder of one vehicle."""
+    """The stop ladder of one vehicle."""
 
     def __init__(self) -> None:
         self.step = Step.OFF
         self._began = 0.0
-        self._speeds: deque[tuple[float, float]] = deque()  # when, m/s: of the last NO_EFFECT
+        self._speeds: deque[tuple[float, float]] = deque()  # (s, m/s) of the last NO_EFFECT s
         self._slowed_at = 0.0
         self._hold_seen_at: float | None = None
 
@@ -53,11 +53,11 @@ class StopLadder:
 
     @property
     def is_on(self) -> bool:
-        """Whether it is not known yet that the vehicle stands."""
+        """Whether the vehicle was told to stand and is not yet known to stand."""
         return self.step is not Step.OFF
 
     def begin(self, *, now: float) -> None:
-        """The vehicle is told to stand from now on; does nothing to a ladder that is on."""
+        """Tell the vehicle to stand from now on; has no effect if the ladder is on."""
         if self.is_on:
             return
         self.step = Step.SETPOINTS
@@ -66,11 +66,11 @@ class StopLadder:
         self._hold_seen_at = None
 
     def end(self) -> None:
-        """The vehicle stands, is told to move, or is somebody else's."""
+        """End the ladder: the vehicle stands, is told to move, or somebody else has it."""
         self.step = Step.OFF
 
     def is_slowing(self, *, now: float) -> bool:
-        """Return whether set-points are still having their effect."""
+        """Return whether set-points still slow the vehicle down."""
         return self.step is Step.SETPOINTS and now - self._slowed_at <= NO_EFFECT
 
     def climb(
@@ -83,12 +83,11 @@ class StopLadder:
         patience: float = NO_EFFECT,
         moves: float = MOVES,
     ) -> Step | None:
-        """Return the step to which the ladder climbs now; None: it stays where it is.
+        """Return the step to which the ladder climbs now, or None if it stays where it is.
 
-        ``speed`` is m/s by displacement, None where nothing fresh is known of it; ``is_held``
-        whether the vehicle shows HOLD. ``disarm_after`` is in s after HOLD was seen, ``patience``
-        in s without getting slower, after which set-points have no effect, if it is faster than
-        ``moves`` m/s.
+        ``speed`` is by displacement, m/s, or None without fresh data. ``is_held`` says whether the
+        vehicle shows HOLD. ``disarm_after`` is in s after HOLD was seen. Set-points have no effect
+        if it is faster than ``moves`` m/s and no slower after ``patience`` s.
         """
         self._look(speed, now)
         if is_held and self._hold_seen_at is None:

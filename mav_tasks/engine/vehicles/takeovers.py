@@ -1,7 +1,7 @@
-"""What a vehicle shows of what others have done to it: a mode, arming, a stick, a restart.
+"""Detects what others have done to a vehicle: a mode, arming, a stick, a restart.
 
-A heartbeat may show our own doing, a client's through us, a person's at the vehicle, or a
-failsafe's. Which it was is found here; what follows is the table's to say.
+A change may be our own doing, a client's through us, a person's at the vehicle, or a failsafe's.
+This module finds out which; the control table decides what follows.
 """
 
 from math import inf
@@ -21,33 +21,33 @@ R = TaskReason
 
 
 class Takeovers:
-    """Finds out who has done what to one vehicle."""
+    """Detects who has done what to one vehicle."""
 
     def __init__(self, parts: Parts, joint: JointControl) -> None:
         self._parts = parts
         self._joint = joint
-        self._may_show_until = -inf  # s, what left before the last halt of an earlier run
-        self._shows_restart = False  # until the heartbeat comes that does, too
-        self._others_drive = False  # it moved in a mode in which nothing of ours drove it
+        self._may_show_until = -inf  # s, effects of packets sent before an earlier run's last halt
+        self._shows_restart = False  # a restart was seen, and the next heartbeat will show it, too
+        self._others_drive = False  # it moved in a mode in which we did not drive it
 
     def __repr__(self) -> str:
         return f"Takeovers({self._joint!r})"
 
     def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:
-        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
+        """Handle a vehicle of an earlier run: stop it if that run left it driving.
 
-        It does as well if that run ended just after a ``halt``: HOLD may not have come.
+        Stop it also if that run ended just after a ``halt``, because HOLD may not have arrived.
 
-        If somebody else had taken it over or disarmed it, we do not arm it before a person lets us
-        go on.
+        If somebody else had taken it over or disarmed it, we do not arm it before a person
+        continues.
         """
         parts = self._parts
         mode, persona = parts.monitor.custom_mode, parts.persona
         is_taken = parts.tasks.paused in TAKEN
         if is_taken or not parts.tasks.terms.may_be_armed:
             parts.withdraw_arming(now=now)
-        # it holds because set-points were lost, and would follow them again if one came; ours to
-        # one that somebody has taken had ended before
+        # It is in HOLD because set-points were lost, and would follow the next one. If somebody had
+        # taken it, our set-points had ended before.
         is_lost = persona.has_loss_failsafe and mode == persona.hold_mode and not is_taken
         words = (
             f"is in {persona.mode_name(mode)}, by its failsafe or by somebody, and is left to it:"
@@ -70,11 +70,11 @@ class Takeovers:
             event = Event.COME_BACK_LED_AWAY
         self._joint.on(event, Word(text=words), now=now)
         is_parked = mode == persona.hold_mode and parts.monitor.armed
-        if is_parked and not parts.tasks.terms.may_be_armed:  # by whoever had it before
+        if is_parked and not parts.tasks.terms.may_be_armed:  # by somebody before this run
             self._taken(Event.PARKED, "", now=now)
 
     def look(self, *, was_mode: int, was_armed: bool, before: Before, now: float) -> None:
-        """Look at a heartbeat: what it shows anew is somebody's doing; ``before`` it."""
+        """Detect what a heartbeat shows that is new; ``before`` is the state before it."""
         parts = self._parts
         armed, mode = parts.monitor.armed, parts.monitor.custom_mode
         if mode != was_mode:
@@ -99,19 +99,19 @@ class Takeovers:
         self._note_others(now=now)
 
     def look_at_motion(self, *, now: float) -> None:
-        """Look whether it drives to a place that it was sent to before a halt."""
+        """Detect that it drives to a place that it was sent to before a halt."""
         if now - self._parts.tasks.halts.at <= SHOWN_LATE and self._moves_late(now=now):
             words = "moves in HOLD, by a word from before it was to stand: HOLD again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
 
     def heard_again(self, *, now: float) -> None:
-        """It was silent, and is not any more."""
+        """Handle the first heartbeat after a silence."""
         self._joint.on(Event.HEARD_AGAIN, Word(), now=now)
 
     def rebooted(self, *, booted_at: float, now: float) -> None:
-        """Its frame may be another one now, and nothing of ours is in force there.
+        """Handle a restart: its frame may have changed, and our requests are no longer in force.
 
-        A restart disarms: what was seen since ``booted_at`` was no person's doing.
+        A restart disarms, so no person caused a disarming that was seen since ``booted_at``.
         """
         parts = self._parts
         self._shows_restart = True
@@ -132,14 +132,14 @@ class Takeovers:
             parts.note(words, now=now)
 
         self._joint.on(Event.REBOOTED, Word(R.FRAME_RESET, text="restarted", do=restart), now=now)
-        # heartbeats that show it may have been lost, or be on their way
+        # heartbeats that show the disarming may be lost or under way
         if parts.monitor.armed and not parts.control.may_have_disarmed(now=now):
             self._disarmed_by_restart(parts.authority.may_arm)
         parts.monitor.restarted()
         parts.control.restarted()
 
     def learn(self, news: News, *, now: float) -> None:
-        """Tell where it is, and, if that was a takeover so far, what has taken it."""
+        """Report a crossing of its own fence; correct an assumed takeover that was a failsafe's."""
         parts = self._parts
         if news.is_outside:
             parts.note("is outside its own fence: tasks wait", now=now)
@@ -166,7 +166,7 @@ class Takeovers:
         elif mode == persona.booting_mode:
             self.rebooted(booted_at=now, now=now)
         elif self._shows_restart:
-            pass  # a restart, which its clock has told of before, and nobody's doing
+            pass  # a restart, which its clock has shown before: nobody changed the mode
         elif is_late:
             words = f"shows {persona.mode_name(mode)}, asked for before it was to stand: HOLD again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
@@ -183,9 +183,9 @@ class Takeovers:
             self._look_for_parking(was_mode, mode, now=now)
 
     def _comes_late(self, mode: int, *, now: float) -> bool:
-        """Whether a wish for a mode was overtaken by HOLD on its way to the vehicle.
+        """Return whether a mode request was sent before a halt and arrived after it.
 
-        A mode for driving by hand is left to who is there.
+        A manual mode is left to the person at the vehicle.
         """
         persona, halts = self._parts.persona, self._parts.tasks.halts
         if mode == persona.hold_mode or mode in persona.manual_modes:
@@ -199,7 +199,7 @@ class Takeovers:
         return is_halted and authority.was_asked_before(mode, ours=ours, halt=halts.at)
 
     def _moves_late(self, *, now: float) -> bool:
-        """Whether what it was told before a halt just now moves it in HOLD."""
+        """Return whether a command from before a recent halt moves the vehicle in HOLD."""
         parts, halts = self._parts, self._parts.tasks.halts
         is_held = parts.monitor.custom_mode == parts.persona.hold_mode
         return (
@@ -213,7 +213,7 @@ class Takeovers:
         )
 
     def _look_for_parking(self, was_mode: int, mode: int, *, now: float) -> None:
-        """Somebody who was driving sets HOLD: what waits does not drive it off from there."""
+        """If somebody who was driving sets HOLD, no waiting task may drive the vehicle off."""
         parts = self._parts
         others_drove, self._others_drive = self._others_drive, False
         follows = (parts.persona.hold_mode, parts.persona.control_mode)
@@ -225,19 +225,19 @@ class Takeovers:
         parts = self._parts
         if parts.control.may_have_disarmed(now=now):
             return
-        if self._shows_restart:  # this heartbeat, or the clock before it, has told of that as well
+        if self._shows_restart:  # this heartbeat, or the clock before it, has shown it
             self._disarmed_by_restart(before.may_arm)
             return
         parts.tasks.halts.shows_disarmed(now=now)
         self._taken(Event.DISARMED, "disarmed", now=now)
-        parts.authority.note_disarmed(before)  # a restart may turn out to have done it
+        parts.authority.note_disarmed(before)  # it may turn out that a restart did it
 
     def _disarmed_by_restart(self, could_arm: bool) -> None:
         authority = self._parts.authority
         authority.restarted(was_allowed=could_arm or authority.is_withdrawn_by_restart)
 
     def _note_rest(self, *, now: float) -> None:
-        """What it measures at rest is learnt while nothing can be telling it to move."""
+        """Learn its noise at rest while nothing can be telling it to move."""
         parts = self._parts
         follows = (parts.persona.hold_mode, parts.persona.control_mode)
         is_driven = parts.is_driven_by_others(now=now)
@@ -247,7 +247,7 @@ class Takeovers:
             parts.where.motion.standstill.told_to_stand(now=now)
 
     def _note_others(self, *, now: float) -> None:
-        """Note that it moves, and that we do not move it: who then sets HOLD has parked it."""
+        """Note that it moves without us: a HOLD after that means that somebody parked it."""
         parts = self._parts
         is_held = parts.monitor.custom_mode == parts.persona.hold_mode
         if parts.monitor.armed and not is_held and not parts.control.is_engaged:

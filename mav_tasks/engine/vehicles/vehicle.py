@@ -1,7 +1,7 @@
-"""One vehicle: what it says, and the way to what is decided about it.
+"""One vehicle: dispatches its messages and requests to the parts that decide about it.
 
-Its parts decide: ``joint`` who may move it, ``pilot`` what is sent to drive it, ``takeovers`` what
-others have done to it, ``motion_rights`` whether a client's set-points pass.
+``joint`` decides who may move it, ``pilot`` what drives it, ``motion_rights`` whether a client's
+set-points pass. ``takeovers`` detects what others have done to it.
 """
 
 from collections.abc import Hashable
@@ -41,14 +41,14 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
-REORDERED = 127  # packets that a net can put one behind others, as far as numbers tell
-SILENT = 0.5  # s without any of its packets
-REORDERED_WITHIN = 3.5  # s; after a longer silence a smaller number is a restart
+REORDERED = 127  # packets by which a network may reorder one, as far as numbers can show
+SILENT = 0.5  # s without any packet of the autopilot
+REORDERED_WITHIN = 3.5  # s; after a longer silence a smaller number means a restart
 MOVING = frozenset({Kind.GO, Kind.MOTION, Kind.ACTION})
 
 
 class Vehicle:
-    """The vehicle with one system id, on one place of a vehicle link."""
+    """The vehicle with one system id, at one endpoint of a vehicle link."""
 
     def __init__(
         self,
@@ -94,13 +94,13 @@ class Vehicle:
         self._takeovers = Takeovers(parts, self.joint)
         self._clock = self.pilot.clock
         self.last_heartbeat: Packet | None = None
-        self.last_seq = 0  # of the autopilot's packets
+        self.last_seq = 0  # sequence number of the autopilot's last packet
         self._number = 0  # the same, counted on beyond 255
-        self._counted_at = -inf  # s, the last of them
-        self._last_beat = (0, -inf)  # number of the last heartbeat, and when it came
-        self._overtaken: tuple[m.Heartbeat | None, float] = (None, -inf)  # the last that was
+        self._counted_at = -inf  # s, when that packet came
+        self._last_beat = (0, -inf)  # number and time of the last heartbeat
+        self._overtaken: tuple[m.Heartbeat | None, float] = (None, -inf)  # the last such heartbeat
         self._was_heard = True
-        #: what was to let it go, whichever endpoint it came from
+        #: recent packets that let the vehicle go, from all endpoints
         self.go_words = GoWords()
         self._says = SelfDescription(parts)
         self.components = Components(system_id, first=settings.identity.component_id)
@@ -113,12 +113,12 @@ class Vehicle:
 
     @property
     def persona(self) -> Persona:
-        """How it wants to be spoken to."""
+        """The persona: how this autopilot must be spoken to."""
         return self.parts.persona
 
     @property
     def setpoint_period(self) -> float:
-        """Seconds from one setpoint to the next, as they should be."""
+        """The nominal seconds from one setpoint to the next."""
         return self.parts.settings.watch.setpoint_period
 
     @property
@@ -133,29 +133,29 @@ class Vehicle:
 
     @property
     def heartbeat(self) -> m.Heartbeat:
-        """What it said last."""
+        """Its last heartbeat."""
         return self._monitor.latest
 
     @property
     def heard_at(self) -> float:
-        """When its last heartbeat came."""
+        """When its last heartbeat came, s."""
         return self._monitor.heard_at
 
     def is_heard(self, *, now: float) -> bool:
-        """Whether its heartbeats are coming."""
+        """Return whether its last heartbeat is recent."""
         return now - self._monitor.heard_at <= self._monitor.lost_after
 
     def count(self, seq: int, *, now: float) -> None:
-        """Take note of the number of a packet of its autopilot.
+        """Note the sequence number of a packet of its autopilot.
 
-        After a silence it is ahead, however many were lost: nothing is late that long by itself.
+        After a silence it counts as ahead, however many were lost: no packet is that late.
         """
         behind = 0 if now - self._counted_at > SILENT else 0x80
         self._number += (seq - self.last_seq + behind & 0xFF) - behind
         self.last_seq, self._counted_at = seq, now
 
     def is_overtaken(self, heartbeat: m.Heartbeat, *, now: float) -> bool:
-        """Whether a newer heartbeat came just before this one, which was counted just now."""
+        """Return whether a newer heartbeat came just before this one. Call ``count`` first."""
         number, at = self._last_beat
         if 0 < number - self._number <= REORDERED and now - at <= REORDERED_WITHIN:
             self._overtaken = heartbeat, now
@@ -164,26 +164,23 @@ class Vehicle:
         return False
 
     def comes_anew(self) -> None:
-        """It is on another connection: its numbers may begin anew, and it may be another one."""
+        """Note a new connection: sequence numbers may restart, and it may be another vehicle."""
         self._last_beat = (0, -inf)
         self.requests.ask_which_again()
 
     def move_to(self, outlet: PacketSender, *, may_arm: bool) -> None:
-        """It is heard at another endpoint now; ``may_arm``: whether we may arm what is there."""
+        """Send to another endpoint from now on; ``may_arm``: whether we may arm it there."""
         self.comes_anew()
         self.requests.move_to(outlet)
         self.parts.authority.moved(may_arm=may_arm)
 
     def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:
-        """A vehicle of an earlier run is heard: first of all it stands, if we left it driving.
-
-        So it does if that run ended just after a ``halt``.
-        """
+        """Handle the first heartbeat of a vehicle of an earlier run: see ``Takeovers``."""
         self._takeovers.come_back(was_driven=was_driven, halt=halt, now=now)
         self.pilot.plan_tick(now=now)
 
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:
-        """Take in a message that the server itself makes use of."""
+        """Process a message that the server itself uses."""
         if isinstance(message, m.CommandAck):
             self.requests.receive(message, component=component_id, now=now)
             self._ask_for_rates(now=now)
@@ -193,7 +190,7 @@ class Vehicle:
         elif isinstance(message, m.Heartbeat):
             self._receive_heartbeat(message, now=now)
         elif isinstance(message, Stamped):
-            due = self._clock.next_at  # a setpoint that is late is followed by a zero
+            due = self._clock.next_at  # after a late tick, data looks old, so that a zero follows
             if self.where.receive(message, now=now, not_after=due) is Heard.RESTART:
                 self._restarted(booted_at=now - message.time_boot_ms / 1000, now=now)
                 self.where.receive(message, now=now, not_after=due)
@@ -226,7 +223,7 @@ class Vehicle:
             self._says.receive_identity(identity_of(message), now=now)
 
     def _restarted(self, *, booted_at: float, now: float) -> None:
-        """Its clock began anew, and its numbers did: what came since was not overtaken by them."""
+        """Handle a reset of its clock; a heartbeat since then was not overtaken but is current."""
         self._last_beat = (0, -inf)
         self._takeovers.rebooted(booted_at=booted_at, now=now)
         heartbeat, at = self._overtaken
@@ -256,13 +253,13 @@ class Vehicle:
         self._says.look(now=now)
 
     def _keep_home(self, place: GlobalPlace | None, *, now: float) -> None:
-        """Where it is first armed is its home; one met armed has said where that was."""
+        """Store its home: where it was first armed, or what it reports if it was found armed."""
         frame = self.where.frame.frame()
         if place and frame and self.tasks.bounds.home_in(frame) is None:
             self.tasks.terms.set_home(place, frame, actor=SERVER, now=now)
 
     def home_was_set(self, command: m.Message, *, actor: str, now: float) -> None:
-        """A client's DO_SET_HOME was accepted: its tasks return there, too."""
+        """Store the home of a client's accepted DO_SET_HOME: tasks return there, too."""
         place, frame = home_meant(command) or self.where.here, self.where.frame.frame()
         if place and frame:
             self.tasks.terms.set_home(place, frame, actor=actor, now=now)
@@ -293,7 +290,7 @@ class Vehicle:
     ) -> None:
         """Forward a client's command; its answer comes from ``requests``."""
         asked = getattr(message, "target_component", 0)
-        # an autopilot answers for every component that is not there, and does as it was told
+        # an autopilot answers, and executes, commands to a component that does not exist
         target = asked if asked in self.components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
         if disarms:
@@ -301,7 +298,7 @@ class Vehicle:
         elif command == MavCmd.COMPONENT_ARM_DISARM:
             self.joint.arm(now=now)
         elif command != MavCmd.DO_SET_MODE and row_of_command(command).passed_on.kind in MOVING:
-            self.parts.authority.note_passed_on(now=now)  # which mode is the vehicle's own affair
+            self.parts.authority.note_passed_on(now=now)  # which may set any mode
         self.requests.relay(
             packet,
             message,
@@ -314,16 +311,16 @@ class Vehicle:
         )
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
-        """Have the vehicle carry out what an item of a plan orders."""
+        """Send a vehicle command that a plan item orders."""
         active = self.tasks.active
         if self.tasks.is_stopped or (active is not None and active.state not in RUNNING):
-            return  # called off in the very step in which it was ordered
+            return  # cancelled in the very step that ordered it
         self.requests.perform(command, now=now)
 
     def next_deadline(self) -> float:
-        """Return when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` must be called next, s."""
         deadline = min(self._clock.next_at, self.requests.next_deadline() or inf)
-        if not self._was_heard:  # nothing is asked of one that cannot answer
+        if not self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             return deadline
         silent_at = self._monitor.heard_at + self.parts.settings.watch.heartbeat_lost + 1e-3
         return min(deadline, self.requests.intervals.next_deadline(), silent_at)
@@ -335,7 +332,7 @@ class Vehicle:
             self._was_heard = False
             self.parts.note("silent", now=now)
         if now >= self._clock.next_at or fell_silent:
-            self.joint.step(now)  # first: what is late may make a request pointless
+            self.joint.step(now)  # first, because it may make a request pointless
         self.requests.handle_deadline(now=now)
         self.requests.flush(now=now)
         self._ask_for_rates(now=now)
@@ -344,7 +341,7 @@ class Vehicle:
         return self.parts.view(drives_on=self._says.may_drive_on, now=now)
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings, but for those that need a restart: see the table of keys."""
+        """Apply new settings, except those that need a restart (see the table of keys)."""
         self.parts.settings = settings
         self._monitor.lost_after = settings.watch.heartbeat_lost
         self.where.motion.apply(settings.watch)
@@ -353,7 +350,7 @@ class Vehicle:
         self._says.apply(settings)
 
     def _ask_for_rates(self, *, now: float) -> None:
-        if self._was_heard:  # nothing is asked of one that cannot answer
+        if self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             self.requests.ask_which(now=now)
             if self.tasks.terms.has_uid and self.requests.has_not_said_which(now=now):
                 self.tasks.unidentified(now=now)

@@ -1,4 +1,4 @@
-"""The ways to vehicles: links, endpoints on them, which vehicle is where, what a link carries."""
+"""The links to vehicles: their endpoints, which vehicle is where, and what a link carries."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 
 MAX_PEERS = 256  # endpoints on one vehicle link
-BOTH_THERE = 1.0  # s; by then what was late on the net from the old place has come
+BOTH_THERE = 1.0  # s; by then, delayed packets from the old place have come
 
 
 @dataclass(slots=True)
 class Link:
-    """One vehicle link that is in use."""
+    """One vehicle link that is up."""
 
     is_local: bool
     capacity: float | None
@@ -50,9 +50,9 @@ class VehicleLinks:
         beat: Callable[..., None],
         note_once: Callable[..., None],
     ) -> None:
-        """``vehicles`` are all that were found, by system id; ``note_once`` tells of one, once.
+        """``vehicles`` has all vehicles by system id; ``note_once`` reports a text about one, once.
 
-        ``beat`` is called with the ways out of a link when they are to be sent a heartbeat.
+        ``beat`` is called with the senders of a link when a heartbeat is due on it.
         """
         self._timers = timers
         self._beat = beat
@@ -64,30 +64,30 @@ class VehicleLinks:
         self._registry = registry
         self._note_once = note_once
         self._links: dict[str, Link] = {}
-        #: which vehicle is where
+        #: the place of each vehicle
         self.router = Router()
-        self._outlets: dict[Place, PacketSender] = {}  # kept: their numbers go on
-        #: heartbeats of a known vehicle's id from another place: when the first one came
+        self._outlets: dict[Place, PacketSender] = {}  # kept, because their numbering continues
+        #: when the first heartbeat of a known vehicle's id came from another place
         self._rivals: dict[tuple[int, str, Peer], float] = {}
-        #: where nobody is any more: whoever was there may be back at once, anywhere
+        #: places whose peer has disconnected: it may be back at once, anywhere
         self._left: set[Place] = set()
-        #: by endpoint; made again when a link, a setting or who is where changes
+        #: by endpoint; cleared when a link, a setting or the place of a vehicle changes
         self._budgets: dict[Place, LinkBudget] = {}
 
     def __repr__(self) -> str:
         return f"VehicleLinks({list(self._links)})"
 
     def __iter__(self) -> Iterator[Link]:
-        """Return every link."""
+        """Iterate over all links."""
         return iter(self._links.values())
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._settings = settings
         self._budgets.clear()
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
-        """Take a link into use, or out of it."""
+        """Add a link that came up; remove one that went down."""
         old = self._links.pop(change.link, None)
         if old is not None:
             old.heartbeat.set(inf)
@@ -103,7 +103,7 @@ class VehicleLinks:
         self._links[change.link] = link
 
     def change_peer(self, change: PeerChanged) -> None:
-        """Speak to who has come; who is gone may come back from another place."""
+        """Send to a peer that connected; one that is gone may come back at another place."""
         link, place = self._links.get(change.link), (change.link, change.peer)
         if link is None:
             return
@@ -119,11 +119,11 @@ class VehicleLinks:
                     vehicle.comes_anew()
 
     def owns(self, link: str) -> bool:
-        """Whether a link of this name is a vehicle link."""
+        """Return whether a link of this name is a vehicle link."""
         return link in self._links
 
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
-        """Return the way to somebody new at an endpoint, and whether it is new; None: too many."""
+        """Return the sender to a new vehicle's endpoint, and whether it is new, or None if full."""
         link = self._links[link_name]
         outlet = link.outlets.get(peer)
         if outlet is not None:
@@ -134,19 +134,19 @@ class VehicleLinks:
         return link.outlets[peer], True
 
     def learn(self, system_id: int, place: Place) -> None:
-        """A vehicle is at a place."""
+        """Note that a vehicle is at a place."""
         self.router.learn(system_id, place)
         self._budgets.clear()
 
     def may_arm(self, name: str) -> bool:
-        """Whether we may arm what is on a link of this name."""
+        """Return whether we may arm vehicles on a link of this name."""
         arming = self._settings.arming
         return arming == "server" or (arming == "auto" and self._links[name].is_local)
 
     def moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
-        """Whether a vehicle that fell silent is back at another place; two are not mixed.
+        """Move a vehicle that fell silent to the place of this heartbeat. Return whether it moved.
 
-        One that was there while the vehicle itself still was is another one, for good.
+        An id that was heard there while the vehicle was still heard is another vehicle, for good.
         """
         rival = vehicle.system_id, link, peer
         if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
@@ -171,7 +171,7 @@ class VehicleLinks:
         return True
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
-        """Return what the way to a vehicle carries, shared with the others behind its endpoint."""
+        """Return what the link to a vehicle carries, shared by all vehicles at its endpoint."""
         place = vehicle.requests.place
         budget = self._budgets.get(place)
         if budget is None:
@@ -187,7 +187,7 @@ class VehicleLinks:
     def why_not_asked(
         self, vehicle: Vehicle, who: Hashable, packet: Packet, message: m.Message, *, now: float
     ) -> str | None:
-        """Return why an observer's question is too much for a vehicle's link, None if it is not."""
+        """Return why an observer's request is too much for a vehicle's link, or None if it fits."""
         budget, place = self.link_budget(vehicle, now=now), vehicle.requests.place
         is_driven = any(v.tasks.is_driving for v in self._all.values() if v.requests.place == place)
         return budget.why_not(who, packet, message, is_driven=is_driven, now=now)
@@ -201,7 +201,7 @@ class VehicleLinks:
         return outlet
 
     def _forget_if_empty(self, place: Place | None) -> None:
-        """Keep nothing of a place that was left, unless a vehicle may still come back to it."""
+        """Forget a place that was left, unless a vehicle may still come back to it."""
         if place in self._left and all(
             self.router.place_of(vehicle.system_id) != place for vehicle in self._all.values()
         ):

@@ -1,4 +1,4 @@
-"""Where a vehicle is, how it moves, where its frame begins; and what lies about: home, fence."""
+"""Where a vehicle is, how it moves, where its local frame begins, and where home and fence are."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
 
 
 class VehiclePosition:
-    """What one vehicle measures of itself, and what follows from it."""
+    """The position data of one vehicle, and what follows from it."""
 
     def __init__(self, watch: Watch, bounds: Bounds) -> None:
         self.motion = MotionMonitor(watch)
@@ -26,13 +26,13 @@ class VehiclePosition:
 
     @property
     def clock(self) -> SenderClock:
-        """Return the vehicle's own clock."""
+        """The vehicle's own clock."""
         return self.motion.clock
 
     def receive(self, message: Stamped, *, now: float, not_after: float) -> Heard:
-        """Take a message in, and return what it is; what is old is dropped.
+        """Process a message and return its classification; an old message is dropped.
 
-        What is read late counts as if it had been made at ``not_after`` at the latest.
+        A message that is read late counts as sent at ``not_after`` at the latest.
         """
         if isinstance(message, GlobalPositionInt):
             heard = self.clock.hear(message, now=now)
@@ -44,21 +44,21 @@ class VehiclePosition:
         return heard
 
     def forget(self) -> None:
-        """It has restarted: nothing of before is true any more."""
+        """Forget all position data after a restart of the vehicle."""
         self.motion.forget()
         self.frame.forget()
 
     @property
     def origin(self) -> GlobalPlace | None:
-        """Where the vehicle's local frame begins on earth, if that is known."""
+        """The global position of the local frame's origin, or None if it is unknown."""
         return self.frame.origin
 
     @property
     def home(self) -> GlobalPlace | None:
-        """Where the vehicle returns to: the nearest rally point, else its home.
+        """The place to which the vehicle returns: the nearest rally point, else its home.
 
-        That is where it was first armed, or what somebody set; the home that it says itself moves
-        with it while it is disarmed (ArduPilot), or at each arming (PX4).
+        Home is where it was first armed, or what somebody set. Its own home is the last resort:
+        that moves with it while disarmed (ArduPilot), or at each arming (PX4).
         """
         motion = self.motion.latest() if self._bounds.rally else None
         rally = None if motion is None else self._bounds.refuge(motion.pose, self.frame.origin)
@@ -66,7 +66,7 @@ class VehiclePosition:
 
     @property
     def here(self) -> GlobalPlace | None:
-        """Where the vehicle is on earth, as far as that is known."""
+        """The global position of the vehicle, or None if it is unknown."""
         motion, origin = self.motion.latest(), self.frame.origin
         if motion is None or origin is None:
             return None
@@ -74,16 +74,16 @@ class VehiclePosition:
 
     @property
     def is_fence_unknown(self) -> bool:
-        """Whether there is a fence, and it cannot be said where it is in the vehicle's frame."""
+        """Whether there is a fence whose place in the vehicle's frame is unknown."""
         return self._bounds.is_unknown(self.frame.origin)
 
     def distance_to(self, goal: GoTo) -> float | None:
-        """Return the metres to the place that a goal means, or None while that is not known."""
+        """Return the metres to the place of a goal, or None if that is unknown."""
         motion, place = self.motion.latest(), self._place_of(goal)
         return None if motion is None or place is None else distance(motion.pose, place)
 
     def is_within_fence(self, goal: GoTo) -> bool:
-        """Whether the place that a goal means is one where it may be, as far as that is known."""
+        """Return whether the fence allows the place of a goal; True if that is unknown."""
         fence = self._bounds.local(self.frame.origin)
         if fence is None:
             return True
@@ -91,7 +91,7 @@ class VehiclePosition:
         return place is None or fence.allows(place)
 
     def leg_over_fence(self, steps: Sequence[Step]) -> int | None:
-        """Return a step of a plan whose straight way crosses the fence, or None."""
+        """Return a step of a plan whose straight line crosses the fence, or None."""
         return self._bounds.forbidden_leg(steps, self.frame.origin)
 
     def _place_of(self, goal: GoTo) -> LocalPlace | None:

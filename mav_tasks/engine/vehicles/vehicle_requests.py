@@ -1,6 +1,6 @@
-"""What is sent to one vehicle, and its answers: setpoints, our commands, those of clients, rates.
+"""What is sent to one vehicle, and its answers: setpoints, our and clients' commands, rates.
 
-It decides nothing but the order in which things leave.
+It decides nothing but the order in which packets leave.
 """
 
 from collections.abc import Hashable
@@ -27,16 +27,16 @@ from mav_tasks.services.phase import Phase
 from mav_tasks.services.turning_kind import TurningKind
 from mav_tasks.settings import Watch
 
-ASK_WHICH = 5  # times that a vehicle is asked for its AUTOPILOT_VERSION
+ASK_WHICH = 5  # times that a vehicle is asked for AUTOPILOT_VERSION
 ASK_WHICH_EACH = 3.0  # s
-SHOW = 0.25  # s in which a heartbeat that was asked for is to come; the next one is not far
-ASK_TO_SHOW = 3  # times in a row that a vehicle may leave that unanswered
-#: commands after which clients wait to see in a heartbeat what they asked for
+SHOW = 0.25  # s in which a requested heartbeat must come; the next regular one is not far
+ASK_TO_SHOW = 3  # times in a row that a vehicle may leave that request unanswered
+#: commands after which clients wait for a heartbeat that shows the result
 SHOWN = frozenset({MavCmd.DO_SET_MODE, MavCmd.DO_SET_STANDARD_MODE, MavCmd.COMPONENT_ARM_DISARM})
 
 
 class VehicleRequests:
-    """The way out to one vehicle, and our hold on it."""
+    """Sends to one vehicle, and holds our offboard control of it."""
 
     def __init__(
         self,
@@ -56,53 +56,53 @@ class VehicleRequests:
         self._sender = CommandSender(source)
         self._answers: list[Answered] = []
         self._uploader = MissionUploader(target)
-        self._performed: set[int] = set()  # commands that plans have ordered
+        self._performed: set[int] = set()  # command ids that plans have ordered
         self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
         self.cruise = CruiseSpeed(target, persona.cruise_parameters)
         self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
         self.turning = TurningKind(target, persona)
-        self._shows = ASK_TO_SHOW  # times more that it is asked for a heartbeat
+        self._shows = ASK_TO_SHOW  # how many more times it is asked for a heartbeat
         self._versions_asked = 0
         self._ask_version_at = now
-        #: whether the vehicle has said which one it is
+        #: whether the vehicle has sent its identity
         self.is_identified = False
         #: zero and HOLD as packets, for an exit on which nothing can be computed any more
         self.emergency_stop_packets = self._prepare_last_words()
 
     @property
     def place(self) -> tuple[str, Peer]:
-        """Link and endpoint at which the vehicle is reached."""
+        """The link and endpoint at which the vehicle is reached."""
         return self._outlet.link, self._outlet.peer
 
     def apply(self, watch: Watch) -> None:
-        """Take new settings; what is being asked for keeps its time."""
+        """Apply new settings; pending requests keep their time limits."""
         self._watch = watch
         self.control.apply(watch)
 
     def adopt(self, persona: Persona) -> None:
-        """Speak otherwise from now on, to the same make of vehicle; it is not being driven."""
+        """Switch to another persona of the same autopilot; not to be called while it is driven."""
         self._persona = persona
         self.control.adopt(persona)
         self.emergency_stop_packets = self._prepare_last_words()
 
     def move_to(self, outlet: PacketSender) -> None:
-        """The vehicle is heard at another endpoint now."""
+        """Send to another endpoint from now on."""
         self._outlet = outlet
         self.emergency_stop_packets = self._prepare_last_words()
 
     def receive(self, ack: m.CommandAck, *, component: int, now: float) -> None:
-        """Take an answer of the vehicle."""
+        """Process an answer of the vehicle."""
         self._sender.receive(ack, component=component, now=now)
         self.flush(now=now)
 
     def forward(self, packet: Packet) -> None:
-        """Pass on a client's packet that no answer is kept for."""
+        """Forward a client's packet that needs no answer."""
         self._outlet.inject(packet)
 
     def ask_to_show(self, *, now: float) -> None:
-        """Have it show its mode and arming at once: whoever changed them waits for a heartbeat."""
+        """Ask for a heartbeat now: somebody waits to see its mode or arming."""
         if not self._shows:
             return
         request = self._message_request(m.Heartbeat.id)
@@ -136,44 +136,44 @@ class VehicleRequests:
         self.flush(now=now)
 
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
-        """Send a command that a plan orders, repeated until it is answered or given up."""
+        """Send a command that a plan orders, and repeat it until it is answered or given up."""
         self._performed.add(command.command)
         self._sender.request(command, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
 
     def end_performing(self) -> None:
-        """Nothing more of what plans have ordered is sent: STOP, or somebody took the vehicle."""
+        """Stop sending what plans have ordered, on STOP or a takeover."""
         for command in self._performed:
             self._sender.withdraw(self._target.component_id, command)
         self._performed.clear()
 
     def drop_what_waits(self) -> None:
-        """Send nothing of clients that waits for an answer to another, and might move it."""
+        """Drop clients' commands that are queued behind an unanswered one and might move it."""
         self._sender.drop(lambda command: not row_of_command(command).passed_on.passes_under_stop)
 
     def write_plan(
         self, mission_type: int, items: tuple[Item, ...], done: Done, *, now: float
     ) -> None:
-        """Let the vehicle itself keep a plan; ``done`` is called with what became of it."""
+        """Upload a plan to the vehicle itself; ``done`` is called with the result."""
         self._uploader.begin(mission_type, items, done, now=now)
         self.flush(now=now)
 
     def receive_of_plan(self, message: m.Message, *, now: float) -> None:
-        """Take in what the vehicle says of a plan that it is sent."""
+        """Process the vehicle's part of such an upload."""
         if target_of(message).reaches(self._source):
             self._uploader.receive(message, now=now)
             self.flush(now=now)
 
     def send_zero(self) -> None:
-        """Send one zero setpoint, whoever the vehicle follows."""
+        """Send one zero setpoint, whoever drives the vehicle."""
         self._outlet.send(self.control.zero_setpoint(), self._source)
 
     def send_hold(self) -> None:
-        """Ask for HOLD once, and wait for no answer."""
+        """Ask for HOLD once, without waiting for an answer."""
         self._outlet.send(self.control.hold_request(), self._source)
 
     def ask_for_rates(self, *, now: float) -> None:
-        """Ask for the next message interval that is due, if one is."""
+        """Ask for the next message interval that is due, if any."""
         request = self.intervals.next_request(now=now)
         if request is not None:
             request.target_system, request.target_component = self._target
@@ -181,18 +181,18 @@ class VehicleRequests:
             self.flush(now=now)
 
     def ask_for_parameters(self) -> None:
-        """Ask how it stops by itself, how it turns and how fast it drives, until it has said so."""
+        """Ask how it stops by itself, how it turns and how fast it drives, until it answers."""
         failsafe, turning = self.loss_failsafe.requests(), self.turning.requests()
         for request in (*failsafe, *turning, *self.cruise.requests()):
             self._outlet.send(request, self._source)
 
     def has_not_said_which(self, *, now: float) -> bool:
-        """Whether the vehicle was asked often enough which one it is, and did not say."""
+        """Return whether it was asked for its identity often enough, and did not answer."""
         is_asked = self._versions_asked >= ASK_WHICH and now >= self._ask_version_at
         return is_asked and not self.is_identified
 
     def ask_which(self, *, now: float) -> None:
-        """Ask which vehicle it is, some times, until it has said so."""
+        """Ask for the identity of the vehicle, a few times, until it answers."""
         if self.is_identified or self._versions_asked >= ASK_WHICH or now < self._ask_version_at:
             return
         self._versions_asked += 1
@@ -202,42 +202,42 @@ class VehicleRequests:
         self.flush(now=now)
 
     def ask_which_again(self) -> None:
-        """It may be another one now, or one that hears us again."""
+        """Ask for the identity again: another vehicle may be there, or it may hear us again."""
         self._shows = max(self._shows, 1)
         self.is_identified = False
         self._versions_asked, self._ask_version_at = 0, -inf
 
     def next_deadline(self) -> float | None:
-        """Return when a command is to be repeated or given up."""
+        """Return when a command is to be repeated or given up, or None."""
         command, upload = self._sender.next_deadline(), self._uploader.next_deadline()
         if command is None or upload is None:
             return upload if command is None else command
         return min(command, upload)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Repeat and give up what is due; ``flush`` sends it."""
+        """Repeat or give up what is due; ``flush`` sends it."""
         self._sender.handle_deadline(now=now)
         self._uploader.handle_deadline(now=now)
 
     def flush(self, *, now: float) -> bool:
-        """Move what the services want sent to the way out, and their answers to who asked.
+        """Send what the services have queued, and hand out the answers that came.
 
-        Whether a setpoint leaves.
+        Return whether a setpoint leaves.
         """
         setpoints = self.control.take_messages()
         outgoing, answers = self._sender.take()
         is_handed_back = self.control.phase is Phase.RELEASING and self._persona.has_loss_failsafe
-        # HOLD also stops what does not follow setpoints; and a zero before it would end a failsafe
+        # HOLD also stops one that ignores setpoints, and a zero before it would end a failsafe
         if is_handed_back or self.control.phase is Phase.STOPPING:
             outgoing += setpoints
-        else:  # in our mode a zero comes before arming
+        else:  # in our mode, a zero must come before arming
             outgoing = [*setpoints, *outgoing]
         outgoing += self._uploader.take()
         for item in outgoing:
             if isinstance(item, Packet):
                 self._outlet.inject(item)
             else:
-                # zeros stay behind what setpoints wait; HOLD stops it whatever those say
+                # zeros stay behind queued setpoints; HOLD stops the vehicle whatever those say
                 is_command = isinstance(item, m.CommandLong | m.CommandInt)
                 is_first = is_command and self.control.phase is Phase.STOPPING
                 until = now + self._watch.motion_fresh if moves(item) else inf
@@ -247,7 +247,7 @@ class VehicleRequests:
         return bool(setpoints)
 
     def take_unperformed(self) -> list[Answered]:
-        """Return the orders of plans that the vehicle has refused or not answered since."""
+        """Return the plans' commands refused or not answered since the last call."""
         unperformed, self._unperformed = self._unperformed, []
         return unperformed
 
@@ -277,9 +277,9 @@ class VehicleRequests:
             self.ask_to_show(now=now)
 
     def _note_shown(self, answer: Answered) -> None:
-        """One that does not send heartbeats on request is not asked again and again.
+        """Stop asking for heartbeats if it does not send them on request.
 
-        Until its unanswered request is given up, those of clients wait.
+        Clients' requests wait until our unanswered request is given up.
         """
         request = answer.request
         if not isinstance(request, m.CommandLong) or request.param1 != m.Heartbeat.id:
@@ -292,6 +292,6 @@ class VehicleRequests:
     def _prepare_last_words(self) -> tuple[Outgoing, ...]:
         queue: list[Outgoing] = []
         spare = self._outlet.sibling(queue)
-        spare.send(self.control.zero_setpoint(), self._source)  # after each setpoint that waits
+        spare.send(self.control.zero_setpoint(), self._source)  # stays behind queued setpoints
         spare.send(self.control.hold_request(), self._source, first=True)
         return tuple(queue)

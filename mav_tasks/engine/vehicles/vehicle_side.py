@@ -1,6 +1,6 @@
-"""All vehicles and the links to them: finding, hearing, and the way to each.
+"""All vehicles and the links to them: finds vehicles, receives from them, and routes to them.
 
-Any bytes may come in here; only a packet with a good CRC from a known or newly heartbeating system
+Any bytes may come in. Only a packet with a good CRC, from a known or newly heartbeating system,
 changes anything.
 """
 
@@ -33,16 +33,16 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 NANO = 1e9  # TIMESYNC is in ns
-ASKED = 64  # questions for the time, one a second and link, to which an answer may come
-OLD_NEWS = 0.3  # s after this process stood still, in which what is read may have waited for it
+ASKED = 64  # TIMESYNC requests, one a second and link, whose answers are still accepted
+OLD_NEWS = 0.3  # s after a stall of this process, in which packets may have waited to be read
 MOST_NOTES = 256
-MOST_NAMED = 5  # tasks in one text
+MOST_NAMED = 5  # tasks named in one text
 
-#: messages that nobody but a controller of the vehicle sends
+#: messages that only a controller of the vehicle sends
 SETPOINTS = frozenset(
     {m.SetPositionTargetLocalNed.id, m.SetPositionTargetGlobalInt.id, m.SetAttitudeTarget.id}
 )
-#: what the server itself makes use of; everything else is forwarded unread
+#: what the server itself decodes; everything else is forwarded unread
 USED = frozenset(
     {
         m.Heartbeat.id,
@@ -87,25 +87,25 @@ class VehicleSide:
         self._registry = registry
         self._fleet = fleet
         self._settings = settings
-        #: as whom the server speaks to vehicles
+        #: the address under which the server speaks to vehicles
         self.our_address = _own_address(settings)
         self._decoder = Decoder()
-        #: which of them have something to do
+        #: the deadlines of all vehicles
         self.deadline_heap = DeadlineHeap(timers)
         self._old_until = -inf
-        self._stood_for = 0.0  # s, that this process stood still before that
+        self._stood_for = 0.0  # s, how long this process stalled before that
         self._noted: set[str] = set()
-        self._answer: Packet | None = None  # the last that told the time
-        self._asked: deque[int] = deque(maxlen=ASKED)  # what vehicles were asked the time with, ns
-        self._question = m.Timesync(0, 0)  # filled in anew each time
+        self._answer: Packet | None = None  # the last answer to our TIMESYNC
+        self._asked: deque[int] = deque(maxlen=ASKED)  # time stamps of our TIMESYNC requests, ns
+        self._question = m.Timesync(0, 0)  # refilled for each request
         self._vehicles: dict[int, Vehicle] = {}
-        #: every one of them, to be looked at only
+        #: all vehicles, read-only
         self.all = self._vehicles.values()
-        #: all of them by system id, to be looked at only
+        #: all vehicles by system id, read-only
         self.by_id: Mapping[int, Vehicle] = self._vehicles
-        #: gives one to which nothing is done
+        #: returns a vehicle, read-only
         self.look_at = self._vehicles.get
-        #: the ways to them
+        #: the links and endpoints
         self.links = VehicleLinks(
             self._vehicles,
             queue=queue,
@@ -122,14 +122,14 @@ class VehicleSide:
         return len(self._vehicles)
 
     def get(self, system_id: int) -> Vehicle | None:
-        """Return a vehicle, to do something to it."""
+        """Return a vehicle in order to change it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None:
             self.deadline_heap.mark_dirty(vehicle)
         return vehicle
 
     def mark_dirty(self, vehicle: Vehicle) -> None:
-        """Note that something is about to be done to a vehicle that was only looked at."""
+        """Note that a vehicle that was only looked at is about to be changed."""
         self.deadline_heap.mark_dirty(vehicle)
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
@@ -140,9 +140,9 @@ class VehicleSide:
         return [vehicle for vehicle in map(self.get, sorted(self._vehicles)) if vehicle is not None]
 
     def stop_unheard(self, system_id: int, *, clear: bool, actor: str, now: float) -> list[int]:
-        """Latch STOP for vehicles of an earlier run that were not heard yet; gives them.
+        """Latch STOP for vehicles of an earlier run that were not heard yet. Return their ids.
 
-        They are stopped when they are heard. ``system_id`` 0: all of them.
+        They are stopped when they are heard. ``system_id`` 0 means all of them.
         """
         unheard = [tasks for tasks in self.unheard if system_id in (0, tasks.vehicle)]
         for tasks in unheard:
@@ -159,13 +159,13 @@ class VehicleSide:
         return next((tasks for tasks in self.unheard if tasks.vehicle == system_id), None)
 
     def has_listened(self, *, now: float) -> bool:
-        """Whether this run is so old that a vehicle that is there would have been heard."""
+        """Return whether this run is old enough to have heard every vehicle that is there."""
         return now - self._fleet.began_at > self._settings.watch.heartbeat_lost
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
-        """Pause each vehicle with a task of a key that counts no more, whosever task is driven.
+        """Pause each vehicle that has a task of a revoked key, even if another key's task drives.
 
-        Whether what that key had asked for is still wanted only an operator can say.
+        Only an operator can say whether the requests of that key are still wanted.
         """
         for each in self.all if keys else ():
             each.parts.forget_start_of(keys)
@@ -187,7 +187,7 @@ class VehicleSide:
                 vehicle.joint.on(Event.PAUSE_TASKS, Word(), now=now)
 
     def commit(self, durable: int, *, now: float) -> None:
-        """Let begin what waited for nothing but that events are durable up to this number."""
+        """Mark events up to ``durable`` as durable; start the tasks that waited only for that."""
         waiting = self.deadline_heap.awaiting_commit()
         self._registry.durable = durable
         for vehicle in waiting:
@@ -196,27 +196,27 @@ class VehicleSide:
 
     @property
     def counts(self) -> DecodeCounts:
-        """What came in on these links."""
+        """Packet counts of the vehicle links."""
         return self._decoder.counts
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._settings = settings
         self.our_address = _own_address(settings)
         self.links.apply(settings)
         for vehicle in self.all:
             vehicle.apply(settings)
-            self.deadline_heap.mark_dirty(vehicle)  # its deadlines may be others
+            self.deadline_heap.mark_dirty(vehicle)  # its deadlines may change
 
     def receive(self, link: str, peer: Peer, packet: Packet, *, now: float) -> Vehicle | None:
-        """Take a packet in; gives the vehicle in whose name it is to be forwarded, if any.
+        """Process a packet. Return the vehicle in whose name to forward it, or None.
 
-        COMMAND_ACK is not to be forwarded: it goes to the one who asked.
+        The caller must not forward COMMAND_ACK: it goes to the client that sent the command.
         """
         message: m.Message | None = None
         if packet.message_id in USED or packet.source == self.our_address:
             message = self._decoder.decode(packet)
-            if message is None:  # what cannot be verified changes nothing
+            if message is None:  # a packet that cannot be verified changes nothing
                 return None
         elif packet.message_id not in m.ALL:
             self.counts.unknown += 1
@@ -249,19 +249,19 @@ class VehicleSide:
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
                 if message.autopilot == MavAutopilot.INVALID:
-                    return None  # of a program that has taken the rover's address
+                    return None  # from a program that uses the rover's address
                 if vehicle.is_overtaken(message, now=now):
-                    return vehicle  # an old mode, or an old arming, is not news
+                    return vehicle  # an old mode or arming state is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
         return vehicle
 
     def is_answer_to_us(self, packet: Packet) -> bool:
-        """Whether what was just received tells the time to us; a client would misread it."""
+        """Return whether this packet answered our TIMESYNC request; a client would misread it."""
         return packet is self._answer
 
     def check_late(self, *, now: float) -> None:
-        """Stop what was driven on without us; before anything else is done after a delay."""
+        """After a delay, and before anything else, stop the vehicles that drove on without us."""
         due = min(
             self.deadline_heap.next_deadline(), *(link.heartbeat.at for link in self.links), inf
         )
@@ -274,11 +274,11 @@ class VehicleSide:
             vehicle.joint.check_late(now=now)
 
     def may_have_waited(self, *, now: float) -> float:
-        """Return for how many seconds what is read now may have waited."""
+        """Return for how many seconds a packet that is read now may have waited."""
         return self._stood_for if now < self._old_until else 0.0
 
     def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
-        """Each second and link: say that we are there, and ask for the time."""
+        """Send a heartbeat and a TIMESYNC request to each endpoint of a link, each second."""
         self._question.ts1 = round(now * NANO)
         self._asked.append(self._question.ts1)
         for outlet in outlets.values():
@@ -288,12 +288,12 @@ class VehicleSide:
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
     ) -> Vehicle | None:
-        """A first heartbeat: from an autopilot that we can drive, it is a new vehicle."""
+        """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
         if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
             return None
         if packet.system_id in (0, self.our_address.system_id):
-            return None  # 0 would address every vehicle, and our own id is no vehicle's
-        if heartbeat.type not in DRIVEN:  # others mean other things by the same mode numbers
+            return None  # 0 addresses every vehicle, and our own id belongs to no vehicle
+        if heartbeat.type not in DRIVEN:  # other types give the mode numbers other meanings
             words = f"a vehicle of type {heartbeat.type} is no rover: not driven"
             self._note_once(packet.system_id, words, now=now)
             return None
@@ -340,7 +340,7 @@ class VehicleSide:
     def _note_intruder(
         self, link: str, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
-        """Our own address, or setpoints, from the vehicles' side: a second server drives there."""
+        """Handle setpoints, or our own address, from the vehicles' side: a second server drives."""
         target = getattr(message, "target_system", 0)
         for vehicle in self.all:
             place = self.links.router.place_of(vehicle.system_id)
