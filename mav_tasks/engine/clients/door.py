@@ -4,9 +4,9 @@ Packets from the address of the server or of a rover are dropped: they come from
 network, or from a client that hides. A command from there is denied, so that a misconfigured ground
 station shows why nothing happens. STOP is accepted from any address, and is never rate-limited.
 
-Packets of a transfer under way, heartbeats and manual control are not counted; the flood gate
-limits them. From a client below operator, every message that an observer may send is counted: the
-link to the rover may be slow.
+Packets of a transfer under way, heartbeats and manual control are not counted: their rate is
+limited before parsing. From a client below operator, every message that an observer may send is
+counted, because the link to the rover may be slow.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient

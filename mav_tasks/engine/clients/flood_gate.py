@@ -41,7 +41,7 @@ class FloodGates:
 
     @property
     def left_out(self) -> int:
-        """Count of datagrams above the limit."""
+        """Count of dropped datagrams."""
         return sum(gate.left_out for gate in self._gates.values())
 
     def apply(self, settings: Clients) -> None:
@@ -76,7 +76,7 @@ class FloodGates:
 
 
 def stops_in(data: bytes) -> bytes:
-    """Return the parts of a datagram that look like STOP packets, joined; b"" if none do."""
+    """Return the joined parts of a datagram that look like STOP packets, or b""."""
     found = islice(_STOP.finditer(data), MOST_STOPS)
     return b"".join(_packet_at(data, each.start()) for each in found)
 
@@ -97,7 +97,7 @@ class FloodGate:
         self._is_known = is_known
         self._buckets: dict[Peer, TokenBucket] = {}
         self._strangers: TokenBucket | None = None
-        #: count of datagrams above the limit
+        #: count of dropped datagrams
         self.left_out = 0
 
     def __repr__(self) -> str:

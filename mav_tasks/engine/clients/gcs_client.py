@@ -1,4 +1,4 @@
-"""One client, which is one endpoint on a client link: what it was sent and what it requested."""
+"""One client: an endpoint on a client link, what it was sent and what it requested."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -53,7 +53,7 @@ class GcsClient:
         link, peer = outlet.link, outlet.peer
         #: link and endpoint, which identify the client
         self.key = (link, peer)
-        #: the endpoint in words
+        #: the endpoint as text
         self.endpoint = ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
         self.heard_at = now
         #: configured or connected: gets heartbeats before it has sent anything
@@ -239,7 +239,7 @@ class GcsClient:
         self.tell(text, MavSeverity.WARNING, source, now=now)
 
     def tell_what_was_left_out(self, *, now: float) -> None:
-        """Send one text for each source with the number of its texts that were dropped."""
+        """Send one text for each source: the number of its dropped texts."""
         while self.left_out and self._texts.take(now=now):
             source, count = self.left_out.popitem()
             self._say(f"{count} more messages: see the queue", MavSeverity.INFO, source)

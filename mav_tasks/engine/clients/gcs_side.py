@@ -24,7 +24,7 @@ from mav_tasks.services.command_receiver import is_stop
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 
-MAX_LINK_NUMBER = 255  # of its field in TASK_STATUS
+MAX_LINK_NUMBER = 255  # limit of its field in TASK_STATUS
 NEWCOMERS = 2.0  # new unsigned clients a second, on average; the burst is ``max_clients``
 CROWDED = 2  # beyond ``max_clients`` / CROWDED, clients heard only once are forgotten after SILENT
 SILENT = 3.0  # s, after which a new client may replace this one; heartbeats come each second
@@ -180,8 +180,8 @@ class GcsSide:
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet to every client that is to have it.
 
-        A packet with a target goes to that client alone: clients take an answer to another's
-        question for their own.
+        A packet with a target goes only to the clients there: a client takes an answer to
+        another's question for its own.
         """
         if packet.message_id not in m.TARGETED:
             for client in self.clients:
@@ -264,9 +264,9 @@ class GcsSide:
     ) -> GcsClient | None:
         """Add a client and return it, or None if too many are active. A STOP needs no room.
 
-        Without this limit a sender that keeps changing its endpoint would displace all clients, and
-        have telemetry sent to all its endpoints. Signed clients come first, because anybody can
-        pose as many unsigned ones.
+        Otherwise a sender that keeps changing its endpoint would displace all clients, and have
+        telemetry sent to all its endpoints. Signed clients come first: anybody can pose as many
+        unsigned ones.
         """
         if self._newcomers is None:
             most = float(self._settings.clients.max_clients)
@@ -286,7 +286,7 @@ class GcsSide:
         return clients > self._settings.clients.max_clients // CROWDED
 
     def _has_room(self, *, is_signed: bool = False, now: float) -> bool:
-        """Whether there is room for one more client; forget the longest silent one if need be."""
+        """Whether there is room for one more client; make room by forgetting a silent one."""
         if len(self._clients) < self._settings.clients.max_clients:
             return True
         others = [

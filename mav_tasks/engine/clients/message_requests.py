@@ -1,4 +1,4 @@
-"""Serves REQUEST_MESSAGE, and the commands and messages that set or show message intervals."""
+"""Serves REQUEST_MESSAGE and the requests about message intervals."""
 
 from math import isfinite
 
@@ -134,7 +134,7 @@ class MessageRequests:
         return True
 
     def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
-        """Send a task's TASK_STATUS to a client, without its queue position, which costs time."""
+        """Send a task's TASK_STATUS without its queue position, which takes time to compute."""
         task = self._registry.get(task_id)
         if task is not None:
             to = task.submitter.system_id, task.submitter.component_id

@@ -44,7 +44,7 @@ class _Wish(NamedTuple):
 
 
 class ParameterServer:
-    """The server of the parameter protocol, and of the settings that follow from parameters."""
+    """The server of the parameter protocol, and the settings that follow from it."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Sends clients what they get unasked: heartbeats, TASK_STATUS, texts, the vehicles that are there.
+"""Sends clients what they do not request each time: heartbeats, TASK_STATUS and texts.
 
 A TASK_STATUS with a final state is sent once that state is durable, so that it is never taken back,
 or after the time limit of the commit gate. A state that a client requests is sent at once.
@@ -39,7 +39,7 @@ class _Ended(NamedTuple):
 
 
 class Publisher:
-    """The sender of everything that clients do not request each time."""
+    """The sender of heartbeats, TASK_STATUS and texts to clients."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class Publisher:
                 client.introduce(heartbeat, last_seq=vehicle.last_seq)
 
     def withhold(self, packet: Packet) -> None:
-        """Note for every client that a vehicle's packet is not forwarded: no gap in its numbers."""
+        """Note for every client that a vehicle's packet is not forwarded: no gap shows."""
         for client in self._gcs.clients:
             client.outlet.withhold(packet.source)
 
@@ -127,7 +127,7 @@ class Publisher:
         return self._registry.is_awaited_at(client.outlet.link, client.endpoint)
 
     def _beat(self, *, now: float) -> None:
-        """Each second: send heartbeats, forget silent clients, update rates, send skipped texts."""
+        """Each second: heartbeats, message rates, dropped texts; forget silent clients."""
         self._gcs.forget_silent(awaits=self._awaits, now=now)
         self._rates.update(now=now)
         self._send_heartbeats(now=now)

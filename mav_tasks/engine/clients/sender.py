@@ -1,4 +1,4 @@
-"""What one MAVLink address at a client's endpoint has sent: commands, sequence numbers, copies."""
+"""What one MAVLink address at a client's endpoint has sent, and in which order."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -40,7 +40,7 @@ class Sender:
         is_anothers: bool = False,
         now: float,
     ) -> int | None:
-        """Return the halt epoch at which the first copy of a command came; None: this is the first.
+        """Return the halt epoch at which a command's first copy came, None if this is no copy.
 
         ``is_counted``: the packet itself says that it is a copy. ``is_anothers``: another sender
         has halted the vehicle. An identical packet is then a copy even if its sender seems to have

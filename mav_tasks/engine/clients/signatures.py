@@ -127,7 +127,7 @@ class Signatures:
         self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
 
     def change_keys(self, change: KeysChanged) -> set[str]:
-        """Replace the keys. Endpoints whose key was removed or changed are no longer signed for.
+        """Replace the keys. No longer sign for endpoints whose key was removed or changed.
 
         Return the names of keys that are no longer valid; at the first call, of revoked ones.
         """
@@ -199,10 +199,10 @@ class Signatures:
         there = self._links.get(link)
         return there is not None and there.takes_unsigned
 
-    # in
+    # incoming packets
 
     def admit(self, link: str, peer: Peer, packet: Packet) -> Key | None:
-        """Return the key that signed a packet of good CRC, or UNSIGNED; None to drop the packet."""
+        """Return the signing key of a packet of good CRC, or UNSIGNED; None to drop it."""
         there = self._links.get(link)
         if there is None:
             return UNSIGNED
@@ -289,7 +289,7 @@ class Signatures:
             times = self._times[fingerprint] = StreamTimes()
         return times
 
-    # out
+    # outgoing packets
 
     def sealed(self, link: str, peer: Peer, raw: bytes) -> bytes:
         """Return a packet as it leaves: signed, if its endpoint or link has a key."""
@@ -339,7 +339,7 @@ class Signatures:
         """Return the time for own signatures: never one that an earlier run used."""
         return max(self._clock(), self._from)
 
-    # kept
+    # timestamps for the store
 
     def take_times(self) -> SignaturesSeen | None:
         """Return the timestamps that are due to be stored, or None if it is not time yet."""
@@ -361,7 +361,7 @@ class Signatures:
 
 
 def _kept_within(link: _Link, packet: Packet) -> float:
-    """Return the seconds within which the timestamp of a packet must go to the store."""
+    """Return the seconds within which a packet's timestamp must go to the store."""
     if packet.message_id in HARMLESS or link.is_of_vehicles:
         return HARMLESS_WITHIN
     return STREAMED_WITHIN if packet.message_id in STREAMED else 0.0

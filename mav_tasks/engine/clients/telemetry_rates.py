@@ -1,7 +1,7 @@
 """The message intervals to request from each vehicle: what its clients want and its link carries.
 
-Computed each second from the present clients, without other state: the requests of a client end
-when it is gone, or so silent that it gets no telemetry any more.
+Computed each second from the present clients only: the requests of a client end when it is gone,
+or so silent that it gets no telemetry any more.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient

@@ -31,28 +31,28 @@ class Ability(NamedTuple):
 
     @property
     def why_no_turn(self) -> str:
-        """Reason, as text, why the vehicle does not turn while it stands."""
+        """Text: why it does not turn while it stands."""
         if self.turning is Turning.STEERED:
             return f"{self.rover} steers as a car and cannot turn on the spot"
         return f"{self.rover} does not turn on the spot, nor at a rate"
 
     @property
     def why_no_rate(self) -> str:
-        """Reason, as text, why the vehicle does not turn at a rate."""
+        """Text: why it does not turn at a rate."""
         if self.turning is Turning.STEERED:
             return f"{self.rover} is steered by course and does not turn at a rate"
         return self.why_no_turn
 
     @property
     def why_no_reverse(self) -> str:
-        """Reason, as text, why the vehicle does not drive backwards."""
+        """Text: why it does not reverse."""
         return f"{self.rover} does not reverse"
 
 
 def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[SingleGoal, str]:
-    """Return a goal as this vehicle drives it, and a text if that differs from the goal, else "".
+    """Return a goal as this vehicle drives it, and a text if that differs, or "".
 
-    Raise Rejection if the vehicle cannot drive it.
+    Raise Rejection if it cannot drive it.
     """
     if persona.honours_yaw_rate and persona.turning is Turning.ON_SPOT:
         return goal, ""  # it drives everything
@@ -86,7 +86,7 @@ def _turns_round(goal: SingleGoal, ability: Ability) -> bool:
 
 
 def driven_otherwise(wish: SingleGoal, ability: Ability) -> str:
-    """Return a text on how the driven goal differs from the requested one, "" if it does not."""
+    """Return a text on how a goal is driven differently than requested, or ""."""
     if _turns_round(wish, ability):
         return f"{ability.why_no_reverse}: it turns round, drives and turns back"
     if ability.turning is not Turning.STEERED or not isinstance(wish, GoTo) or wish.yaw is None:
@@ -106,7 +106,7 @@ def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
 
 
 def _check_course(goal: SingleGoal, ability: Ability) -> None:
-    """Raise Rejection for turn rates and reverse, which speed and course setpoints do not have."""
+    """Raise Rejection for a turn rate or reverse: setpoints of speed and course have neither."""
     match goal:
         case Rotate() | Face() if not ability.turns_on_spot:
             raise _cannot(ability.why_no_turn)

@@ -125,10 +125,10 @@ class Commands:
     ) -> None:
         """Answer a command for a rover that was not heard in this run.
 
-        REQUEST_MESSAGE is answered; task commands and DO_PAUSE_CONTINUE are refused, but not in the
-        first seconds, as the rover may be heard while a script still repeats its command. Without
-        any rover, the server itself answers a request for TASK_QUEUE_STATUS to system 0. All else
-        gets no answer: clients send to everyone, and it is for somebody else.
+        REQUEST_MESSAGE is answered. Task commands and DO_PAUSE_CONTINUE are refused, but not in the
+        first seconds: the rover may be heard while a script still repeats its command. Without a
+        rover the server answers requests for TASK_QUEUE_STATUS to system 0. All others get no
+        answer: clients send to everyone.
         """
         system_id, component = command.target
         tasks = self._vehicles.tasks_of_unheard(system_id)
@@ -250,7 +250,7 @@ class Commands:
             relay(asked, now=now)
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
-        """Raise Rejection for an observer's question that is too much for the link to the rover."""
+        """Raise Rejection if an observer's question is too much for the rover's link."""
         if asked.row.kind is Kind.QUESTION and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
             why_not = self._vehicles.links.why_not_asked(

@@ -111,7 +111,7 @@ class Forwarder:
 
 
 def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
-    """Return the text why a packet that a client may send does not go to a rover now."""
+    """Return why a packet that the client's role may send does not go to a rover now."""
     return why_not_sent(row, vehicle, client.key) or "not finite, or older than the server's pause"
 
 

@@ -79,7 +79,7 @@ def parse_command(
     priority: int = DEFAULT_PRIORITY,
     is_cruising: bool = False,
 ) -> ParsedCommand:
-    """Return a task command parsed. Raise Rejection that names a bad parameter.
+    """Return a parsed task command. Raise Rejection that names a bad parameter.
 
     ``priority`` and ``is_cruising`` are for standard commands, which cannot name them.
     """
@@ -144,7 +144,7 @@ def number(
     high: float,
     default: float | None = None,
 ) -> float:
-    """Return a parameter. Raise Rejection that names it if it is bad. NaN is "not given"."""
+    """Return a parameter, or raise Rejection that names it. NaN is "not given"."""
     value = command.params[index - 1]
     if low <= value <= high:
         return value
@@ -160,7 +160,7 @@ def number(
 def whole(
     command: Command, index: int, name: str, *, low: int = 0, high: int, default: int | None = 0
 ) -> int:
-    """Return a whole-number parameter. Raise Rejection that names it if it is bad.
+    """Return a whole-number parameter, or raise Rejection that names it.
 
     ``default`` None: it must be given.
     """

@@ -20,7 +20,7 @@ RC_IGNORED = (0, 65535)
 
 
 def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable, *, takes_over: bool = False) -> str:
-    """Return the text why a client's message may not go to a rover now, "" if it may.
+    """Return why a client's message may not go to a rover now, "" if it may.
 
     ``takes_over``: it also asks for the mode in which clients drive.
     """
@@ -57,7 +57,7 @@ def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> Non
 def passed(
     vehicle: Vehicle, client: Hashable, row: Row, message: m.Message | None, *, now: float
 ) -> None:
-    """Note a packet that is forwarded to the vehicle: its effect on the tasks."""
+    """Note the effect on the tasks of a packet that is forwarded to the vehicle."""
     if row.needs_grant:
         vehicle.motion_rights.passed(client, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):

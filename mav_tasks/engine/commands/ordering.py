@@ -33,10 +33,9 @@ def require_newer(asked: CommandRequest, *, now: float) -> None:
 
 
 def why_older(asked: CommandRequest, *, now: float) -> str:
-    """Return the text why a command is older than the last halt, "" if it is newer; remember it.
+    """Return why a command is older than the last halt, "" if it is newer; remember it.
 
-    Call this for each copy, also for one that is recognised in another way: the next copy is
-    recognised by it.
+    Call this for each copy, even one recognised in another way: the next copy is recognised by it.
     """
     halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
     is_old = asked.client.is_late
@@ -90,8 +89,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
 def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False, now: float) -> bool:
     """Return whether this command's sender sent it before its own last halt.
 
-    With ``anybodys`` the halt may be of any sender, and a command that may have been sent before it
-    counts.
+    With ``anybodys`` also whether it may have been sent before the last halt of any sender.
     """
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
     number = line.number_of(asked.packet.seq)

@@ -31,7 +31,7 @@ class _Asker(NamedTuple):
 
 
 def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
-    """Raise Rejection for a command that moves a stopped vehicle, or one that a task drives."""
+    """Raise Rejection if a command may not go to its vehicle now, else note its effect."""
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
     asked.rights.require(row.role, f"send command {number} to a rover")

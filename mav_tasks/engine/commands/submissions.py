@@ -1,4 +1,4 @@
-"""Submissions of tasks: deduplicated, queued, and acknowledged once they are durable."""
+"""Submissions of tasks: deduplicated, queued, and acknowledged once durable."""
 
 from collections.abc import Hashable
 from typing import NamedTuple
@@ -49,7 +49,7 @@ class Submitted(NamedTuple):
 
 
 class Submissions:
-    """The entry of all new tasks, and of the acknowledgements that wait for the store."""
+    """The entry of all new tasks, which are acknowledged once durable."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class Submissions:
         self.gate.within = settings.watch.commit
 
     def committed(self, through: int, *, now: float) -> None:
-        """Carry out what waited for the events up to ``through``; accept submissions again."""
+        """Carry out what waited for events up to ``through``; accept submissions again."""
         self._store_is_away = False
         self.gate.committed(through, now=now)
 
@@ -201,7 +201,7 @@ class Submissions:
             vehicle.tasks.withdraw(current, now=now)
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
-        """Note that a client halted a vehicle: its next equal request is no repeat."""
+        """Note that a client halted a vehicle: a return that it requests next is a new task."""
         self._deduplicator.held(submitter, vehicle.system_id)
 
     def _priority_of(self, submitter: Submitter) -> int:

@@ -87,7 +87,7 @@ class TaskControl:
             raise Rejection(R.NOT_FOUND, "no task is running")
         task = active if task_id == 0 and active is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "cancel")
-        if asked.client.is_late and task.state is TaskState.HELD:  # the next would start
+        if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
             words = f"it waited while the server stood still, and task {task.id} is held since"
             raise Rejection(R.STALE, words)
         asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)

@@ -316,7 +316,7 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
 
 
 def _words(task: Task, reason: TaskReason, says: str) -> str:
-    """Return a text of a task, its state and reason; ``says``: the vehicle's own text on it."""
+    """Return a task, its state and reason as text; ``says``: the vehicle's own text on it."""
     label = f" '{task.terms.label}'" if task.terms.label else ""
     words = f"{describe(task.goal)}{label}: {STATES[task.state]}"
     if not reason:

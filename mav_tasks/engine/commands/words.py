@@ -57,8 +57,8 @@ def halts_again(command: Command, persona: Persona, *, after: float) -> bool:
     """Whether a command is executed again when the same packet comes ``after`` so many seconds.
 
     Every halt is: some senders do not count their packets, so it may be a new command. TASK_CANCEL
-    by id is not, as it means one task. Without an id, and TASK_CLEAR, it is after REPEATED seconds,
-    when it means other tasks.
+    by id is not, as it means one task. TASK_CANCEL without an id and TASK_CLEAR are executed again
+    after REPEATED seconds, when they mean other tasks.
     """
     if command.command in OF_ONE_TASK:
         is_by_id = command.command == MavCmd.TASK_CANCEL and command.params[0] != 0.0

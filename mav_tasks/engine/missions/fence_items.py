@@ -31,7 +31,7 @@ CIRCLES = {
 
 
 def check_fence_item(item: Item, seq: int, *, count: int) -> None:
-    """Raise Rejection if an item of a fence is bad."""
+    """Raise Rejection if an item of a fence with ``count`` items is bad."""
     if item.command == MavCmd.NAV_FENCE_RETURN_POINT:
         _place(item)
     elif item.command in CORNERS:
@@ -55,7 +55,7 @@ def check_rally_item(item: Item, seq: int) -> None:
 
 
 def fence_of(items: Sequence[Item]) -> Fence:
-    """Return the fence of checked items. Raise Rejection if they make none."""
+    """Return the fence of checked items. Raise Rejection if they make no valid fence."""
     zones: list[Zone] = []
     seq = 0
     while seq < len(items):

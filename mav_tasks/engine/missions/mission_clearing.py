@@ -90,7 +90,7 @@ class MissionClearing:
         *,
         now: float,
     ) -> None:
-        """Clear one type after the other, on the vehicle first, then hold the answer."""
+        """Clear one type after the other, bounds on the vehicle first; then hold the answer."""
         actor = str(sender.address)
         if not kinds:
             task = (

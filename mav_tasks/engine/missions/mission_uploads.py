@@ -165,7 +165,7 @@ class MissionUploads:
         terms = replace(wanted.terms, is_staged=is_staged, is_cruising=is_staged)
         nonce = 0 if is_staged else wanted.nonce
         draft = self._draft(vehicle, wanted.plan, terms, sender, nonce=nonce)
-        # by the upload's begin: a long plan may take longer than submissions are remembered
+        # ``begun_at``: a long plan may come again later than submissions are remembered
         known = None
         if not is_staged:
             known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)

@@ -196,7 +196,7 @@ class Plans:
             raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
 
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
-        """Resume an active mission, with its queue; start a waiting one, also in a paused queue."""
+        """Resume an active mission and its queue; start a waiting one, even in a paused queue."""
         vehicle.joint.leave_manual(now=now)
         if task.state in ACTIVE:
             if vehicle.tasks.paused:

@@ -41,7 +41,7 @@ class Row:
     is_claimed: bool = False
     #: may change more than motion: the rover's limits, its software, its position estimate
     is_bound: bool = False
-    #: counts as a request; otherwise only the flood gate limits its rate
+    #: counts as a request; otherwise its rate is limited only before parsing
     is_counted: bool = True
     #: its row where the server does not handle it: for another component, or not claimed
     elsewhere: "Row | None" = None
