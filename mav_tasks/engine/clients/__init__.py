@@ -1,1 +1,1 @@
-"""Who is on a client link, what they may do, and what they are shown."""
+"""The clients: their links, keys and rights, and what the server sends to them."""

@@ -1,9 +1,9 @@
-"""Messages to target_system 0, which every stock autopilot takes for its own: one for each rover.
+"""Copies a message to target_system 0 for each rover: every stock autopilot accepts 0 as its own.
 
-Each rover then sees to its copy, and answers it, as if its own id had been named; DroneKit, for
-one, sends 0. MAVLink guide, "Packet Routing". What is only passed on (parameters, setpoints) goes
-to all rovers as it came, and STOP to all at once. Task commands name their rover: ids of tasks and
-of rovers mean nothing to a crowd.
+Each copy is processed and answered as if it named its rover; DroneKit, for one, sends 0. MAVLink
+guide, "Packet Routing". Messages that are only forwarded (parameters, setpoints) go to all rovers
+unchanged, and STOP to all at once. Other task commands must name their rover: a task id belongs to
+one rover.
 """
 
 from copy import copy
@@ -21,14 +21,14 @@ EVERYBODY = 0  # target_system and target_component
 
 
 class Broadcasts:
-    """Turns a message to every rover into one to each."""
+    """The copier of messages to all rovers."""
 
     def __init__(self, vehicles: VehicleSide, packer: Packer) -> None:
         self._vehicles = vehicles
         self._packer = packer
 
     def addressed(self, received: Received) -> list[Received]:
-        """Return a copy of a client's packet for each rover; it alone if none is to answer it."""
+        """Return a copy of a client's packet for each rover; only the packet if none answers it."""
         if not _is_to_be_answered(received.message):
             return [received]
         unheard = (tasks.vehicle for tasks in self._vehicles.unheard)
@@ -36,8 +36,8 @@ class Broadcasts:
         return [self._copy(received, system_id) for system_id in ids] or [received]
 
     def _copy(self, received: Received, system_id: int) -> Received:
-        """Return what a client sent to everybody as if it had named this rover's autopilot."""
-        message: Any = copy(received.message)  # of several classes, whose fields have these names
+        """Return a client's packet with this rover's autopilot as its target."""
+        message: Any = copy(received.message)  # one of several classes with these fields
         message.target_system = system_id
         if getattr(message, "target_component", AUTOPILOT) == EVERYBODY:
             message.target_component = AUTOPILOT
@@ -47,7 +47,7 @@ class Broadcasts:
 
 
 def _is_to_be_answered(message: m.Message | None) -> bool:
-    """Whether a message is of a kind that each rover is to answer."""
+    """Whether each rover is to answer a message of this kind."""
     if isinstance(message, m.CommandLong | m.CommandInt):
         return not is_task_command(message.command)
     return isinstance(message, (m.SetMode, *MISSION_MESSAGES))

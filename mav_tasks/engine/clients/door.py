@@ -1,12 +1,12 @@
-"""What of a client's packets is seen to: none of a borrowed address, and not too many requests.
+"""Drops client packets with a borrowed source address, and requests above the rate limit.
 
-Who calls itself the server, or a rover, is heeded by nobody, whatever it sends: a loop in the net
-does so, or somebody who hides; a command of theirs is denied, so that a station that is set up so
-says why nothing happens. STOP alone comes in from anybody, and is never too many.
+Packets from the address of the server or of a rover are dropped: they come from a loop in the
+network, or from a client that hides. A command from there is denied, so that a misconfigured ground
+station shows why nothing happens. STOP is accepted from any address, and is never rate-limited.
 
-What belongs to a transfer that is under way is asked for, and not counted; nor is what says that
-somebody is there, or drives by hand: its rate is bounded where it comes in. But all that goes on to
-a rover is counted of who may only look: its way there may be narrow.
+Packets of a transfer under way, heartbeats and manual control are not counted: their rate is
+limited before parsing. From a client below operator, every message that an observer may send is
+counted, because the link to the rover may be slow.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -25,18 +25,18 @@ from mav_tasks.tasks.lifecycle import TaskReason
 
 
 class Door:
-    """Counts requests, and answers what is one too many; turns borrowed addresses away."""
+    """The check of each client packet: its source address and the client's request rate."""
 
     def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
         self._refusals = refusals
         self._vehicles = vehicles
-        #: requests that were too many
+        #: requests dropped because they were too many
         self.left_out = 0
 
     def may_pass(
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> bool:
-        """Whether a client's packet is seen to; a command is told if it is not."""
+        """Whether a client's packet is processed; the sender of a refused command is told."""
         if is_stop(message):
             return True
         if self._is_ours(packet.source):
@@ -52,7 +52,7 @@ class Door:
         return False
 
     def _is_ours(self, source: Address) -> bool:
-        """Whether a packet says that it is of the server or of a rover; it is of neither."""
+        """Whether a client's packet names an address of the server or of a rover as its own."""
         vehicle = self._vehicles.look_at(source.system_id)
         return source == self._vehicles.our_address or (
             vehicle is not None
@@ -63,7 +63,7 @@ class Door:
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
         if message is None or row_of(packet.message_id, message).kind is Kind.TELL:
-            return  # noise may look like it, and nobody waits for what comes of a heartbeat
+            return  # noise may look so, and nobody waits for an answer to a heartbeat
         words = f"{packet.source} is an address of the server or of a rover"
         refusal = Rejection(TaskReason.NOT_ALLOWED, words)
         if isinstance(message, m.CommandLong | m.CommandInt):

@@ -1,7 +1,7 @@
-"""What of a flood of datagrams is looked at: so much of each client, a little of all strangers.
+"""Limits the datagrams that are parsed: a rate for each client, one for all strangers together.
 
-It decides by nothing but who sends, and how much, before anything is read: to read costs more. Of
-what is too much STOPs are let in, alone.
+It decides by sender and size alone, before parsing, which costs more. From datagrams above the
+limit only STOP packets are let in.
 """
 
 import re
@@ -15,21 +15,21 @@ from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Clients
 
 _NUMBER = re.escape(int(MavCmd.TASK_STOP).to_bytes(2, "little"))
-#: how a STOP begins, MAVLink 1 or 2: COMMAND_INT or COMMAND_LONG, with the number at its place
+#: the start of a STOP, MAVLink 1 or 2: COMMAND_INT or COMMAND_LONG, with its command number
 _STOP = re.compile(
     rb"\xfe.{4}[\x4b\x4c].{28}" + _NUMBER + rb"|\xfd.{6}[\x4b\x4c]\0\0.{28}" + _NUMBER, re.DOTALL
 )
-STRANGERS = 500.0  # datagrams a second, of all together who are no clients
+STRANGERS = 500.0  # datagrams a second, of all senders together that are no clients
 MOST_BUCKETS = 1024
-MOST_STOPS = 16  # of one datagram: routers put several packets into one
-WITHIN = 1.0  # s, of which the rate may come at once
-SIZE = 64  # bytes that count as one more datagram: many packets may be in one
+MOST_STOPS = 16  # from one datagram: routers put several packets into one
+WITHIN = 1.0  # s, whose datagrams may come in one burst
+SIZE = 64  # each so many bytes count as one more datagram, as many packets may be in one
 
 Datagrams = Sequence[tuple[Peer, bytes]]
 
 
 class FloodGates:
-    """The gates of all links of datagrams on which clients are."""
+    """The gates of all datagram links of clients."""
 
     def __init__(self, *, is_client: Callable[[str, Peer], bool], settings: Clients) -> None:
         self._is_client = is_client
@@ -41,7 +41,7 @@ class FloodGates:
 
     @property
     def left_out(self) -> int:
-        """Datagrams that were not looked at."""
+        """Count of dropped datagrams."""
         return sum(gate.left_out for gate in self._gates.values())
 
     def apply(self, settings: Clients) -> None:
@@ -51,7 +51,7 @@ class FloodGates:
             gate.apply(rate=self._rate)
 
     def change_link(self, change: LinkChanged) -> None:
-        """Guard a link, or no more. Who sends too much on a stream waits by itself."""
+        """Add or remove the gate of a link. Stream links need none: they have backpressure."""
         link = change.link
         self._gates.pop(link, None)
         if change.up and change.side is LinkSide.CLIENTS and not change.is_stream:
@@ -60,7 +60,7 @@ class FloodGates:
             )
 
     def let_in(self, item: Packets, *, now: float) -> Packets:
-        """Return what is looked at of what came in."""
+        """Return the datagrams within the limit, and the STOPs of the others."""
         gate = self._gates.get(item.link)
         if gate is None:
             return item
@@ -76,7 +76,7 @@ class FloodGates:
 
 
 def stops_in(data: bytes) -> bytes:
-    """Return what of a datagram looks like STOPs, one after the other; b"" if nothing does."""
+    """Return the joined parts of a datagram that look like STOP packets, or b""."""
     found = islice(_STOP.finditer(data), MOST_STOPS)
     return b"".join(_packet_at(data, each.start()) for each in found)
 
@@ -90,26 +90,26 @@ def _packet_at(data: bytes, start: int) -> bytes:
 
 
 class FloodGate:
-    """The gate of one link of datagrams."""
+    """The gate of one datagram link."""
 
     def __init__(self, *, rate: float, is_known: Callable[[Peer], bool]) -> None:
         self._rate = rate
         self._is_known = is_known
         self._buckets: dict[Peer, TokenBucket] = {}
         self._strangers: TokenBucket | None = None
-        #: datagrams that were not looked at
+        #: count of dropped datagrams
         self.left_out = 0
 
     def __repr__(self) -> str:
         return f"FloodGate({len(self._buckets)} clients, {self.left_out} left out)"
 
     def apply(self, *, rate: float) -> None:
-        """Take another rate of each client, in datagrams a second."""
+        """Take a new rate for each client, in datagrams a second."""
         self._rate = rate
         self._buckets.clear()
 
     def let_in(self, datagrams: Datagrams, *, now: float) -> Datagrams:
-        """Return those that are looked at: the very same, where all are."""
+        """Return the datagrams within the limit: the same object if all are."""
         buckets = self._buckets
         let_in: list[tuple[Peer, bytes]] = []
         left_out = 0

@@ -1,4 +1,4 @@
-"""One client: an endpoint on a client link. What it has been shown, and what it asked for."""
+"""One client: an endpoint on a client link, what it was sent and what it requested."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -20,23 +20,23 @@ from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
 
-AT_ONCE = 5.0  # s, of which the requests may come in a moment: a script queues a day's work
+AT_ONCE = 5.0  # s, whose requests may come in one burst: a script queues a day's work
 REFUSALS = 20.0  # a second
-#: s in which one refusal is said once: QGroundControl asks three times for a mode, 1.3 s apart, and
-#: sends one "go to" in two messages
+#: s for which a refusal is not repeated: QGroundControl asks three times for a mode, 1.3 s apart,
+#: and sends one "go to" in two messages
 REFUSAL_EACH = 5.0
 MAX_REFUSALS_TOLD = 64
-BACK_AFTER = 3.5  # s of silence, after which a ground station may be another run of it
-OLD = 0.5  # s; what lay here for longer may have been sent before anything that came since
-MAX_FOLLOWED = 1000  # tasks of others that one client is told about
+BACK_AFTER = 3.5  # s of silence, after which a ground station may have been restarted
+OLD = 0.5  # s; a packet that lay here longer may be older than packets that came since
+MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
-MAX_SENDERS = 32  # of which it is remembered what they have sent: there may be a router
+MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
 
 Nonces = dict[Address, OrderedDict[int, Pending]]
 
 
 class GcsClient:
-    """One endpoint that listens, and perhaps commands."""
+    """One endpoint that receives telemetry, and perhaps sends commands."""
 
     def __init__(
         self,
@@ -48,53 +48,53 @@ class GcsClient:
         is_connected: bool,
         now: float,
     ) -> None:
-        """``wake`` is called with the time at which it is to be told of a task."""
+        """``wake`` is called with the time at which the next TASK_STATUS is due."""
         self.outlet = outlet
         link, peer = outlet.link, outlet.peer
-        #: what tells clients apart: link and endpoint
+        #: link and endpoint, which identify the client
         self.key = (link, peer)
-        #: the endpoint in words
+        #: the endpoint as text
         self.endpoint = ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
         self.heard_at = now
-        #: spoken to before it was heard: gets heartbeats until it answers
+        #: configured or connected: gets heartbeats before it has sent anything
         self.is_configured = is_configured
-        #: on a stream, whose link tells when it is gone: may be silent for as long as it likes
+        #: on a stream link, which reports when it is gone: may be silent for any time
         self.is_connected = is_connected
         self.is_heard = False
-        #: heard once, and perhaps never again
+        #: heard at most once so far
         self.is_passing = True
-        #: one of many who came at about the same time: gets heartbeats only until it says more
+        #: added while many clients were: gets only heartbeats until it is heard a second time
         self.is_one_of_many = False
-        #: with which the packet in hand was signed, or the last one
+        #: key of the packet in hand, or of the last one
         self.signed_by = UNSIGNED
-        #: s, for which the packet in hand may have lain here before it was read
+        #: s that the packet in hand may have lain here before it was read
         self.waited = 0.0
-        #: the address that the packet in hand names as its own
+        #: source address of the packet in hand
         self.source: Address | None = None
-        #: who sent it, and what he may do
+        #: its submitter, and what that submitter may do
         self.who = Submitter(link, self.endpoint, 0, 0)
         self.rights = NOTHING
-        self._addresses: dict[Address, None] = {}  # seen here, the latest last
-        #: has used our dialect: gets TASK_STATUS
+        self._addresses: dict[Address, None] = {}  # addresses seen here, the latest last
+        #: whether it has used our dialect: it gets TASK_STATUS then
         self.uses_dialect = False
         self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
         self.thinner = StreamRateLimiter(default_interval=settings.stream_interval)
         self.statuses = TaskStatusSender(rate=settings.status_rate, wake=wake, now=now)
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0
-        self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by who said it
-        #: texts that were too many, by who said them
+        self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by source and text
+        #: counts of texts above the rate limit, by source
         self.left_out: dict[Address, int] = {}
-        #: the vehicles of whose autopilots it has seen a heartbeat
+        #: vehicles whose autopilot's heartbeat it was sent
         self.introduced: set[int] = set()
-        self._informed: set[int] = set()  # of which vehicles' tasks it was told since it came
-        self.listed_at: dict[int, float] = {}  # by system id, when it was sent all parameters
+        self._informed: set[int] = set()  # vehicles whose summary it was sent since it came
+        self.listed_at: dict[int, float] = {}  # by system id, when it was last sent all parameters
         self._submitters: dict[
             tuple[Address, str], Submitter
-        ] = {}  # made once: each command asks for it
-        #: what of its requests is taken in, and what of its refusals is told
+        ] = {}  # cached: each command needs one
+        #: limit of its requests; ``_refusals`` limits the refusals that are told
         self.requests = TokenBucket(rate=0.0, burst=0.0, now=now)
-        self._requests_of: dict[str, TokenBucket] = {}  # by role: who signs otherwise has another
+        self._requests_of: dict[str, TokenBucket] = {}  # by role: the key may change
         self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS, now=now)
         self._senders: dict[Address, Sender] = {}
 
@@ -110,11 +110,11 @@ class GcsClient:
 
     @property
     def is_late(self) -> bool:
-        """Whether the packet in hand has waited while the server stood still."""
+        """Whether the packet in hand waited while the server was stalled."""
         return self.waited > OLD
 
     def submitter(self, source: Address) -> Submitter:
-        """Return who submits when a packet of ``source`` comes from here."""
+        """Return the submitter for packets of ``source`` from this endpoint."""
         submitter = self._submitters.get((source, self.signed_by.name))
         if submitter is None:
             if len(self._submitters) >= MAX_ADDRESSES:
@@ -124,7 +124,7 @@ class GcsClient:
         return submitter
 
     def take_rights(self, rights: Rights, *, now: float) -> None:
-        """From here on it may do this."""
+        """Set the client's rights, and the rate limit of its role."""
         self.rights, rate = rights, rights.limits.rate
         bucket = self._requests_of.get(rights.role)
         if bucket is None or bucket.rate != rate:
@@ -133,7 +133,7 @@ class GcsClient:
         self.requests = bucket
 
     def may_be_refused(self, *, now: float) -> bool:
-        """Whether one more refusal is told to it, and kept, now: a flood of them is not."""
+        """Whether one more refusal may be told and recorded now; a flood of them is not."""
         return self._refusals.take(now=now)
 
     def submitted(self, task: Task) -> bool:
@@ -142,18 +142,18 @@ class GcsClient:
         return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
 
     def follow(self, task_id: int) -> None:
-        """It has asked about a task: have it told of each change from now on."""
+        """Send the client each change of this task from now on."""
         self._followed.pop(task_id, None)
         self._followed[task_id] = None
         if len(self._followed) > MAX_FOLLOWED:
             del self._followed[next(iter(self._followed))]
 
     def follows(self, task_id: int) -> bool:
-        """Whether it has asked about a task."""
+        """Whether the client has asked about this task."""
         return task_id in self._followed
 
     def sender(self, source: Address) -> Sender:
-        """Return the memory of what one address at this endpoint has sent."""
+        """Return the ``Sender`` of one address at this endpoint."""
         sender = self._senders.get(source)
         if sender is None:
             if len(self._senders) >= MAX_SENDERS:
@@ -162,7 +162,7 @@ class GcsClient:
         return sender
 
     def heard(self, packet: Packet, *, now: float) -> None:
-        """Note that a packet came from here."""
+        """Note a packet from this client."""
         source = packet.source
         sender = self._senders.get(source) or self.sender(source)
         sender.line.place(packet.seq, now=now)
@@ -178,30 +178,30 @@ class GcsClient:
             self._addresses[source] = None
 
     def is_reached_by(self, target: Address) -> bool:
-        """Whether a message for this target is for somebody here."""
+        """Whether a message for this target reaches an address at this endpoint."""
         return any(target.reaches(address) for address in self._addresses)
 
     def answer(self, answer: Answer, to: Address) -> None:
-        """Send the COMMAND_ACK of a command that ``to`` at this endpoint sent."""
+        """Send a COMMAND_ACK to the address ``to`` at this endpoint."""
         self.outlet.send(answer.ack(to), answer.source)
 
     def is_to_be_informed(self, system_id: int) -> bool:
-        """Whether it is new to a vehicle that it knows, or back; asked once, it is informed."""
+        """Whether the client has missed this vehicle's summary. Counts as sent after this call."""
         if system_id in self._informed:
             return False
         self._informed.add(system_id)
         return True
 
     def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
-        """Show a vehicle by its latest heartbeat, before anything else of its system.
+        """Send a vehicle's latest heartbeat, before anything else of its system.
 
-        ``last_seq`` is the number of the autopilot's last packet: the one after it follows on.
+        ``last_seq`` is the number of the autopilot's last packet, so that the next one follows on.
         """
         self.introduced.add(heartbeat.system_id)
         self.outlet.forward(heartbeat._replace(seq=last_seq))
 
     def forward(self, packet: Packet, *, now: float) -> None:
-        """Pass a vehicle's packet on, unless it is one too many of its stream."""
+        """Forward a vehicle's packet, unless its stream is above this client's rate."""
         system_id = packet.system_id
         if system_id not in self.introduced:
             if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
@@ -216,7 +216,7 @@ class GcsClient:
             self.outlet.withhold(packet.source)
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
-        """Send a STATUSTEXT of a vehicle's task server, unless there were too many."""
+        """Send a STATUSTEXT of a vehicle's task server; one below WARNING within the rate limit."""
         is_known = source.system_id in self.introduced or self.uses_dialect
         if not self.is_heard or not is_known:
             return
@@ -226,8 +226,8 @@ class GcsClient:
         self._say(text, severity, source)
 
     def tell_refusal(self, text: str, source: Address, *, now: float) -> None:
-        """Say why something was refused; to a ground station that tries again and again, once."""
-        if self.uses_dialect:  # a script has its words with each refusal
+        """Send the reason of a refusal; to a ground station that keeps trying, only once."""
+        if self.uses_dialect:  # a script gets the text of each refusal
             self.tell(text, MavSeverity.WARNING, source, now=now)
             return
         said_at = self._refusals_told.get((source, text), -inf)
@@ -239,7 +239,7 @@ class GcsClient:
         self.tell(text, MavSeverity.WARNING, source, now=now)
 
     def tell_what_was_left_out(self, *, now: float) -> None:
-        """Say how many texts were too many, in one for each who said them."""
+        """Send one text for each source: the number of its dropped texts."""
         while self.left_out and self._texts.take(now=now):
             source, count = self.left_out.popitem()
             self._say(f"{count} more messages: see the queue", MavSeverity.INFO, source)

@@ -1,7 +1,7 @@
-"""All clients and the links to them: who is there, what they are shown and told.
+"""The client links and the clients on them, by link and endpoint.
 
-Any bytes may come in here; only a packet with a good CRC makes its sender a client. What a client
-wants is given back as a value; the engine sees to it.
+Any bytes may come in here; only a packet with a good CRC makes its sender a client. ``receive``
+returns a client's packet as a value; the engine acts on it.
 """
 
 from collections.abc import Callable
@@ -24,16 +24,16 @@ from mav_tasks.services.command_receiver import is_stop
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 
-MAX_LINK_NUMBER = 255  # of its field in TASK_STATUS
-NEWCOMERS = 2.0  # a second in the long run, as many at once as there may be
-CROWDED = 2  # this part of all places being taken, who was heard once only is not waited for
-SILENT = 3.0  # s, after which a client may be forgotten for another; heartbeats come each second
+MAX_LINK_NUMBER = 255  # limit of its field in TASK_STATUS
+NEWCOMERS = 2.0  # new unsigned clients a second, on average; the burst is ``max_clients``
+CROWDED = 2  # beyond ``max_clients`` / CROWDED, clients heard only once are forgotten after SILENT
+SILENT = 3.0  # s, after which a new client may replace this one; heartbeats come each second
 
 
 class Received(NamedTuple):
-    """A packet of a client. ``message`` is None when its id is not in the dialect.
+    """A packet of a client. ``message`` is None if its id is not in the dialect.
 
-    ``waited``: for so many seconds it may have lain here before it was read.
+    ``waited``: seconds that it may have lain on this machine before it was read.
     """
 
     client: GcsClient
@@ -55,7 +55,7 @@ class GcsSide:
         statuses: Timer,
         settings: Settings,
     ) -> None:
-        """``statuses`` comes when a client is to be told of a task."""
+        """``statuses`` fires when a TASK_STATUS to a client is due."""
         self._queue = queue
         self._packer = packer
         self._signatures = signatures
@@ -65,26 +65,26 @@ class GcsSide:
         #: the client links, by name
         self.links: set[str] = set()
         self._newcomers: TokenBucket | None = None
-        #: packets of strangers for whom there was no room
+        #: packets of unknown senders for which there was no room
         self.turned_away = 0
-        #: of the client links that have been there in this run, from 1
+        #: number of each client link of this run, from 1
         self.link_numbers: dict[str, int] = {}
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
-        #: all that are there
+        #: all clients
         self.clients = self._clients.values()
-        #: gives a client by its key, if it is still there
+        #: return a client by its key, None if it is gone
         self.client = self._clients.get
-        #: what came in on these links
+        #: counts of what came in on these links
         self.counts = self._decoder.counts
         self._statuses = statuses
 
     def plan_statuses(self) -> None:
-        """Have the statuses that are to be told next come when they are due."""
+        """Set the timer to the next TASK_STATUS that is due."""
         due = [client.statuses.next_deadline() for client in self.clients]
         self._statuses.set(min(due, default=inf))
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
-        """Take a link into use, or out of it."""
+        """Add a link that came up, remove one that went down."""
         if not change.up:
             self.links.discard(change.link)
             for key in [key for key in self._clients if key[0] == change.link]:
@@ -97,14 +97,14 @@ class GcsSide:
             self._add(change.link, peer, is_configured=True, now=now)
 
     def change_peer(self, change: PeerChanged, *, now: float) -> None:
-        """Speak to who has come, forget who is gone."""
+        """Add a connection of a stream link, or remove it when it is closed."""
         self._remove((change.link, change.peer))
         self._signatures.forget(change.link, change.peer)
         if change.up and change.link in self.links:
             self._add(change.link, change.peer, is_configured=True, is_connected=True, now=now)
 
     def note_congestion(self, change: Congestion, *, now: float) -> None:
-        """Keep telemetry from a way out that does not take it."""
+        """Hold back telemetry to an endpoint that is congested."""
         client = self._clients.get((change.link, change.peer))
         if client is not None:
             client.thinner.backoff.note(change.is_congested, now=now)
@@ -120,9 +120,9 @@ class GcsSide:
             client.take_rights(rights, now=client.heard_at)
 
     def forget_unknown(self) -> list[tuple[str, Peer]]:
-        """Forget who has signed with a key that counts no more; who is spoken to is unheard.
+        """Forget clients whose key is no longer valid; configured ones become unheard.
 
-        Gives where they were.
+        Return their links and endpoints.
         """
         unknown = [
             (key, client)
@@ -134,13 +134,13 @@ class GcsSide:
         return [key for key, _ in unknown]
 
     def has(self, link: str, peer: Peer) -> bool:
-        """Whether an endpoint is a client's."""
+        """Whether a client is at this endpoint."""
         return (link, peer) in self._clients
 
     def receive(
         self, link: str, peer: Peer, packet: Packet, *, waited: float = 0.0, now: float
     ) -> Received | None:
-        """Take a packet in; None if it means nothing."""
+        """Return a client's packet, decoded; None if it is to be ignored."""
         message = None
         if packet.message_id in m.ALL:
             message = self._decoder.decode(packet)
@@ -153,7 +153,7 @@ class GcsSide:
             return None
         client = self._clients.get((link, peer))
         if client is None:
-            if message is None:  # unverified bytes make nobody a client
+            if message is None:  # bytes without a checked CRC make no client
                 return None
             is_signed = key is not UNSIGNED
             client = self._admit(link, peer, message, is_signed=is_signed, now=now)
@@ -167,21 +167,21 @@ class GcsSide:
         return Received(client, packet, message, key, waited)
 
     def hear_out(self, received: Received, *, now: float) -> None:
-        """Have a client be again who it was when it sent this packet, of several at one moment."""
+        """Restore a client's address, key and rights of this packet, one of several in a batch."""
         received.client.waited = received.waited
         self._know(received.client, received.packet.source, received.key, now=now)
 
     def _know(self, client: GcsClient, source: Address, key: Key, *, now: float) -> None:
-        """Let it count for a client who sends from this address of its, and signs with this key."""
+        """Set the address and key of a client's packet in hand, and the rights that follow."""
         client.source, client.signed_by = source, key
         client.who = client.submitter(source)
         client.take_rights(self._rights.of(key, client.who), now=now)
 
     def forward(self, packet: Packet, *, now: float) -> None:
-        """Show a vehicle's packet to every client that is to have it.
+        """Forward a vehicle's packet to every client that is to have it.
 
-        One that names whom it is for goes to nobody else: clients take an answer to another's
-        question for their own.
+        A packet with a target goes only to the clients there: a client takes an answer to
+        another's question for its own.
         """
         if packet.message_id not in m.TARGETED:
             for client in self.clients:
@@ -198,7 +198,7 @@ class GcsSide:
                 client.outlet.withhold(packet.source)
 
     def continue_numbers(self, packet: Packet) -> None:
-        """Let this packet follow on the last one of its source towards every client."""
+        """Continue the sequence numbers of this packet's source, to every client."""
         for client in self.clients:
             client.outlet.continue_numbers(packet)
 
@@ -210,7 +210,7 @@ class GcsSide:
     def forget_silent(self, *, awaits: Callable[[GcsClient], bool], now: float) -> None:
         """Drop clients that have been silent for long; configured ones become unheard again.
 
-        Who awaits the end of a task is told of it, however long it takes.
+        ``awaits``: whether a client waits for the end of a task; it is kept, however long it takes.
         """
         limits = self._settings.clients
         clients = list(self._clients.items())
@@ -240,7 +240,7 @@ class GcsSide:
     def _add(
         self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
     ) -> GcsClient:
-        self._has_room(now=now)  # who is configured, or has dialled, always has
+        self._has_room(now=now)  # a configured or connected client is added even if there is none
         client = self._new(
             link, peer, is_configured=is_configured, is_connected=is_connected, now=now
         )
@@ -262,10 +262,11 @@ class GcsSide:
     def _admit(
         self, link: str, peer: Peer, message: m.Message, *, is_signed: bool, now: float
     ) -> GcsClient | None:
-        """Make somebody a client, unless there are many who are not silent; STOP alone needs none.
+        """Add a client and return it, or None if too many are active. A STOP needs no room.
 
-        Or else whoever sends from ever other places would drive everybody out, and have telemetry
-        sent to all those places. Who signs comes before who does not: anybody can be many of those.
+        Otherwise a sender that keeps changing its endpoint would displace all clients, and have
+        telemetry sent to all its endpoints. Signed clients come first: anybody can pose as many
+        unsigned ones.
         """
         if self._newcomers is None:
             most = float(self._settings.clients.max_clients)
@@ -285,7 +286,7 @@ class GcsSide:
         return clients > self._settings.clients.max_clients // CROWDED
 
     def _has_room(self, *, is_signed: bool = False, now: float) -> bool:
-        """Whether one more may be remembered; forgets who has been silent the longest for that."""
+        """Whether there is room for one more client; make room by forgetting a silent one."""
         if len(self._clients) < self._settings.clients.max_clients:
             return True
         others = [

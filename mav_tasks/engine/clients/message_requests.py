@@ -1,4 +1,4 @@
-"""What a client is shown because it asks: messages on request, and the rates of streams."""
+"""Serves REQUEST_MESSAGE and the requests about message intervals."""
 
 from math import isfinite
 
@@ -23,13 +23,13 @@ R = TaskReason
 
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
 EVERYBODY = Address(0, 0)
-NO_INTERVAL = -1  # of MESSAGE_INTERVAL: it is not sent
-PAGE = 16  # waiting, or finished, tasks that one request shows
-MAX_INTERVAL_ID = 0xFFFF  # of the field that MESSAGE_INTERVAL has for it
+NO_INTERVAL = -1  # of MESSAGE_INTERVAL: the message is not sent
+PAGE = 16  # waiting or finished tasks that one request returns
+MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 
 
 class MessageRequests:
-    """Answers to REQUEST_MESSAGE and to the commands about intervals."""
+    """The handler of REQUEST_MESSAGE and of message intervals."""
 
     def __init__(self, gcs: GcsSide, vehicles: VehicleSide, registry: TaskRegistry) -> None:
         self._gcs = gcs
@@ -37,7 +37,7 @@ class MessageRequests:
         self._registry = registry
 
     def set_interval(self, asked: CommandRequest, *, now: float) -> None:
-        """SET_MESSAGE_INTERVAL: thin for this client; see ``TelemetryRates`` for what comes."""
+        """SET_MESSAGE_INTERVAL: set this client's rate; ``TelemetryRates`` asks the rover."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         message_id, interval_us = translate.message_id_of(command), command.params[1]
         if message_id < 0:
@@ -53,7 +53,7 @@ class MessageRequests:
         client.thinner.set_interval(vehicle.system_id, message_id, interval_us, commands=commands)
 
     def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
-        """REQUEST_DATA_STREAM: as SET_MESSAGE_INTERVAL for each message of the group."""
+        """REQUEST_DATA_STREAM: set the interval of each message of the group."""
         rate = message.req_message_rate if message.start_stop else 0
         commands = client.rights.reach(SUBMITTER)
         for vehicle in self._vehicles.addressed_by(message.target_system):
@@ -62,7 +62,7 @@ class MessageRequests:
             )
 
     def show_interval(self, asked: CommandRequest) -> None:
-        """GET_MESSAGE_INTERVAL: what this client gets."""
+        """GET_MESSAGE_INTERVAL: send the interval at which this client gets a message."""
         message_id = translate.message_id_of(asked.command)
         if not 0 <= message_id <= MAX_INTERVAL_ID:
             words = f"param1 message id {asked.command.params[0]:g} not in 0..{MAX_INTERVAL_ID}"
@@ -76,7 +76,7 @@ class MessageRequests:
         asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
 
     def show(self, asked: CommandRequest, *, now: float) -> bool:
-        """REQUEST_MESSAGE for what the server itself can show; whether it can."""
+        """REQUEST_MESSAGE: send a message of the server itself. Return False if it is not one."""
         client, vehicle = asked.client, asked.vehicle
         match translate.message_id_of(asked.command):
             case m.TaskStatus.id:
@@ -106,7 +106,7 @@ class MessageRequests:
         *,
         now: float,
     ) -> bool:
-        """REQUEST_MESSAGE about a rover that was not heard in this run; whether it is shown."""
+        """REQUEST_MESSAGE about a rover not heard in this run. Return False if it is not for us."""
         client.uses_dialect = True
         match translate.message_id_of(command):
             case m.TaskQueueStatus.id:
@@ -127,14 +127,14 @@ class MessageRequests:
                         forecast=forecast,
                         now=now,
                     )
-            case m.TaskTiming.id:  # it needs the rate of the rover's setpoints
+            case m.TaskTiming.id:  # needs the rover's setpoint rate
                 raise Rejection(R.VEHICLE_SILENT, f"rover {tasks.vehicle} was not heard yet")
             case _:
                 return False
         return True
 
     def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
-        """Send a task's TASK_STATUS to a client that listens, without the cost of its position."""
+        """Send a task's TASK_STATUS without its queue position, which takes time to compute."""
         task = self._registry.get(task_id)
         if task is not None:
             to = task.submitter.system_id, task.submitter.component_id
@@ -152,7 +152,7 @@ class MessageRequests:
     ) -> None:
         """Send a task's TASK_STATUS, from the task server of its vehicle.
 
-        ``is_full``: with what is known of its place in the queue, and of its times.
+        ``is_full``: with its queue position and estimated times.
         """
         vehicle = self._vehicles.look_at(task.vehicle)
         if vehicle is not None:
@@ -222,7 +222,7 @@ class MessageRequests:
         self._send_status(client, task, reader=reader, now=now)
 
     def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
-        """Return the tasks that a request without a task id is about: what waits, or is over."""
+        """Return the waiting or finished tasks for a request without a task id."""
         first = max(0, translate.first_index_of(command))
         if translate.is_of_finished(command):
             return self._registry.finished(tasks.vehicle, first, PAGE)
@@ -235,7 +235,7 @@ class MessageRequests:
             words = f"no task {asked.command.params[1]:g}" if task_id else "no task runs"
             raise Rejection(R.NOT_FOUND, words)
         vehicle = self._vehicles.look_at(task.vehicle)
-        if vehicle is None:  # of an earlier run, not heard yet: as for TASK_STATUS
+        if vehicle is None:  # its rover is of an earlier run, not heard yet: as for TASK_STATUS
             return
         message = translate.task_timing(
             task,

@@ -1,4 +1,4 @@
-"""Whether the people are still there: heartbeats of ground stations, all of them together."""
+"""Detects that no ground station is heard any more: the heartbeats of all of them count."""
 
 from math import inf
 
@@ -9,11 +9,11 @@ from mav_tasks.settings import Settings
 
 
 class OperatorWatch:
-    """When a ground station was last heard; a script that sends no heartbeat is none."""
+    """The watch on ground stations' heartbeats (MAV_TYPE_GCS)."""
 
     def __init__(self, timers: Timers, lost: Effect, settings: Settings) -> None:
-        """``lost`` is called once when the last one has been silent for too long."""
-        self._heard_at = inf  # there is none, or its loss was told
+        """``lost`` is called once when all ground stations have been silent for too long."""
+        self._heard_at = inf  # inf: none was heard, or its loss was reported
         self._lost = lost
         self._timer = timers.timer(Turn.OPERATOR, self._lose)
         self.apply(settings)

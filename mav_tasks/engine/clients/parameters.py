@@ -1,7 +1,7 @@
-"""The server's own settings as parameters of its component inside each vehicle's system.
+"""The server's settings as parameters of its component in each vehicle's system.
 
-They are the same for all vehicles, kept over a restart, and have effect at once. The vehicle's own
-parameters are its affair: messages about those go on to it.
+They are the same for all vehicles, survive a restart, and take effect once they are durable.
+Messages about the vehicle's own parameters are forwarded to it.
 """
 
 from collections.abc import Mapping
@@ -27,12 +27,12 @@ from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Submitter
 
 MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
-LIST_EACH = 0.2  # s: one packet asks for many, and no client asks again so soon
+LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
 
 
 class _Wish(NamedTuple):
-    """A parameter that a client wants set; it has effect, and is told, once that is durable."""
+    """A PARAM_SET of a client; it takes effect, and is announced, once it is durable."""
 
     client: GcsClient
     vehicle: Vehicle
@@ -44,7 +44,7 @@ class _Wish(NamedTuple):
 
 
 class ParameterServer:
-    """Answers about the server's parameters, and the settings that follow from them."""
+    """The server of the parameter protocol, and the settings that follow from it."""
 
     def __init__(
         self,
@@ -62,25 +62,25 @@ class ParameterServer:
         self._submissions = submissions
         self._configured = settings
         self._kept = dict(kept)
-        #: the latest wish for each that is not durable yet
+        #: by name, the latest PARAM_SET that is not durable yet
         self._pending: dict[str, _Wish] = {}
         submissions.gate.knows(_Wish, self._accept, self._give_up)
         self._settings, self._why_not = with_all(settings, self._kept)
-        #: whether ``take_change`` has something to give
+        #: whether settings changed since the last ``take_change``
         self.is_changed = False
 
     @property
     def in_force(self) -> dict[str, float]:
-        """What clients have set, by name, and is not left out for what is configured since."""
+        """Parameters set by clients, by name, that the configuration does not rule out."""
         return {name: value for name, value in self._kept.items() if name not in self._why_not}
 
     @property
     def not_in_force(self) -> tuple[str, ...]:
-        """Why the others are left out."""
+        """Reasons why the other parameters are ruled out."""
         return tuple(why for _, why in sorted(self._why_not.items()))
 
     def configured(self, settings: Settings) -> Settings:
-        """Take settings as configured anew; gives them with what was set by parameter."""
+        """Take reloaded settings, and return them with the parameters applied."""
         before = self._values()
         self._configured = settings
         self._settings, self._why_not = with_all(settings, self._kept)
@@ -90,14 +90,14 @@ class ParameterServer:
         return self._settings
 
     def take_change(self) -> Settings:
-        """Return the settings after a change that is in force now."""
+        """Return the settings in force, and clear ``is_changed``."""
         self.is_changed = False
         return self._settings
 
     def receive(
         self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
     ) -> None:
-        """Answer what is, or is also, for the task servers inside the vehicles addressed."""
+        """Answer a message that addresses the task server of one or more vehicles."""
         vehicles = [
             v for v in self._vehicles.all if message.target_system in (BROADCAST, v.system_id)
         ]
@@ -149,7 +149,7 @@ class ParameterServer:
         *,
         now: float,
     ) -> None:
-        """It has effect, and is told to everybody, once it is durable."""
+        """Check a PARAM_SET and record it; the commit gate makes it take effect."""
         name, value = name_in(message), as_sent(message.param_value)
         wish = _Wish(client, vehicle, packet.source, message, client.who, name, value)
         if name not in PARAMETERS:
@@ -178,7 +178,7 @@ class ParameterServer:
         is_latest = self._settled(wish)
         try:
             changed(self._settings, wish.name, wish.value)
-        except SettingError as error:  # what it was checked against was not stored
+        except SettingError as error:  # the values that it was checked against were not stored
             if is_latest:
                 self._record_kept(wish, now=now)
             self._refuse(wish, str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
@@ -186,13 +186,13 @@ class ParameterServer:
             self._take(wish.name, wish.value)
 
     def _give_up(self, wish: _Wish, *, now: float) -> None:
-        if self._settled(wish):  # or else a later wish is on its way to the store
+        if self._settled(wish):  # otherwise a later value is on its way to the store
             self._record_kept(wish, now=now)
         words = f"{wish.name} was not stored in time: not set"
         self._refuse(wish, words, MavParamError.PERMISSION_DENIED, now=now)
 
     def _settled(self, wish: _Wish) -> bool:
-        """Whether a wish that waits no more was the latest for this parameter."""
+        """Remove a pending PARAM_SET; return whether it was the latest of its parameter."""
         is_latest = self._pending.get(wish.name) is wish
         if is_latest:
             del self._pending[wish.name]
@@ -205,7 +205,7 @@ class ParameterServer:
     def _refuse(self, wish: _Wish, text: str, why: int, *, now: float) -> None:
         client, source = wish.client, wish.vehicle.server_address
         client.outlet.send(param_receiver.error(wish.message, why, to=wish.asker), source)
-        if wish.name in PARAMETERS:  # to clients that do not know the error, the old value says it
+        if wish.name in PARAMETERS:  # for clients that do not know PARAM_ERROR
             client.outlet.send(param_receiver.value_of(self._values(), wish.name), source)
         client.tell(text, MavSeverity.WARNING, source, now=now)
 
@@ -216,7 +216,7 @@ class ParameterServer:
         self._tell(name)
 
     def _tell(self, name: str) -> None:
-        """Tell every client that is there of a value."""
+        """Send a parameter's value to every client."""
         told = param_receiver.value_of(self._values(), name)
         for vehicle in self._vehicles.all:
             for client in self._gcs.clients:
@@ -225,5 +225,5 @@ class ParameterServer:
 
 
 def _begins(message: ParamMessage) -> bool:
-    """Whether a client with a cache begins so; it may leave the list of all out, then."""
+    """Whether a client with cached parameters asks for their hash; it may then skip the list."""
     return isinstance(message, m.ParamRequestRead) and name_in(message) == HASH_CHECK

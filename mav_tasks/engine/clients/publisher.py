@@ -1,7 +1,7 @@
-"""Tells clients what happened, and keeps them supplied: heartbeats, statuses, introductions.
+"""Sends clients what they do not request each time: heartbeats, TASK_STATUS and texts.
 
-A TASK_STATUS that a task is over waits until that is durable: it is never taken back. Where the
-store is too slow it is told all the same; a state that is shown on request waits for nothing.
+A TASK_STATUS with a final state is sent once that state is durable, so that it is never taken back,
+or after the time limit of the commit gate. A state that a client requests is sent at once.
 """
 
 from typing import NamedTuple
@@ -33,13 +33,13 @@ from mav_tasks.tasks.task import TaskId
 
 
 class _Ended(NamedTuple):
-    """What is over, and told when that is durable; or all the same, where that takes too long."""
+    """Tasks that ended; their status waits at the commit gate, at most for its time limit."""
 
     tasks: frozenset[TaskId]
 
 
 class Publisher:
-    """What goes to clients without their asking each time."""
+    """The sender of heartbeats, TASK_STATUS and texts to clients."""
 
     def __init__(
         self,
@@ -59,26 +59,26 @@ class Publisher:
         self._displays = displays
         self._submissions = submissions
         self._rates = rates
-        self._ended: set[int] = set()  # tasks that are over, not durably yet
+        self._ended: set[int] = set()  # tasks whose end is not durable yet
         submissions.gate.knows(_Ended, self._tell_ends, self._tell_ends)
         timers.rhythm(Turn.HEARTBEATS, self._beat, period=INTERVAL, now=now)
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
-        """Show a client every vehicle that it has not seen yet, by the latest heartbeat."""
+        """Send a client the latest heartbeat of each vehicle that it has not seen yet."""
         for vehicle in self._vehicles.all:
             if vehicle.system_id in client.introduced or not vehicle.is_heard(now=now):
-                continue  # a silent one must not look alive
+                continue  # a silent vehicle must not look alive
             if vehicle.last_heartbeat is not None:
                 heartbeat = vehicle.shown.applied(vehicle.last_heartbeat, now=now)
                 client.introduce(heartbeat, last_seq=vehicle.last_seq)
 
     def withhold(self, packet: Packet) -> None:
-        """Note for every client that a packet of a vehicle is not passed on."""
+        """Note for every client that a vehicle's packet is not forwarded: no gap shows."""
         for client in self._gcs.clients:
             client.outlet.withhold(packet.source)
 
     def publish(self, events: list[Event], *, now: float) -> None:
-        """Tell of events: in words to all who listen, as TASK_STATUS to who submitted."""
+        """Send events as texts to all clients, and as TASK_STATUS to submitters and followers."""
         ended: set[TaskId] = set()
         for event in events:
             if isinstance(event, TaskChanged) and event.new in TERMINAL:
@@ -88,7 +88,7 @@ class Publisher:
             self._submissions.gate.hold(_Ended(frozenset(ended)), now=now)
         for event in events:
             if isinstance(event, TaskSubmitted):
-                continue  # who has asked for it is told of it, and so is everybody
+                continue  # ``Submissions`` and ``MissionUploads`` tell everybody of it
             spoken = translate.text_of(event)
             if spoken is not None:
                 system_id, severity, text = spoken
@@ -99,7 +99,7 @@ class Publisher:
                 self.note_change(event.task_id)
 
     def warn_of_loss(self, system_id: int, *, now: float) -> None:
-        """Tell all who listen that a vehicle stands by a word that is stored nowhere."""
+        """Tell all clients that a STOP or pause in force is not stored: a restart loses it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None and vehicle.tasks.paused:
             what = "STOP" if vehicle.tasks.is_stopped else "Pause"
@@ -113,12 +113,12 @@ class Publisher:
         self.send_statuses(now=now)
 
     def note_change(self, task_id: TaskId) -> None:
-        """Have the submitter of a task told of its state, and who has asked about it."""
+        """Schedule a TASK_STATUS to the submitter of a task, and to clients that follow it."""
         task = self._registry.get(task_id)
         if task is None or task_id in self._ended:
             return
         for client in self._gcs.clients:
-            # a nonce says it for good: after a restart, or a long silence, the client is another
+            # a nonce proves it for good; after a restart or a long silence the client is a new one
             reads = client.uses_dialect or task.marks.nonce
             if (reads and client.submitted(task)) or client.follows(task.id):
                 client.statuses.changed(task.id)
@@ -127,7 +127,7 @@ class Publisher:
         return self._registry.is_awaited_at(client.outlet.link, client.endpoint)
 
     def _beat(self, *, now: float) -> None:
-        """Each second: the task servers' heartbeats, and what goes by them."""
+        """Each second: heartbeats, message rates, dropped texts; forget silent clients."""
         self._gcs.forget_silent(awaits=self._awaits, now=now)
         self._rates.update(now=now)
         self._send_heartbeats(now=now)
@@ -151,10 +151,10 @@ class Publisher:
         self._gcs.plan_statuses()
 
     def _send_heartbeats(self, *, now: float) -> None:
-        """One from inside each vehicle that is heard, to each client that is.
+        """Send the task server's heartbeat for each vehicle that is heard, to each client heard.
 
-        To an address that is only pushed to, nobody may be listening yet; and whoever begins to
-        must hear the autopilot first, because an older MAVSDK otherwise never connects.
+        A pushed address gets none before it answers. Its client must hear the autopilot first,
+        because an older MAVSDK otherwise never connects.
 
         DEVIATION: the task server's component falls silent with its vehicle; its heartbeats would
         otherwise hide from a ground station that the vehicle is lost.
@@ -174,9 +174,9 @@ class Publisher:
                 self._inform(vehicle, new, now=now)
 
     def _inform(self, vehicle: Vehicle, new: list[GcsClient], *, now: float) -> None:
-        """Tell clients that are new, or back, what is held or paused, up to a second later.
+        """Tell clients that are new, or back, what is held or paused: with the next heartbeat.
 
-        A ground station takes no text of a vehicle that it has only just heard of.
+        A ground station ignores texts of a vehicle that it has only just heard of.
         """
         words = summary_of(vehicle.tasks)
         for client in new if words else ():

@@ -1,8 +1,7 @@
-"""What clients are refused, for the journal and the log: who, what and why.
+"""Records refused client messages for the journal and the log: who, what and why.
 
-A command is refused with its acknowledgement (``CommandRequest``). Here is what has none: messages
-of the mission protocol, SET_MODE, and what comes as a stream, of which one line in STREAM_EACH
-seconds is kept.
+A command is refused in its acknowledgement (``CommandRequest``). Here are messages without one: of
+the mission protocol, SET_MODE, and streams, for which one refusal in STREAM_EACH seconds is kept.
 """
 
 from collections.abc import Hashable
@@ -15,12 +14,12 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 
-STREAM_EACH = 30.0  # s, the log's own window for words that repeat themselves
+STREAM_EACH = 30.0  # s, the log's own window for repeated texts
 REMEMBERED = 256  # streams of clients
 
 
 class Refusals:
-    """Records refusals; of a flood of them only so many."""
+    """The recorder of refusals, limited in rate for each client."""
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
@@ -29,7 +28,7 @@ class Refusals:
     def message(
         self, client: GcsClient, vehicle: Vehicle, packet: Packet, refusal: Rejection, *, now: float
     ) -> bool:
-        """Record that a message was refused; False: it is one of a flood, to be passed over."""
+        """Record a refused message. Return False if too many were refused: ignore it."""
         if not client.may_be_refused(now=now):
             return False
         self._record(client, vehicle.system_id, packet, refusal, now=now)
@@ -38,7 +37,7 @@ class Refusals:
     def stream(
         self, client: GcsClient, system_id: int, packet: Packet, refusal: Rejection, *, now: float
     ) -> None:
-        """Record that a message of a stream went no further, once in a while."""
+        """Record a refused message of a stream, at most once in STREAM_EACH seconds."""
         key = (client.key, packet.source, system_id, packet.message_id, refusal.text)
         if now - self._streams.get(key, -STREAM_EACH) < STREAM_EACH:
             return

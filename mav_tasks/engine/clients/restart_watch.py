@@ -1,20 +1,20 @@
-"""Notices that a rover counts its packets from 0 again, which is a restart and no loss.
+"""Detects that a rover restarted: its sequence numbers begin at 0 again.
 
-Towards clients its numbers then go on where they were: a ground station would count up to 255
-packets as lost. What a link really loses stays visible: only after a silence as long as a restart
-takes, and for a number near 0, is a gap taken for one.
+Its numbers towards clients then continue, because a ground station would count up to 255 packets as
+lost. Real losses stay visible: a gap counts as a restart only after a silence as long as a restart
+takes, and with a number near 0.
 """
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import Packet
 
 SILENCE = 2.0  # s; the shortest restart of an autopilot seen took 3 s
-FIRST_NUMBERS = 32  # of packets that may be lost before the first one that is heard
-MOST = 1_000  # sources remembered: anybody can make up 65,536
+FIRST_NUMBERS = 32  # sequence numbers: some packets may be lost before the first one heard
+MOST = 1_000  # sources remembered; a sender can make up 65,536
 
 
 class RestartWatch:
-    """The last number of each source, and when it came."""
+    """The last sequence number of each source, and when it came."""
 
     def __init__(self) -> None:
         self._last: dict[Address, tuple[int, float]] = {}

@@ -1,6 +1,6 @@
-"""What a client may do: by its key or its address it has a role, and the role has limits.
+"""What a client may do: its key, or else its address, gives it a role, and each role has limits.
 
-What only stops a rover, everybody may: STOP, pause, HOLD, disarming. A refusal names its rule.
+Every client may stop a rover: STOP, pause, HOLD, disarm. A refusal names the rule that it follows.
 """
 
 from dataclasses import replace
@@ -27,52 +27,55 @@ R = TaskReason
 OBSERVER, SUBMITTER, OPERATOR, SAFETY = ROLES
 RANKS = {role: rank for rank, role in enumerate(ROLES)}
 NO_LIMIT = Limits()
-SAME = 1 + 1e-6  # a float32 of a limit is that limit
+SAME = 1 + 1e-6  # tolerance: a limit that was sent as a float32 is that limit
 
 
 class Rights(NamedTuple):
-    """What one client may do."""
+    """The role of one client, and its limits."""
 
     role: str
     limits: Limits
 
     @property
     def rank(self) -> int:
-        """The place of the role among all roles: the higher, the more it may do."""
+        """Position of the role among all roles; a higher one may do more."""
         return RANKS[self.role]
 
     def reach(self, role: str) -> bool:
-        """Whether they are at least those of a role."""
+        """Whether the client's role is this one or a higher one."""
         return RANKS[self.role] >= RANKS[role]
 
     def require(self, role: str, what: str) -> None:
-        """Raise Rejection unless they are at least those of a role."""
+        """Raise Rejection unless the client's role is this one or a higher one."""
         if RANKS[self.role] < RANKS[role]:
             raise self.refusal(f"may not {what}, {role} may")
 
     def require_own(self, task: Task, submitter: Submitter, what: str) -> None:
-        """Raise Rejection unless it is the client's own task, or it may do that to any."""
+        """Raise Rejection unless the task is the submitter's own, or the role reaches operator."""
         self.require(SUBMITTER, what)
         if not self.reach(OPERATOR) and task.submitter.owner != submitter.owner:
             words = f"may not {what}: task {task.id} is of {task.submitter}"
             raise self.refusal(words)
 
     def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
-        """Return what is said when it may not."""
+        """Return a Rejection that names the role."""
         return Rejection(reason, f"role {self.role} {words}")
 
     def check_priority(self, priority: int) -> None:
-        """Raise Rejection for a task that would be too urgent."""
+        """Raise Rejection if the role may not submit tasks of this priority."""
         most = self.limits.max_priority
         if priority > most:
             raise self.refusal(f"may not have priority {priority}, {most} at the most")
 
     def check_preemptive(self) -> None:
-        """Raise Rejection unless a task of its may interrupt those of others at once."""
+        """Raise Rejection unless the role may submit pre-emptive tasks."""
         self.require(OPERATOR, "make a task pre-emptive")
 
     def checked(self, draft: Draft, *, waiting: int) -> Draft:
-        """Return a task as it may be submitted by somebody of whom so many wait; Rejection."""
+        """Return the draft, bounded to the role's speed; raise Rejection if it is not allowed.
+
+        ``waiting``: how many tasks of its submitter wait already.
+        """
         self.require(SUBMITTER, "submit tasks")
         self.check_priority(draft.terms.priority)
         kinds = () if self.limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
@@ -94,18 +97,18 @@ class Rights(NamedTuple):
         return replace(draft, terms=self.bounded(draft.terms))
 
     def bounded(self, terms: Terms) -> Terms:
-        """Return terms that keep a task to the speed, whatever speed is set for it."""
+        """Return the terms with the role's top speed, which limits any speed set later."""
         if self.limits.max_speed >= NO_LIMIT.max_speed:
             return terms
         return replace(terms, top_speed=self.limits.max_speed)
 
 
-#: before it is known who somebody is
+#: rights of a client that has sent nothing yet
 NOTHING = Rights(OBSERVER, NO_LIMIT)
 
 
 class RightsBook:
-    """The rights of everybody."""
+    """The rights of all roles, by key and address."""
 
     def __init__(self, roles: Roles) -> None:
         self._roles = roles
@@ -115,7 +118,7 @@ class RightsBook:
         return f"RightsBook(unsigned: {self._roles.unsigned})"
 
     def of(self, key: Key, submitter: Submitter) -> Rights:
-        """Return the rights of who sent a packet that was signed with this key."""
+        """Return the rights of a submitter whose packet was signed with this key."""
         if key is not UNSIGNED:
             return self._by_role[key.role]
         addresses = self._roles.addresses
@@ -126,7 +129,7 @@ class RightsBook:
 
 
 def _kinds_of(goal: Goal) -> list[str]:
-    """Return the kinds of tasks that a goal is, a plan of one step being as that step."""
+    """Return the kinds of tasks in a goal; a plan of one step counts as that step."""
     if not isinstance(goal, Plan):
         return [kind_of(goal)]
     kinds = [kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]

@@ -1,4 +1,4 @@
-"""One MAVLink address at a client's endpoint: what it has sent, and in which order."""
+"""What one MAVLink address at a client's endpoint has sent, and in which order."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -9,19 +9,19 @@ from mav_tasks.mavlink.number_line import NumberLine
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import COPIED, DOUBLED, CommandReceiver
 
-REMEMBERED = 1024  # words: a gimbal that is turned says 20 a second
-COPIES = 32  # of one word
+REMEMBERED = 1024  # commands; a gimbal in motion gets 20 a second
+COPIES = 32  # of one command
 
 
 class _Said(NamedTuple):
-    life: int  # of the sender: a program that is run again says all anew
-    epoch: int  # of the vehicle, when the first copy came
+    life: int  # of the sender, by its restarts: after one, an equal command is a new one
+    epoch: int  # halt epoch of the vehicle when the first copy came
     at: float  # s, of the last copy
     packets: frozenset[bytes]  # the latest copies
 
 
 class Sender:
-    """The memory of what one address has sent."""
+    """The memory of the commands and sequence numbers of one address."""
 
     def __init__(self) -> None:
         self.commands = CommandReceiver()
@@ -40,11 +40,11 @@ class Sender:
         is_anothers: bool = False,
         now: float,
     ) -> int | None:
-        """Return the epoch at which the first copy of this word came; None: it is none.
+        """Return the halt epoch at which a command's first copy came, None if this is no copy.
 
-        ``is_counted``: it says itself that it is a copy. ``is_anothers``: somebody else has halted
-        the vehicle. Then the very same packet is a copy, though its sender seems to run anew: it
-        may as well be the net that brings all its packets once more.
+        ``is_counted``: the packet itself says that it is a copy. ``is_anothers``: another sender
+        has halted the vehicle. An identical packet is then a copy even if its sender seems to have
+        restarted, because the network may deliver all its packets a second time.
         """
         said = self._said.get(content)
         if said is None:
@@ -55,17 +55,17 @@ class Sender:
         return said.epoch if now - said.at <= within else None
 
     def has_said(self, content: Hashable, packet: Packet) -> bool:
-        """Return whether this very packet has come before."""
+        """Return whether this very packet came before, since the sender last restarted."""
         said = self._said.get(content)
         return said is not None and said.life == self.line.lives and packet.raw in said.packets
 
     def last_copy_at(self, content: Hashable) -> float:
-        """Return when the last copy of this word came, s; -inf: none has."""
+        """Return when the last copy of this command came, s; -inf: none came."""
         said = self._said.get(content)
         return -inf if said is None or said.life != self.line.lives else said.at
 
     def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:
-        """Remember a word, or that one more copy of it has come."""
+        """Remember a command, or one more copy of it."""
         before = self._said.pop(content, None)
         packets = frozenset() if before is None or len(before.packets) >= COPIES else before.packets
         self._said[content] = _Said(self.line.lives, epoch, now, packets | {packet.raw})

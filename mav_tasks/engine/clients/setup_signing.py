@@ -1,7 +1,7 @@
-"""SETUP_SIGNING of a client: from then on the server signs to it, if it knows the key.
+"""SETUP_SIGNING from a client: the server signs its packets to it, if the key is in the ring.
 
-It gives nobody more rights, brings no new key into the ring, and is never passed on: a rover whose
-key changes under the server would take no STOP from it any more.
+It gives no rights, adds no key to the ring, and is never forwarded: a rover whose key changed
+without the server would accept no STOP from it any more.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -13,7 +13,7 @@ from mav_tasks.settings import Settings
 
 
 class SetupSigning:
-    """Answers by signed packets; a text says why not. QGroundControl looks for both."""
+    """The handler of SETUP_SIGNING. QGroundControl looks for signed packets or a text."""
 
     def __init__(self, signatures: Signatures, vehicles: VehicleSide, settings: Settings) -> None:
         self._signatures = signatures
@@ -25,7 +25,7 @@ class SetupSigning:
         self._policy = settings.signing.setup
 
     def receive(self, client: GcsClient, message: m.SetupSigning, *, now: float) -> None:
-        """See to a client's wish."""
+        """Start or end signing to this client; a text says why not."""
         targets = self._vehicles.addressed_by(message.target_system)
         if not targets:
             return

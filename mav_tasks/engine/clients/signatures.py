@@ -1,7 +1,7 @@
-"""Whose a packet is by its signature, and the signatures of what the server sends.
+"""Checks the signatures of incoming packets, and signs outgoing ones (MAVLink 2 signing).
 
-On a client link every key of the ring counts, on a vehicle link the one that it was given. What was
-accepted once is not accepted again, over restarts as well: the times go to the store.
+On a client link every key of the ring is valid, on a vehicle link only the link's own key. A packet
+is accepted once, also over restarts: the timestamps go to the store.
 """
 
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ from mav_tasks.mavlink.signing import (
 )
 from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen, SignatureTime
 
-#: who signs nothing, where that is allowed
+#: stands for the key of unsigned packets, where they are allowed
 UNSIGNED = Key("", b"", fingerprint="-")
 
-#: what does nothing that could be done twice: a clock, a question, that somebody is there
+#: messages that do no harm if they are replayed: clocks, questions, heartbeats
 HARMLESS = frozenset({m.Heartbeat.id, m.Timesync.id, m.SystemTime.id, m.Ping.id})
-#: what comes so often while somebody drives that its time is kept each second only
+#: messages that come so often while a client drives that their time is stored each second only
 STREAMED = frozenset(
     {
         *(m.ManualControl.id, m.RcChannelsOverride.id, m.SetPositionTargetLocalNed.id),
@@ -41,26 +41,26 @@ STREAMED = frozenset(
         m.SetActuatorControlTarget.id,
     }
 )
-#: s, in which a time is on its way to the store. A minute, because each write is some 13 kB on the
-#: disk: 1.1 GB a day for one idle station, were it each second
+#: s, within which a timestamp goes to the store. A minute, because each write is some 13 kB on the
+#: disk: each second it would be 1.1 GB a day for one idle station
 HARMLESS_WITHIN, STREAMED_WITHIN = 60.0, 1.0
-RESERVE = int(120 * UNITS)  # of own times, so that each is new, even if the clock is set back
-#: a clock before 2020 was never set: of a computer without a battery for it, that has no network
+RESERVE = int(120 * UNITS)  # own timestamps stored ahead: none is used twice if a clock is set back
+#: a clock before 2020 was never set: the computer has no battery for it, and no network
 SET_SINCE = timestamp_at(1_577_836_800.0)
-TELL_EACH = 60.0  # s, at most one line for each key whose clock is wrong
+TELL_EACH = 60.0  # s between log lines about one key whose clock is wrong
 MOST_SIGNERS = 1024
-MOST_OWN = 4096  # streams of our own
+MOST_OWN = 4096  # own streams remembered
 HIGHEST_LINK_ID = 255
 
 
 @dataclass(slots=True)
 class SignatureCounts:
-    """What was refused, in packets."""
+    """Counts of refused packets, by reason."""
 
-    unsigned: int = 0  # where that is not allowed
-    unverified: int = 0  # no key of ours, or changed on the way
-    old: int = 0  # signed well, and not later than one before, or held back: replayed, overtaken
-    ahead: int = 0  # signed well, by a clock that is ahead of ours
+    unsigned: int = 0  # where unsigned packets are not allowed
+    unverified: int = 0  # signed with an unknown key, or changed on the way
+    old: int = 0  # valid, but not newer than one before, or held back: replayed or overtaken
+    ahead: int = 0  # valid, but its clock is ahead of ours
 
 
 class _Link(NamedTuple):
@@ -71,7 +71,7 @@ class _Link(NamedTuple):
 
 
 class Signatures:
-    """The keys, and the times of signatures on all links."""
+    """The keys, and the timestamps of signatures on all links."""
 
     def __init__(
         self,
@@ -80,7 +80,7 @@ class Signatures:
         times: tuple[SignatureTime, ...] = (),
         signed_until: int = 0,
     ) -> None:
-        """``window`` in seconds; the rest is what the store gave back."""
+        """``window`` is in seconds; ``times`` and ``signed_until`` come from the store."""
         self._window = int(window * UNITS)
         self._keys: dict[str, Key] = {}  # with a secret, by name
         self._has_ring = False
@@ -88,24 +88,24 @@ class Signatures:
         self._numbers: dict[str, int] = {}
         self._times: dict[str, StreamTimes] = {}  # by fingerprint
         self._signers: dict[tuple[str, Peer], Signer] = {}
-        #: there is somebody to sign for, or a key to begin with
+        #: whether there is a key or an endpoint to sign for
         self.may_sign = False
         self._offset: float | None = None  # UTC less ``now``
-        self._highest_offset = -inf  # in this run: a clock that is set back shuts nobody out
-        #: times of what we have signed, by side, key, link id and source
+        self._highest_offset = -inf  # in this run: a clock that is set back locks no sender out
+        #: timestamps of packets that we signed, by side, key, link id and source
         self._own: dict[tuple[bool, str, int, int, int], int] = {}
-        self._heard: dict[tuple[str, Stream], int] = {}  # and not given to the store yet
+        self._heard: dict[tuple[str, Stream], int] = {}  # timestamps not given to the store yet
         self._gone: set[tuple[str, Stream]] = set()
-        #: when times are to be given to the store
+        #: when timestamps are to be given to the store
         self.keep_at = inf
         self._signed_until = signed_until  # as the store has it
         self._highest = 0
-        self._from = signed_until  # where own times begin, until the clock is known
-        self._known_until = signed_until  # up to where an earlier run has known the time
-        self._told: dict[str, float] = {}  # of wrong clocks, by key
-        #: whose clocks are wrong, until it is taken
+        self._from = signed_until  # least own timestamp, until the clock is known
+        self._known_until = signed_until  # latest time that an earlier run knew
+        self._told: dict[str, float] = {}  # by key, when its wrong clock was reported
+        #: reports of wrong clocks, until ``take_refused``
         self.refused: list[SignatureRefused] = []
-        #: seconds: set before anything is signed or looked at
+        #: monotonic seconds; set before anything is signed or checked
         self.now = 0.0
         self.counts = SignatureCounts()
         for time in times:
@@ -116,20 +116,20 @@ class Signatures:
         return f"Signatures({sorted(self._keys)}, {self.counts})"
 
     def apply(self, window: float) -> None:
-        """Take another window, in seconds."""
+        """Take a new window, in seconds."""
         self._window = int(window * UNITS)
 
     def set_wall(self, offset: float) -> None:
-        """Take note of the time of the wall, UTC less ``now``."""
+        """Take the offset of the wall clock, UTC less ``now``, in seconds."""
         self._offset = offset
         self._highest_offset = max(self._highest_offset, offset)
         clock = self._clock()
         self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
 
     def change_keys(self, change: KeysChanged) -> set[str]:
-        """Take other keys; who has signed with one that is no more is unknown from here on.
+        """Replace the keys. No longer sign for endpoints whose key was removed or changed.
 
-        Return the names of keys that count no more; the first time, of those that were revoked.
+        Return the names of keys that are no longer valid; at the first call, of revoked ones.
         """
         before, self._keys = self._keys, {key.name: key for key in change.keys if key.secret}
         gone = {name for name, key in before.items() if not self._has_secret_of(key)}
@@ -138,7 +138,7 @@ class Signatures:
         self._has_ring = True
         for way, signer in list(self._signers.items()):
             if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
-                del self._signers[way]  # its role may be another one, too
+                del self._signers[way]  # also if only its role changed
         self.may_sign = bool(self._keys or self._signers)
         return gone
 
@@ -147,15 +147,16 @@ class Signatures:
         return there is not None and there.fingerprint == key.fingerprint
 
     def _is_last_of_vehicles(self, link: str) -> bool:
-        """Whether vehicles have lost their key, and no other is there: they hear nothing else.
+        """Whether a vehicle link has lost its key without a new one under that name.
 
-        They are not believed, and so not driven; that they are to stand is still said to them.
+        Its vehicles take no other signature. Their packets are refused, so they are not driven;
+        but commands to stand are still signed with the old key.
         """
         there = self._links[link]
         return there.is_of_vehicles and there.key not in self._keys
 
     def change_link(self, change: LinkChanged) -> None:
-        """Take note of what a link asks for."""
+        """Add a link with its key and rules when it comes up, remove it when it goes down."""
         if not change.up:
             self._links.pop(change.link, None)
             for way in [way for way in self._signers if way[0] == change.link]:
@@ -170,19 +171,19 @@ class Signatures:
         )
 
     def forget(self, link: str, peer: Peer) -> None:
-        """Somebody is gone, or another one: who comes there has signed nothing yet."""
+        """Forget the key of an endpoint: its sender is gone, or another one is there."""
         self._signers.pop((link, peer), None)
 
     def knows(self, key: Key) -> bool:
-        """Whether a key still counts; UNSIGNED does."""
+        """Whether a key is still valid; UNSIGNED is."""
         return key is UNSIGNED or self._keys.get(key.name) == key
 
     def key_of_secret(self, secret: bytes) -> Key | None:
-        """Return the key that has this secret, if one has."""
+        """Return the key that has this secret, or None."""
         return next((key for key in self._keys.values() if key.secret == secret), None)
 
     def sign_to(self, link: str, peer: Peer, key: Key | None) -> None:
-        """Sign with a key from here on what goes to an endpoint; None: no more."""
+        """Sign packets to an endpoint with this key from now on; None: stop signing them."""
         if key is None:
             self._signers.pop((link, peer), None)
         elif key is not UNSIGNED:
@@ -194,21 +195,21 @@ class Signatures:
         return there is not None and bool(there.key)
 
     def takes_unsigned(self, link: str) -> bool:
-        """Whether what nobody has signed is taken from a link."""
+        """Whether the link accepts unsigned packets."""
         there = self._links.get(link)
         return there is not None and there.takes_unsigned
 
-    # in
+    # incoming packets
 
     def admit(self, link: str, peer: Peer, packet: Packet) -> Key | None:
-        """Return whose a packet is; None: it is not to be looked at. Its CRC was found right."""
+        """Return the signing key of a packet of good CRC, or UNSIGNED; None to drop it."""
         there = self._links.get(link)
         if there is None:
             return UNSIGNED
-        # whether there is a key that a signature could be of
+        # whether there is any key to check a signature with
         matters = there.key if there.is_of_vehicles else self._has_ring
         if not matters or not packet.is_signed:
-            # a client's radio tells of a way that is none of a rover's, and signs for nobody
+            # radios cannot sign; the status of a client's radio says nothing of a rover's link
             is_of_radio = packet.message_id in FROM_RADIOS and there.is_of_vehicles
             if there.takes_unsigned or is_of_radio:
                 return UNSIGNED
@@ -222,7 +223,7 @@ class Signatures:
         times = self._times_of(key.fingerprint)
         own = there.is_of_vehicles, key.fingerprint, stream.link_id, *stream.source
         if timestamp <= self._own.get(own, -1):
-            self.counts.old += 1  # our own, sent back by who has overheard it
+            self.counts.old += 1  # our own packet, sent back by an eavesdropper
             return None
         window = self._believed(there)
         if not times.is_news(stream, timestamp, window):
@@ -238,10 +239,10 @@ class Signatures:
         return key
 
     def _believed(self, link: _Link) -> Window:
-        """Return which times are believed on a link.
+        """Return the window of timestamps that are accepted on a link.
 
-        A clock that was not set yet, or shows less than an earlier run has signed, keeps nobody
-        out who is ahead of it. A vehicle may be ahead: it has GPS.
+        It has no upper bound while our clock is not set, or is behind what an earlier run signed;
+        nor on a vehicle link, because a vehicle with GPS may be ahead.
         """
         clock, newest, latest = self._clock(), HIGHEST_TIMESTAMP, HIGHEST_TIMESTAMP
         is_set = clock >= max(SET_SINCE, self._known_until - RESERVE)
@@ -251,7 +252,7 @@ class Signatures:
         return Window(clock - self._window, newest, latest, self._window, self.now)
 
     def _refuse(self, key: Key, peer: Peer, packet: Packet, window: Window) -> None:
-        """Count a packet that is not believed, and tell of a clock that is wrong."""
+        """Count a packet outside the window, and report a wrong clock."""
         timestamp = timestamp_of(packet)
         is_ahead = timestamp > window.newest
         self.counts.ahead += is_ahead
@@ -265,7 +266,7 @@ class Signatures:
         self.refused.append(SignatureRefused(actor, seconds, self.now))
 
     def take_refused(self) -> list[SignatureRefused]:
-        """Return whose clocks are wrong, for the journal and the log, since the last call."""
+        """Return the wrong clocks found since the last call, for the journal and the log."""
         refused, self.refused = self.refused, []
         return refused
 
@@ -288,10 +289,10 @@ class Signatures:
             times = self._times[fingerprint] = StreamTimes()
         return times
 
-    # out
+    # outgoing packets
 
     def sealed(self, link: str, peer: Peer, raw: bytes) -> bytes:
-        """Return a packet as it is to leave."""
+        """Return a packet as it leaves: signed, if its endpoint or link has a key."""
         signer = self._signers.get((link, peer))
         if signer is None:
             there = self._links.get(link)
@@ -302,7 +303,7 @@ class Signatures:
         clock = self._own_clock()
         sealed = signer.sign(raw, clock=clock)
         self._note_own(link, signer, sealed)
-        if signer.last <= clock + RESERVE:  # else it is a time of the other end's, for it alone
+        if signer.last <= clock + RESERVE:  # beyond, it is the other end's time, for it alone
             self._highest = max(self._highest, signer.last)
         return sealed
 
@@ -316,7 +317,7 @@ class Signatures:
         self._own[own] = max(signer.last, self._own.get(own, 0))
 
     def sealed_late(self, outgoing: Outgoing) -> Outgoing:
-        """Return a packet that was made long before as it is to leave now."""
+        """Return a packet that was made long before, signed for sending now."""
         data = self.sealed(outgoing.link, outgoing.peer, outgoing.data)
         return outgoing._replace(data=data)
 
@@ -326,7 +327,7 @@ class Signatures:
             if len(self._signers) >= MOST_SIGNERS:
                 del self._signers[next(iter(self._signers))]
             signer = Signer(key, link_id=self._links[link].number)
-            # one that was forgotten may have been ahead of the clock by as many packets as it sent
+            # a forgotten signer may have been ahead of the clock, by one unit for each packet
             signer.last = min(self._highest, self._own_clock() + int(UNITS))
             self._signers[link, peer] = signer
         return signer
@@ -335,13 +336,13 @@ class Signatures:
         return 0 if self._offset is None else timestamp_at(self.now + self._offset)
 
     def _own_clock(self) -> int:
-        """Return the time of what we sign: never one of an earlier run again."""
+        """Return the time for own signatures: never one that an earlier run used."""
         return max(self._clock(), self._from)
 
-    # kept
+    # timestamps for the store
 
     def take_times(self) -> SignaturesSeen | None:
-        """Return what the store has to keep by now, if it is time for that."""
+        """Return the timestamps that are due to be stored, or None if it is not time yet."""
         is_used_up = self._highest > 0 and self._signed_until < self._highest + RESERVE // 2
         if self.now < self.keep_at and not is_used_up:
             return None
@@ -360,7 +361,7 @@ class Signatures:
 
 
 def _kept_within(link: _Link, packet: Packet) -> float:
-    """Return the seconds in which the time of a packet must be on its way to the store."""
+    """Return the seconds within which a packet's timestamp must go to the store."""
     if packet.message_id in HARMLESS or link.is_of_vehicles:
         return HARMLESS_WITHIN
     return STREAMED_WITHIN if packet.message_id in STREAMED else 0.0

@@ -1,7 +1,7 @@
-"""What a ground station that is new, or back, is told of a rover: why its tasks do not go on.
+"""The text for a ground station that is new, or back: why a rover's tasks do not go on.
 
-The texts that told of it were sent before that station listened. The important words come first,
-because some clients show the first 50 characters only.
+That station has missed the earlier texts. The important words come first, because some clients show
+the first 50 characters only.
 """
 
 from mav_tasks.engine.commands.submissions import PAUSED
@@ -13,7 +13,7 @@ BUTTONS = "Held: rest, again or skip"  # of the actions file for QGroundControl
 
 
 def summary_of(tasks: VehicleTasks) -> str:
-    """Return why the tasks of a rover stand and what to press; "" if they do not stand."""
+    """Return why a rover's tasks are stopped, and what to press; "" if they are not."""
     waiting = len(tasks.waiting)
     wait = f"; {waiting} wait" if waiting else ""
     held = _in_state(tasks, TaskState.HELD)
@@ -31,6 +31,6 @@ def summary_of(tasks: VehicleTasks) -> str:
 
 
 def _in_state(tasks: VehicleTasks, state: TaskState) -> Task | None:
-    """Return the first task of this state that has begun."""
+    """Return the first active or suspended task in this state."""
     active = [] if tasks.active is None else [tasks.active]
     return next((task for task in (*active, *tasks.suspended) if task.state is state), None)

@@ -1,7 +1,7 @@
-"""What each vehicle is asked to stream: as the clients wish that are there, and its link carries.
+"""The message intervals to request from each vehicle: what its clients want and its link carries.
 
-Worked out anew each second, and nothing else is remembered: a client that is gone, or so silent
-that it is shown no telemetry any more, has taken its wishes with it.
+Computed each second from the present clients only: the requests of a client end when it is gone,
+or so silent that it gets no telemetry any more.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -11,7 +11,7 @@ from mav_tasks.services.rate_budget import granted
 
 
 class TelemetryRates:
-    """Brings the wishes of clients to the vehicles."""
+    """The requester of clients' message intervals from the vehicles."""
 
     def __init__(self, gcs: GcsSide, vehicles: VehicleSide) -> None:
         self._gcs = gcs
@@ -19,7 +19,7 @@ class TelemetryRates:
         self._had_wishes = False
 
     def update(self, *, now: float) -> None:
-        """Have each vehicle asked for what is wished now."""
+        """Pass the intervals that clients want now to each vehicle's requester."""
         clients: list[GcsClient] = []
         for client in self._gcs.clients:
             if client.is_heard and client.thinner.asked:

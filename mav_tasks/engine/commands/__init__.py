@@ -1,1 +1,1 @@
-"""What clients ask for by a command, and what becomes of it."""
+"""The commands of clients: parsed, submitted as tasks, executed at once or forwarded."""

@@ -1,4 +1,4 @@
-"""What a vehicle cannot drive, by its set-points or its steering: refused when it is asked for."""
+"""Refuses or adapts goals that a vehicle cannot drive, by its setpoints or its steering."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -16,41 +16,44 @@ class Ability(NamedTuple):
     honours_yaw_rate: bool = True
     turning: Turning = Turning.ON_SPOT
     rover: str = "this rover"
-    turns_by_course: bool = False  # on the spot, to the course of a set-point
+    turns_by_course: bool = False  # turns on the spot to the course of a setpoint
 
     @classmethod
     def of(cls, persona: Persona, *, rover: str = "this rover") -> "Ability":
-        """Return that of a vehicle."""
+        """Return the ability of a vehicle."""
         return cls(persona.honours_yaw_rate, persona.turning, rover, persona.turns_by_course)
 
     @property
     def turns_on_spot(self) -> bool:
-        """Return whether it turns while it stands."""
+        """Whether the vehicle turns while it stands."""
         by_rate = self.honours_yaw_rate and self.turning is Turning.ON_SPOT
         return by_rate or self.turns_by_course
 
     @property
     def why_no_turn(self) -> str:
-        """Return in words why it does not turn while it stands."""
+        """Text: why it does not turn while it stands."""
         if self.turning is Turning.STEERED:
             return f"{self.rover} steers as a car and cannot turn on the spot"
         return f"{self.rover} does not turn on the spot, nor at a rate"
 
     @property
     def why_no_rate(self) -> str:
-        """Return in words why it does not turn at a rate."""
+        """Text: why it does not turn at a rate."""
         if self.turning is Turning.STEERED:
             return f"{self.rover} is steered by course and does not turn at a rate"
         return self.why_no_turn
 
     @property
     def why_no_reverse(self) -> str:
-        """Return in words why it does not drive backwards."""
+        """Text: why it does not reverse."""
         return f"{self.rover} does not reverse"
 
 
 def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[SingleGoal, str]:
-    """Return a goal as this vehicle drives it, and in words if that is otherwise. Rejection."""
+    """Return a goal as this vehicle drives it, and a text if that differs, or "".
+
+    Raise Rejection if it cannot drive it.
+    """
     if persona.honours_yaw_rate and persona.turning is Turning.ON_SPOT:
         return goal, ""  # it drives everything
     ability = Ability.of(persona, rover=f"rover {system_id}")
@@ -58,10 +61,10 @@ def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[Singl
 
 
 def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
-    """Return a goal as such a vehicle drives it. Raise Rejection if it cannot.
+    """Return a goal as a vehicle of this ability drives it. Raise Rejection if it cannot.
 
-    A heading at the end of a way is left out, as its autopilot does: clients name one without
-    meaning it.
+    The final heading of a "go to" is dropped where the autopilot ignores it, too: clients name one
+    without meaning it.
     """
     if isinstance(goal, GoTo):
         turns = ability.honours_yaw_rate and ability.turning is Turning.ON_SPOT
@@ -77,13 +80,13 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
 
 
 def _turns_round(goal: SingleGoal, ability: Ability) -> bool:
-    """Whether it drives a way backwards forwards, between two turns on the spot."""
+    """Whether a backward move is driven forwards, between two turns on the spot."""
     is_backwards = isinstance(goal, Move) and goal.distance < 0
     return is_backwards and not ability.honours_yaw_rate and ability.turns_on_spot
 
 
 def driven_otherwise(wish: SingleGoal, ability: Ability) -> str:
-    """Return in words how a goal is driven otherwise than it was asked for; "": it is not."""
+    """Return a text on how a goal is driven differently than requested, or ""."""
     if _turns_round(wish, ability):
         return f"{ability.why_no_reverse}: it turns round, drives and turns back"
     if ability.turning is not Turning.STEERED or not isinstance(wish, GoTo) or wish.yaw is None:
@@ -92,7 +95,7 @@ def driven_otherwise(wish: SingleGoal, ability: Ability) -> str:
 
 
 def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
-    """A car turns only while it rolls."""
+    """Raise Rejection for a turn in place: a car turns only while it rolls."""
     match goal:
         case Rotate() | Face():
             raise _cannot(ability.why_no_turn)
@@ -103,7 +106,7 @@ def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
 
 
 def _check_course(goal: SingleGoal, ability: Ability) -> None:
-    """What is steered by speed and course has neither a turn rate nor a way back."""
+    """Raise Rejection for a turn rate or reverse: setpoints of speed and course have neither."""
     match goal:
         case Rotate() | Face() if not ability.turns_on_spot:
             raise _cannot(ability.why_no_turn)

@@ -1,4 +1,4 @@
-"""A command on its way through the server: who asked what of which vehicle, and the way back."""
+"""A client's command while the server handles it: sender, vehicle, content, and its answer."""
 
 from collections.abc import Hashable
 from typing import Self
@@ -25,7 +25,7 @@ from mav_tasks.tasks.task import Marks, Submitter
 
 
 class CommandRequest:
-    """One command of one client to one vehicle; to be answered exactly once."""
+    """One command of one client to one vehicle, to be answered exactly once."""
 
     def __init__(
         self, client: GcsClient, vehicle: Vehicle, packet: Packet, pending: Pending
@@ -34,14 +34,14 @@ class CommandRequest:
         self.vehicle = vehicle
         self.packet = packet
         self.pending = pending
-        #: who asks, and what he may do: later the endpoint may have signed with another key
+        #: submitter and rights at arrival: later the endpoint may sign with another key
         self.submitter: Submitter = client.who
         self.rights = client.rights
-        #: what is remembered of who asks
+        #: the sender's earlier commands and sequence numbers
         self.sender = client.sender(packet.source)
-        #: what is asked for
+        #: the parsed message
         self.command = command = pending.command
-        #: what that is by the policy table
+        #: its row in the policy table
         self.row = row_said(command)
         self.kind = kind_of(command, self.row, vehicle.parts.persona)
 
@@ -50,17 +50,17 @@ class CommandRequest:
 
     @property
     def actor(self) -> str:
-        """Who asks, in words."""
+        """The submitter, as text."""
         return str(self.submitter)
 
     @property
     def receiver(self) -> CommandReceiver:
-        """The memory of what this client asked before."""
+        """The receiver that knows this sender's earlier commands."""
         return self.sender.commands
 
     @property
     def answering(self) -> Address:
-        """The component that answers: the one addressed; where that is all, our own."""
+        """The component that answers: the target, or the task server for target 0."""
         target, ours = self.command.target, self.vehicle.server_address
         if target.component_id in (0, ours.component_id):
             return ours
@@ -68,17 +68,17 @@ class CommandRequest:
 
     @property
     def answers_to(self) -> Hashable:
-        """What one answer is enough for, however often it was asked."""
+        """Key of requests that one answer is enough for."""
         return self.client.key, type(self), self.command.command, self.answering
 
     @property
     def marks(self) -> Marks:
-        """By what it is recognised when it comes again."""
+        """Keys by which a repeat of this command is recognised."""
         return marks_of(self.command, self.packet.raw)
 
     @property
     def is_go_to(self) -> bool:
-        """Whether it is an operator's "go to" at the autopilot: one that changes the mode."""
+        """Whether this is an operator's "go to": at the autopilot, and changing the mode."""
         command = self.command
         return (
             command.command == MavCmd.DO_REPOSITION
@@ -87,16 +87,16 @@ class CommandRequest:
         )
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Acknowledge it."""
+        """Send the COMMAND_ACK."""
         self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
         self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(
         self, refusal: Rejection, *, result: MavResult | None = None, now: float
     ) -> SubmissionRefused:
-        """Answer with the reason's code and say it in words; gives it for the audit log.
+        """Answer with the reason's code and send its text; return the event for the audit log.
 
-        ``result``: None is what follows from the reason.
+        ``result``: None for the result that follows from the reason.
         """
         if result is None:
             result = translate.result_of(refusal.reason)
@@ -108,16 +108,16 @@ class CommandRequest:
         )
 
     def tell(self, text: str, severity: MavSeverity, *, now: float) -> None:
-        """Say something to the client, in the name of the vehicle's task server."""
+        """Send a text to the client in the name of the vehicle's task server."""
         self.client.tell(text, severity, self.vehicle.server_address, now=now)
 
 
 class MessageRequest(CommandRequest):
-    """The same as asked by the message SET_MODE, which nothing acknowledges."""
+    """A mode request by the message SET_MODE, which has no acknowledgement."""
 
     @classmethod
     def of(cls, client: GcsClient, vehicle: Vehicle, packet: Packet, mode: int) -> Self:
-        """Return the wish for a mode, by its number."""
+        """Return the request for a mode, by its number."""
         target = Address(vehicle.system_id, AUTOPILOT)
         params = (*vehicle.persona.mode_params(mode), 0.0, 0.0, 0.0, 0.0)
         command = Command(target, MavCmd.DO_SET_MODE, params, 0, None, NO_MESSAGE)
@@ -125,7 +125,7 @@ class MessageRequest(CommandRequest):
 
     @property
     def marks(self) -> Marks:
-        """None: a ground station sends it again and again, and means it once."""
+        """Empty keys, equal for all: a ground station repeats SET_MODE and means it once."""
         return Marks()
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:

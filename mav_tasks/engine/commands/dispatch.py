@@ -1,7 +1,8 @@
-"""Where each command of a client goes: to the queue, to a vehicle, or to what the client is shown.
+"""Dispatches each client command: to the task queue, to message requests, or to the vehicle.
 
-Every command is answered exactly once, from the component that was addressed, to the endpoint that
-asked. What is not ours is forwarded to the vehicle, whose answer comes back through ``deliver``.
+Every command is answered exactly once, by the component that was addressed, to the endpoint that
+sent it. A command that the server does not claim is forwarded to the vehicle; its answer comes back
+through ``deliver``.
 """
 
 from typing import NamedTuple
@@ -46,15 +47,15 @@ MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
 
 
 class _UndoesHold(NamedTuple):
-    """A "go to" that came after a HOLD of which it says that nobody has wished for it."""
+    """A "go to" just after a HOLD: it shows that MAVSDK, and no person, sent that HOLD."""
 
     vehicle: Vehicle
-    number: int  # of that HOLD
+    number: int  # identifies the HOLD
     actor: str
 
 
 class Commands:
-    """The answers to commands, and their effects."""
+    """The dispatcher of client commands."""
 
     def __init__(
         self,
@@ -87,7 +88,7 @@ class Commands:
         self._control.apply(settings)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
-        """See to a client's command."""
+        """Execute or refuse a client's command, and answer it."""
         if command.command == MavCmd.TASK_STOP:
             self._stop(client, packet, command, now=now)
             return
@@ -115,18 +116,19 @@ class Commands:
                 asked.answer(MavResult.CANCELLED, refusal.reason)
             elif client.may_be_refused(now=now):
                 self._registry.record(asked.refuse(refusal, now=now))
-            else:  # a flood of them fills neither disk nor net
+            else:  # a flood of refusals fills neither disk nor network
                 asked.answer(result_of(refusal.reason), refusal.reason)
         note_halt(asked, before=epoch)
 
     def _of_unheard(
         self, client: GcsClient, packet: Packet, command: Command, *, now: float
     ) -> None:
-        """Answer about a rover of an earlier run: a question; what is more than that is refused.
+        """Answer a command for a rover that was not heard in this run.
 
-        Not in the first seconds: the rover may be heard before a script that sends again gives up.
-        A server that has no rover answers in its own name to whoever looks for task servers.
-        Silence otherwise: clients send everything to everyone, and it is for somebody else.
+        REQUEST_MESSAGE is answered. Task commands and DO_PAUSE_CONTINUE are refused, but not in the
+        first seconds: the rover may be heard while a script still repeats its command. Without a
+        rover the server answers requests for TASK_QUEUE_STATUS to system 0. All others get no
+        answer: clients send to everyone.
         """
         system_id, component = command.target
         tasks = self._vehicles.tasks_of_unheard(system_id)
@@ -157,9 +159,9 @@ class Commands:
             client.tell_refusal(words, address, now=now)
 
     def _is_tried_again(self, asked: CommandRequest, *, now: float) -> bool:
-        """Whether a mode that has just been refused is asked for, and refused, once more.
+        """Whether an equal mode request was refused a moment ago.
 
-        QGroundControl asks three times, and shows a box for each refusal that is called so.
+        QGroundControl asks three times, and shows a dialog for each refusal; none for CANCELLED.
         """
         is_mode = asked.command.command == MavCmd.DO_SET_MODE
         return is_mode and asked.receiver.is_refused_again(
@@ -167,7 +169,7 @@ class Commands:
         )
 
     def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
-        if asked.command.target.system_id == EVERYBODY:  # what is not ours came once for each rover
+        if asked.command.target.system_id == EVERYBODY:  # others: see ``Broadcasts``
             number = asked.command.command
             raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
         command, row = asked.command, asked.row
@@ -195,7 +197,7 @@ class Commands:
                     return
                 case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
                     number
-                ):  # in examples for every kind of vehicle: nothing to do
+                ):  # examples for every kind of vehicle send it: nothing to do
                     asked.answer(MavResult.ACCEPTED)
                     return
                 case MavCmd.NAV_LAND as number if at_server or self._claims(number):
@@ -233,13 +235,13 @@ class Commands:
                 case number if is_task_command(number):
                     self._refuse_unknown(asked, now=now)
                     return
-        if at_server and row.kind is Kind.QUESTION:  # ground stations ask everybody
+        if at_server and row.kind is Kind.QUESTION:  # ground stations ask all components
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif at_server:
             self._refuse_unknown(asked, now=now)
         elif asked.command.command == MavCmd.DO_SET_MODE and self._modes.asked(asked, now=now):
             return
-        else:  # also to a component never heard of: an autopilot does what that is told
+        else:  # also for a component never heard: an autopilot executes its commands
             lets_go = row.kind is not Kind.GO and not row.passed_on.passes_under_stop
             if lets_go and not asked.vehicle.tasks.is_stopped:
                 require_newer(asked, now=now)
@@ -248,7 +250,7 @@ class Commands:
             relay(asked, now=now)
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
-        """Refuse an observer's question that is too much for the link to the rover."""
+        """Raise Rejection if an observer's question is too much for the rover's link."""
         if asked.row.kind is Kind.QUESTION and not asked.rights.reach(SUBMITTER):
             message = asked.command.message
             why_not = self._vehicles.links.why_not_asked(
@@ -263,16 +265,16 @@ class Commands:
         self._registry.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
 
     def _claims(self, command: int) -> bool:
-        """Whether a command to the autopilot itself is ours to see to."""
+        """Whether the server handles this command when it is sent to the autopilot."""
         return is_task_command(command) or self._settings.claim
 
     def _reposition(self, asked: CommandRequest, *, now: float) -> None:
-        """A "go to"; or, without a place, a pause."""
+        """DO_REPOSITION: submit a "go to"; without a place, pause."""
         if not has_place(asked.command):
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
             return
         held_at = asked.vehicle.hold_before.since
-        # one from before a HOLD, or a copy of one, says nothing about that
+        # a "go to" from before the HOLD, or a copy of one, does not undo it
         is_older = has_left_before_halt(asked, now=now)
         is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
         self._submissions.submit(asked, now=now)
@@ -288,7 +290,7 @@ class Commands:
     def cancel_latest(
         self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
     ) -> None:
-        """COMMAND_CANCEL: nothing acknowledges it; the task's own status tells."""
+        """COMMAND_CANCEL: it has no acknowledgement; the task's status shows the effect."""
         vehicle = self._vehicles.get(message.target_system)
         if vehicle is not None:
             self._control.cancel_latest(
@@ -303,7 +305,7 @@ class Commands:
     # STOP, pause, modes
 
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
-        """Stop one vehicle or all, whatever component is named; acts on every copy, and answers it.
+        """Stop one vehicle or all, whatever the target component; execute and answer every copy.
 
         DEVIATION: for target_system 0 there is one ack, not one from each system: the worst
         result, from the task server of the lowest system id.
@@ -312,7 +314,7 @@ class Commands:
         targets = self._vehicles.addressed_by(target.system_id)
         actor = str(client.submitter(packet.source))
         is_to_clear = command.params[0] == 1.0
-        clear = is_to_clear and client.rights.reach(OPERATOR)  # of nobody else; STOP is everybody's
+        clear = is_to_clear and client.rights.reach(OPERATOR)  # STOP needs no role
         unheard = self._vehicles.stop_unheard(target.system_id, clear=clear, actor=actor, now=now)
         if not targets and not unheard:
             return
@@ -352,7 +354,7 @@ class Commands:
         vehicle = asked.vehicle
         self._submissions.held(vehicle, asked.submitter)
         paused = vehicle.joint.pause(actor=asked.actor, now=now)
-        if not vehicle.is_heard(now=now):  # paused all the same
+        if not vehicle.is_heard(now=now):  # it is paused nevertheless
             words = f"paused, but rover {vehicle.system_id} is silent"
             raise Rejection(R.VEHICLE_SILENT, words)
         return paused
@@ -368,13 +370,13 @@ def _undo_hold(undoes: _UndoesHold, *, now: float) -> None:
 
 
 def _leave_hold(undoes: _UndoesHold, *, now: float) -> None:
-    """It was not stored in time."""
+    """Do nothing: the "go to" was not stored in time, so the HOLD stays."""
 
 
 def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:
-    """Whether it is about the messages of a component that is not there.
+    """Whether a message interval is set or requested of a component that was never heard.
 
-    An autopilot answers for those: also about what it sends.
+    The autopilot would answer in its place, about the autopilot's own messages too.
     """
     intervals = MavCmd.SET_MESSAGE_INTERVAL, MavCmd.GET_MESSAGE_INTERVAL
     component = asked.command.target.component_id

@@ -1,6 +1,6 @@
-"""What clients send past the server to vehicles, and what of it ends here.
+"""Forwards clients' packets that the server does not claim, and drops those not allowed.
 
-What the server does not claim goes to the link on which the target was seen, if it may.
+A packet goes to the link on which its target was seen.
 """
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -25,7 +25,7 @@ EVERYBODY = Address(0, 0)
 
 
 class Forwarder:
-    """Passes clients' packets on."""
+    """The forwarder of client packets to vehicles."""
 
     def __init__(self, vehicles: VehicleSide, refusals: Refusals) -> None:
         self._refusals = refusals
@@ -35,10 +35,10 @@ class Forwarder:
     def forward(
         self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
-        """Pass a packet to the vehicles that it is for; what is for us ends here.
+        """Forward a packet to its target vehicles, unless it is for the task server.
 
-        Without a ``message`` its id is unknown and its bytes are unverified: noise may look like
-        it, and is no refusal worth a line.
+        Without a ``message`` its id is unknown and its bytes are unverified. Noise may look so; its
+        refusal is not logged.
         """
         row = row_of(packet.message_id, message).passed_on
         target = EVERYBODY if message is None else _target(message)
@@ -48,7 +48,7 @@ class Forwarder:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
         is_observers = not client.rights.reach(SUBMITTER)
-        behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # one endpoint, a radio with several
+        behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # a radio may have several
         for vehicle in self._vehicles.addressed_by(target.system_id):
             if target != vehicle.server_address:
                 behind.setdefault(vehicle.requests.place, []).append(vehicle)
@@ -84,7 +84,7 @@ class Forwarder:
     def _refuse_question(
         self, client: GcsClient, vehicle: Vehicle, packet: Packet, why: str, *, now: float
     ) -> None:
-        """Refuse an observer's question, in a text as well: MAVLink has no answer for that."""
+        """Refuse an observer's question with a text: MAVLink has no answer for that."""
         refusal = client.rights.refusal(why, R.RATE_LIMITED)
         client.tell_refusal(refusal.text, vehicle.server_address, now=now)
         self._refusals.stream(client, vehicle.system_id, packet, refusal, now=now)
@@ -92,7 +92,7 @@ class Forwarder:
     def _why_not(
         self, client: GcsClient, row: Row, message: m.Message | None, *, now: float
     ) -> Rejection | None:
-        """Return why a packet may go to no rover at all, None if it may."""
+        """Return why a packet may go to no rover, or None if it may."""
         if not client.rights.reach(row.role):
             return client.rights.refusal(f"may not send that to a rover, {row.role} may")
         if isinstance(message, m.FileTransferProtocol):
@@ -103,7 +103,7 @@ class Forwarder:
         return None
 
     def end(self, link: str, peer: Peer, *, now: float) -> None:
-        """A client is gone: whatever it was driving is driven by nobody."""
+        """Stop the vehicles that a client was driving, because it is gone."""
         for vehicle in self._vehicles.all:
             if vehicle.motion_rights.has_granted((link, peer)):
                 self._vehicles.mark_dirty(vehicle)
@@ -111,12 +111,12 @@ class Forwarder:
 
 
 def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
-    """Return in words why a packet that a client may send does not go to a rover now."""
+    """Return why a packet that the client's role may send does not go to a rover now."""
     return why_not_sent(row, vehicle, client.key) or "not finite, or older than the server's pause"
 
 
 def _target(message: m.Message) -> Address:
-    """Return whom a message is for, 0 for all."""
-    if isinstance(message, m.ManualControl):  # its field has a name of its own
+    """Return the target of a message; 0 means all."""
+    if isinstance(message, m.ManualControl):  # it names its target ``target``
         return Address(message.target, 0)
     return target_of(message)

@@ -1,6 +1,7 @@
-"""Commands → drafts of tasks; a Rejection names what is wrong. Pure functions.
+"""Parses commands into goals, terms and deduplication keys. Pure functions.
 
-Our own commands, and the standard ones that a stock client sends without knowing of us.
+Takes our own commands, and the standard ones of clients that do not know this server. A Rejection
+names the bad parameter.
 """
 
 from collections.abc import Callable
@@ -34,7 +35,7 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Ma
 
 R = TaskReason
 
-#: a COMMAND_INT may name any frame there is where its numbers are no coordinates
+#: a COMMAND_INT without coordinates may name any existing frame
 KNOWN_FRAMES = frozenset(MavFrame)
 GLOBAL_FRAMES = frozenset(
     {
@@ -46,15 +47,15 @@ GLOBAL_FRAMES = frozenset(
         MavFrame.GLOBAL_TERRAIN_ALT_INT,
     }
 )
-NOT_GIVEN = 0x7FFFFFFF  # of x and y in COMMAND_INT, which has no NaN there
+NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT, whose integers have no NaN
 LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
 MAX_WAIT = 86_400.0  # s
 MAX_DELAY = 31_536_000.0  # s, a year
 CHANGE_MODE, RELATIVE_YAW = 1, 2  # MAV_DO_REPOSITION_FLAGS
 MAX_FLAGS = EXACT  # of a bit mask in a float32
-MIN_SPEED = 0.01  # m/s; slower, a drive of a metre takes minutes and is taken for being stuck
-MIN_RATE = 0.1  # deg/s, the same of turning
-HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own time-out of a setpoint
+MIN_SPEED = 0.01  # m/s; a slower drive takes minutes for a metre, and counts as stuck
+MIN_RATE = 0.1  # deg/s, the same for turning
+HEAD_FOR = 3.0  # s that NAV_SET_YAW_SPEED drives: an autopilot's own setpoint time-out
 
 INTEGERS = (5, 6)  # x and y of COMMAND_INT
 
@@ -62,7 +63,7 @@ _MARK = Struct("<BBHh7d")
 
 
 class ParsedCommand(NamedTuple):
-    """What a command asks for: a goal, and on what terms."""
+    """The goal, terms and deduplication keys in a command."""
 
     goal: SingleGoal
     terms: Terms
@@ -78,9 +79,9 @@ def parse_command(
     priority: int = DEFAULT_PRIORITY,
     is_cruising: bool = False,
 ) -> ParsedCommand:
-    """Return what a command that becomes a task asks for; Rejection names a bad parameter.
+    """Return a parsed task command. Raise Rejection that names a bad parameter.
 
-    ``priority`` and ``is_cruising`` are those of a standard command, which cannot name them.
+    ``priority`` and ``is_cruising`` are for standard commands, which cannot name them.
     """
     if command.frame is not None and command.frame not in KNOWN_FRAMES:
         raise Rejection(R.BAD_FRAME, f"frame {command.frame} is unknown")
@@ -99,20 +100,20 @@ def parse_command(
     return ParsedCommand(goal, _terms(named), marks)
 
 
-@cache  # nearly all are alike, and to make them anew takes its time
+@cache  # nearly all are equal, and making them takes time
 def _terms(priority: int, *, is_cruising: bool = False) -> Terms:
     return Terms(priority=priority, is_cruising=is_cruising)
 
 
 def goal_of(command: Command, driving: Driving) -> SingleGoal:
-    """Return the goal of a command that becomes a task; Rejection names a bad parameter."""
+    """Return the goal of a task command. Raise Rejection that names a bad parameter."""
     return GOALS[command.command](command, driving)
 
 
 def marks_of(command: Command, packet: bytes, *, nonce: int = 0) -> Marks:
-    """Return by what a submission is recognised when it comes again; NaN is equal to NaN.
+    """Return the keys by which a repeated submission is recognised; NaN is equal to NaN.
 
-    With a nonce nothing else is asked, so that the packet's own digest is not needed.
+    With a nonce the packet's digest is not needed.
     """
     params: tuple[float, ...] = command.params
     if isnan(sum(params)):  # at least one: NaN has many forms
@@ -130,7 +131,7 @@ def _digest(data: bytes) -> str:
 
 
 def bad(words: str, *, param: int) -> Rejection:
-    """Return the refusal of a parameter, 1 to 7."""
+    """Return a Rejection for a parameter, 1 to 7."""
     return Rejection(R.BAD_PARAMETER, words, param=param)
 
 
@@ -143,7 +144,7 @@ def number(
     high: float,
     default: float | None = None,
 ) -> float:
-    """Return a parameter, or raise a Rejection that names it. NaN is "not given"."""
+    """Return a parameter, or raise Rejection that names it. NaN is "not given"."""
     value = command.params[index - 1]
     if low <= value <= high:
         return value
@@ -159,7 +160,7 @@ def number(
 def whole(
     command: Command, index: int, name: str, *, low: int = 0, high: int, default: int | None = 0
 ) -> int:
-    """Return a parameter that must be a whole number, or raise a Rejection that names it.
+    """Return a whole-number parameter, or raise Rejection that names it.
 
     ``default`` None: it must be given.
     """
@@ -177,7 +178,7 @@ def whole(
 def identifier(
     command: Command, index: int, name: str, *, low: int = 0, default: int | None = 0
 ) -> int:
-    """Return a task id or a nonce: a whole number that may be larger than a float32 holds."""
+    """Return a task id or nonce, a whole number that may exceed the range of a float32."""
     value = command.params[index - 1]
     if low <= value <= EXACT and value == int(value):
         return int(value)
@@ -195,7 +196,7 @@ def flag(command: Command, index: int, name: str, *, default: int | None = 0) ->
 
 
 def has_place(command: Command) -> bool:
-    """Whether a place is given in x and y, a bad one or a good one."""
+    """Whether x and y give a place, valid or not."""
     x, y = command.params[4:6]
     if command.frame is None:
         return not (isnan(x) and isnan(y))
@@ -203,7 +204,7 @@ def has_place(command: Command) -> bool:
 
 
 def place_in(command: Command) -> Place | None:
-    """Return the place in x and y, or None if none is given; Rejection names what is wrong."""
+    """Return the place in x and y, or None if none is given. Raise Rejection if it is bad."""
     if not has_place(command):
         return None
     x, y = command.params[4:6]
@@ -226,7 +227,7 @@ def place_in(command: Command) -> Place | None:
 
 
 def _global(latitude_degE7: int, longitude_degE7: int) -> GlobalPlace:
-    if latitude_degE7 == longitude_degE7 == 0:  # what an unset place looks like
+    if latitude_degE7 == longitude_degE7 == 0:  # an unset place looks like this
         raise bad("latitude and longitude are 0: no place is given", param=5)
     return GlobalPlace(latitude_degE7, longitude_degE7)
 
@@ -239,9 +240,9 @@ def _place(command: Command) -> Place:
 
 
 def _yaw(command: Command, index: int, *, turn: float) -> float | None:
-    """Return a heading of at most a full ``turn``, None where none is asked for.
+    """Return a heading of at most a full ``turn``, None if none is given.
 
-    Many clients leave a 0 there that is not meant as north.
+    0 counts as none: many clients leave a 0 there without meaning north.
     """
     value = number(command, index, "yaw", low=-turn, high=turn, default=0.0)
     return value or None
@@ -262,7 +263,7 @@ def _speed_or_default(command: Command, index: int, driving: Driving) -> float |
 
 
 def _rate_or_default(command: Command, index: int, driving: Driving) -> float | None:
-    """Return a rate of turn in rad/s, None for the default: 0 or NaN."""
+    """Return a turn rate in rad/s, None for the default: 0 or NaN."""
     if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
         return None
     fastest = degrees(driving.max_turn_rate)
@@ -305,14 +306,14 @@ def _drive(command: Command, driving: Driving) -> SingleGoal:
 
 
 def refuse_infinite(command: Command) -> None:
-    """Also in what is not used: it cannot be meant."""
+    """Raise Rejection for an infinite parameter, also an unused one: it cannot be meant."""
     for index, value in enumerate(command.params, 1):
         if isinf(value):
             raise bad(f"param{index} is infinite", param=index)
 
 
 def _refuse_reserved(command: Command, index: int) -> None:
-    """What may come to mean something is refused until it does, never left out in silence."""
+    """Raise Rejection if a reserved parameter is set: it must not be ignored silently."""
     if not (isnan(command.params[index - 1]) or command.params[index - 1] == 0.0):
         raise bad(f"param{index} (unused): must be 0 in this version", param=index)
 
@@ -373,7 +374,7 @@ def _set_yaw_speed(command: Command, driving: Driving) -> SingleGoal:
     return Head(radians(angle), speed, HEAD_FOR, is_relative=flag(command, 3, "relative"))
 
 
-#: how the goal is made of each command that asks for a task
+#: parser of the goal, by command
 GOALS: dict[int, Callable[[Command, Driving], SingleGoal]] = {
     MavCmd.TASK_MOVE: _move,
     MavCmd.TASK_ROTATE: _rotate,

@@ -1,7 +1,7 @@
-"""What a client's wish for a mode means: HOLD, a return, the mission, or the vehicle's own affair.
+"""Handles mode requests: HOLD, return and mission by the server, other modes by the vehicle.
 
-It comes as a command, which is answered, or as the old message SET_MODE, which nothing
-acknowledges: who sent that waits until a heartbeat shows the mode.
+A request comes as DO_SET_MODE, which is answered, or as the older message SET_MODE, which has no
+acknowledgement: its sender waits until a heartbeat shows the mode.
 """
 
 from typing import NamedTuple
@@ -27,20 +27,20 @@ from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
 
 R = TaskReason
 
-SHOWN_FOR = 1.2  # s, in which a heartbeat each second shows a mode at least once
+SHOWN_FOR = 1.2  # s, in which heartbeats at 1 Hz show a mode at least once
 CRUISING = Terms(is_cruising=True)
 STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
 
 
 class _Started(NamedTuple):
-    """A mission that was started, or goes on, for whoever has asked for that."""
+    """A mission that was started or resumed, and the request to answer."""
 
     asked: CommandRequest
     task: Task
 
 
 class ModeRequests:
-    """The wishes for modes of all clients."""
+    """The handler of mode requests and mission starts of all clients."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class ModeRequests:
         self._claims = settings.claim
 
     def asked(self, asked: CommandRequest, *, now: float) -> bool:
-        """See to a wish for a mode; False: it is for the vehicle itself to answer."""
+        """Handle DO_SET_MODE. Return False if the vehicle itself is to answer it."""
         vehicle, client = asked.vehicle, asked.client
         main, sub = asked.command.params[1:3]
         mode = vehicle.persona.mode_in(main, sub)
@@ -98,7 +98,7 @@ class ModeRequests:
         return True
 
     def heard(self, asked: MessageRequest, *, now: float) -> None:
-        """See to the message SET_MODE."""
+        """Handle the message SET_MODE."""
         vehicle = asked.vehicle
         epoch = vehicle.tasks.halts.epoch
         try:
@@ -115,7 +115,7 @@ class ModeRequests:
     # missions
 
     def start_plan(self, asked: CommandRequest, *, first: int, now: float) -> None:
-        """Start or continue the uploaded mission; one that is over is another task."""
+        """Start or resume the uploaded mission; after its end it is submitted as a new task."""
         vehicle, submitter = asked.vehicle, asked.submitter
         self._plans.check_start(asked.rights, vehicle, submitter)
         self._submissions.check_open()
@@ -138,19 +138,19 @@ class ModeRequests:
         self._registry.record(started.asked.refuse(refusal, now=now))
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
-        """Begin the mission of a vehicle that was to be armed first, if it has just been."""
+        """Start the mission of a vehicle that was to be armed first and is armed now."""
         mark = vehicle.start_mark
         if mark.marker is None or not mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
             return
         if vehicle.control.is_engaged or vehicle.control.we_armed:
-            return  # armed by ourselves, for a task
+            return  # armed by the server, for a task
         marker = vehicle.start_mark.take()
         vehicle.shown.forget()
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
         if vehicle.parts.is_manual and not vehicle.motion_rights.is_armed_by_client(now=now):
-            return  # by a person who means to drive
+            return  # armed by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)
         except Rejection as refusal:
@@ -176,7 +176,7 @@ class ModeRequests:
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
     def _show(self, vehicle: Vehicle, mode: int, *, now: float) -> None:
-        """Let clients see a mode at once: who sends SET_MODE is told in no other way."""
+        """Show clients a mode at once: SET_MODE has no other answer."""
         lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
         vehicle.shown.show(mode, until=now + lasts)
         heartbeat = vehicle.shown.in_message(vehicle.heartbeat, now=now)
@@ -189,13 +189,13 @@ class ModeRequests:
         return vehicle.persona.starts_when_armed and not vehicle.armed
 
     def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
-        """Whether a mode is the return that we drive ourselves: towards a home that is known."""
+        """Whether the server drives this mode itself, as a return to a known home."""
         return (
             self._claims and mode == vehicle.persona.return_mode and vehicle.where.home is not None
         )
 
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
-        """Whether a mode is the mission that we drive ourselves: one was uploaded to us."""
+        """Whether the server drives this mode itself, as the mission uploaded to it."""
         active = vehicle.tasks.active
         has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
         has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
@@ -203,7 +203,7 @@ class ModeRequests:
 
 
 def _return_home(asked: CommandRequest) -> Draft:
-    """What the mode RTL asks for."""
+    """Return the draft for the mode RTL."""
     command = MavCmd.NAV_RETURN_TO_LAUNCH
     return Draft(
         asked.vehicle.system_id,

@@ -1,7 +1,7 @@
-"""What of a client's messages goes to a vehicle now, by the policy table and what it does.
+"""Decides whether a client's message goes to a vehicle now, by policy table and vehicle state.
 
-A client that streams setpoints must not drive the instant a task ends, and nobody but a person at
-the sticks moves a vehicle that a task is driving.
+A client that streams setpoints must not drive the instant a task ends. While a task drives a
+vehicle, only manual control moves it.
 """
 
 from collections.abc import Hashable
@@ -13,14 +13,14 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services.orders import moves
 
-NO_PLACE = 7  # type_mask of what ignores x, y and z
+NO_PLACE = 7  # type_mask that ignores x, y and z
 STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
 RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 
 
 def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable, *, takes_over: bool = False) -> str:
-    """Return in words what keeps a word of a client from a rover now, "" if nothing does.
+    """Return why a client's message may not go to a rover now, "" if it may.
 
     ``takes_over``: it also asks for the mode in which clients drive.
     """
@@ -39,8 +39,8 @@ def may_pass(
     row: Row,
     message: m.Message | None,
 ) -> bool:
-    """Whether a client's packet may be passed on to the vehicle; then ``passed`` is called."""
-    # it may have waited for us while the vehicle stopped by itself
+    """Whether a client's packet may be forwarded to the vehicle; if so, call ``passed``."""
+    # it may have waited here while the vehicle stopped by itself
     if client.is_late and row.kind in (Kind.MOTION, Kind.STICKS) and not _asks_to_stand(message):
         return False
     if row.needs_grant and message is not None and not _is_finite(message):
@@ -49,7 +49,7 @@ def may_pass(
 
 
 def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> None:
-    """Note that a client's packet does not go to the vehicle."""
+    """Note that a client's packet is not forwarded to the vehicle."""
     if row.needs_grant:
         vehicle.motion_rights.withheld(client, now=now)
 
@@ -57,7 +57,7 @@ def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> Non
 def passed(
     vehicle: Vehicle, client: Hashable, row: Row, message: m.Message | None, *, now: float
 ) -> None:
-    """Note what a packet that goes to the vehicle means for its tasks."""
+    """Note the effect on the tasks of a packet that is forwarded to the vehicle."""
     if row.needs_grant:
         vehicle.motion_rights.passed(client, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
@@ -74,7 +74,7 @@ def _asks_to_stand(message: m.Message | None) -> bool:
 
 
 def _is_finite(message: m.Message) -> bool:
-    """Whether no number in it would make an autopilot abort, even in a field that is ignored."""
+    """Whether all numbers are finite: others make autopilots abort, even in ignored fields."""
     return all(
         isfinite(number)
         for value in message.to_dict().values()
@@ -84,7 +84,7 @@ def _is_finite(message: m.Message) -> bool:
 
 
 def _off_centre(message: m.ManualControl | m.RcChannelsOverride) -> bool:
-    """Whether a person moves the sticks, rather than resting at them."""
+    """Whether a stick is off its centre: a person drives."""
     if isinstance(message, m.ManualControl):
         sticks = (message.x, message.y, message.z, message.r)  # z is a rover's throttle
         return any(abs(s) > STICKS_CENTRED for s in sticks if s != 0x7FFF)

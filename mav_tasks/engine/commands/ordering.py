@@ -1,8 +1,8 @@
-"""Whether a word that lets a rover go counts: what holds beats every older one.
+"""Refuses a command that lets a rover go if it is older than the rover's last halt.
 
-A word is older than a halt if its first copy came before it, if its sender's numbers show that it
-had left before it, if it names another epoch than the present one, or if it waited while the server
-stood still. Who is refused may send it anew; that is told.
+It is older if its first copy came before the halt, if its sequence number shows that it was sent
+before the halt, if it names another halt epoch than the present one, or if it waited while the
+server was stalled. The refusal tells the client to send it again.
 """
 
 from math import isfinite
@@ -14,29 +14,28 @@ from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.services.command_receiver import COPIED, DOUBLED, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 
-#: where a word names the epoch that its sender was shown: which of the parameters, from 0
+#: index of the parameter with the halt epoch that the sender was shown, by command
 EPOCH_IN: dict[int, int] = {
     MavCmd.DO_PAUSE_CONTINUE: 1,
     MavCmd.TASK_RELEASE: 2,
     MavCmd.MISSION_START: 2,
 }
-REPEATED = 2.0  # s, within which MAVSDK sends again, unmarked, what it has no answer to: 1.5
-EPOCHS = 1 << 24  # that a float32 tells apart
+REPEATED = 2.0  # s, within which MAVSDK repeats an unanswered command, unmarked: at 1.5 s
+EPOCHS = 1 << 24  # epochs that a float32 tells apart
 AGAIN = "if you still mean it, send it again in 4 s"
 
 
 def require_newer(asked: CommandRequest, *, now: float) -> None:
-    """Raise Rejection (STALE) for a word that lets go and is older than what holds the rover."""
+    """Raise Rejection (STALE) for a command that is older than the rover's last halt."""
     words = why_older(asked, now=now)
     if words:
         raise Rejection(TaskReason.STALE, words)
 
 
 def why_older(asked: CommandRequest, *, now: float) -> str:
-    """Return in words why a word that lets go does not count, "" if it does; remember it.
+    """Return why a command is older than the last halt, "" if it is newer; remember it.
 
-    It is older than what holds the rover. Each copy has to be asked about, also one that is known
-    for what it is otherwise: by that the next one is known for a copy.
+    Call this for each copy, even one recognised in another way: the next copy is recognised by it.
     """
     halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
     is_old = asked.client.is_late
@@ -56,10 +55,11 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     elsewhere = asked.vehicle.go_words.first_epoch(packet.raw, sender, now=now)
     if elsewhere is not None:
         first = elsewhere if first is None else min(first, elsewhere)
-    if first is None and copies:  # the first one was lost, and had left before this one
+    if first is None and copies:  # the first copy was lost; it was sent before this one
         sent_after = min(sent_after, now - min(copies * COPIED, DOUBLED))
-    # its sender has said the last halt itself, and before this, which it does not repeat by itself:
-    # no stock client has two commands of one number under way; or that halt has been let go since
+    # The sender of the last halt sent this after it. It is no repeat of an older command if that
+    # halt was undone since, if the halt has the same command number (no stock client has two of one
+    # number under way), or if no copy came for REPEATED s.
     follows = halts.by is sender and number > halts.number
     is_over = halts.is_undone or halts.command == asked.command.command
     is_repeated = copies > 0 or sender.has_said(content, packet)
@@ -68,7 +68,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     else:
         epoch = halts.epoch if halts.at < sent_after else halts.epoch - 1
         epoch = epoch if first is None else min(epoch, first)
-    # it may be a copy of what only the server before has heard
+    # it may be a copy of a command that only the server's run before this one heard
     if first is None and now - halts.restored_at <= COPIED:
         epoch = halts.epoch - 1
     if named:
@@ -87,9 +87,9 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
 
 
 def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False, now: float) -> bool:
-    """Return whether the last halt is the same sender's, and this word had left before it.
+    """Return whether this command's sender sent it before its own last halt.
 
-    With ``anybodys`` the halt may be anybody's: it is enough that this word may have left before.
+    With ``anybodys`` also whether it may have been sent before the last halt of any sender.
     """
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
     number = line.number_of(asked.packet.seq)
@@ -99,7 +99,7 @@ def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False, now: 
 
 
 def note_halt(asked: CommandRequest, *, before: int) -> None:
-    """Note whose word the last halt was, if there was one since the epoch ``before``."""
+    """Note this command as the last halt if the epoch is not ``before``, or if it repeats it."""
     halts = asked.vehicle.tasks.halts
     is_repeated = halts.by is asked.sender and asked.kind is Kind.HALT
     if halts.epoch != before or is_repeated:
@@ -108,7 +108,7 @@ def note_halt(asked: CommandRequest, *, before: int) -> None:
 
 
 def _epoch_in(command: Command) -> int:
-    """Return the epoch that a command names, 0 if it names none."""
+    """Return the halt epoch that a command names, 0 if it names none."""
     place = EPOCH_IN.get(command.command)
     value = 0.0 if place is None else command.params[place]
     return int(value) if isfinite(value) and value > 0.0 else 0

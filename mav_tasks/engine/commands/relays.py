@@ -1,4 +1,4 @@
-"""Commands of clients that are the vehicle's own affair: passed on, their answers brought back."""
+"""Forwards commands that the server does not claim to vehicles, and returns their answers."""
 
 from math import isfinite
 from typing import NamedTuple
@@ -23,7 +23,7 @@ R = TaskReason
 
 
 class _Asker(NamedTuple):
-    """Whose command was forwarded: the endpoint, the address there, and whom it addressed."""
+    """The sender of a forwarded command: endpoint, address there, and the component addressed."""
 
     client: tuple[str, Peer]
     source: Address
@@ -31,7 +31,7 @@ class _Asker(NamedTuple):
 
 
 def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
-    """Refuse what would move a stopped vehicle, or drive one that a task drives."""
+    """Raise Rejection if a command may not go to its vehicle now, else note its effect."""
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
     asked.rights.require(row.role, f"send command {number} to a rover")
@@ -43,7 +43,7 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     if why_not:
         raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
-        raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # would abort a vehicle
+        raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # makes an autopilot abort
     if takes_over:
         vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
     if row.needs_grant:
@@ -51,7 +51,7 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
 
 
 def relay(asked: CommandRequest, *, now: float) -> None:
-    """Pass a command on; ``deliver`` brings its answer to who asked."""
+    """Forward a command; ``deliver`` brings its answer to the client."""
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
     asker = _Asker(asked.client.key, asked.packet.source, answering)
@@ -73,7 +73,7 @@ def _disarms(request: Message) -> bool:
 
 
 def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
-    """Bring a vehicle's answer, or its silence, to the client that asked."""
+    """Answer the client with the vehicle's answer, or with a refusal if there is none."""
     asker = answered.origin
     assert isinstance(asker, _Asker), "only relay gives commands an origin"
     is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
@@ -90,7 +90,7 @@ def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -
         # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK
         result = ack.result if ack.result <= MavResult.CANCELLED else MavResult.UNSUPPORTED
         if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
-            result = MavResult.UNSUPPORTED  # as some say that they have no such message
+            result = MavResult.UNSUPPORTED  # some autopilots answer so for an unknown message
         answer = Answer(command, result, ack.result_param2, asker.answering)
     elif not answered.was_sent:
         reason = int(R.RATE_LIMITED)

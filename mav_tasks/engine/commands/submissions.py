@@ -1,4 +1,4 @@
-"""Submissions of tasks: recognised if they come again, queued, and acknowledged once durable."""
+"""Submissions of tasks: deduplicated, queued, and acknowledged once durable."""
 
 from collections.abc import Hashable
 from typing import NamedTuple
@@ -29,7 +29,7 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskI
 
 R = TaskReason
 
-#: why a queue stands, in the first words that a station shows
+#: texts why a queue is paused, short for a ground station's first words
 PAUSED = {
     R.OPERATOR: "queue paused",
     R.STOPPED: "STOP in force",
@@ -37,19 +37,19 @@ PAUSED = {
     R.FAILSAFE: "failsafe",
     R.RESTARTED: "server restarted",
 }
-GIVEN_UP = 3.5  # s, after which a client waits for no answer any more
-NONCE = 3  # where it is among the parameters
+GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
+NONCE = 3  # its index among the parameters
 
 
 class Submitted(NamedTuple):
-    """A task that was taken in; whoever has asked for it is told when that is durable."""
+    """A submitted task; the request is acknowledged once the task is durable."""
 
     asked: CommandRequest
     task: Task
 
 
 class Submissions:
-    """What becomes a task, and whether it may be said so yet."""
+    """The entry of all new tasks, which are acknowledged once durable."""
 
     def __init__(
         self,
@@ -63,16 +63,16 @@ class Submissions:
         self._registry = registry
         self._deduplicator = deduplicator
         self._settings = settings
-        #: what waits for the store, whosever it is
+        #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
-        #: taken in, and not durable yet: who is to be told, each client once for a command
+        #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
         self._store_is_away = False
         self._is_closing = False
 
     def close(self) -> None:
-        """Take no more: the server ends."""
+        """Refuse new submissions from now on: the server shuts down."""
         self._is_closing = True
 
     def apply(self, settings: Settings) -> None:
@@ -81,7 +81,7 @@ class Submissions:
         self.gate.within = settings.watch.commit
 
     def committed(self, through: int, *, now: float) -> None:
-        """Let go what waited for the store."""
+        """Carry out what waited for events up to ``through``; accept submissions again."""
         self._store_is_away = False
         self.gate.committed(through, now=now)
 
@@ -90,7 +90,7 @@ class Submissions:
         self._store_is_away = True
 
     def submit(self, asked: CommandRequest, *, now: float) -> None:
-        """Take in the task that a command asks for; Rejection says why not."""
+        """Submit the task of a command. Raise Rejection if it is refused."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
             words = "it waited while the server stood still: send it again"
@@ -104,8 +104,8 @@ class Submissions:
             priority=DEFAULT_PRIORITY if is_ours else self._priority_of(asked.submitter),
             is_cruising=command.target.component_id in (0, AUTOPILOT),
         )
-        # A stock client cannot read TASK_STATUS, and counts it as a packet lost; it fills up with
-        # zeros. A nonce, or NaN for none, comes from somebody who knows these commands.
+        # A stock client counts TASK_STATUS, which it cannot read, as a lost packet; it fills unused
+        # parameters with zeros. A nonce, or NaN for none, shows that the client knows our dialect.
         client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         goal, words = driven(wish.goal, vehicle.parts.persona, system_id=vehicle.system_id)
         if isinstance(goal, GoTo):
@@ -117,7 +117,7 @@ class Submissions:
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
-        waits = bool(vehicle.tasks.paused)  # nothing moves by it before a word that lets go
+        waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
         if has_left_before_halt(asked, anybodys=not waits, now=now):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came since: {AGAIN}")
         task = self.take_in(
@@ -126,7 +126,7 @@ class Submissions:
             draft,
             runs_now=runs_now,
             why_not=why_not,
-            # as on an autopilot; a task of ours waits until its client has driven
+            # as on an autopilot; a task command waits until its client has ended driving
             ends_driving_of=None if is_ours else client.key,
             now=now,
         )
@@ -135,20 +135,20 @@ class Submissions:
             asked.tell(words, MavSeverity.INFO, now=now)
 
     def run_now(self, asked: CommandRequest, draft: Draft, *, now: float) -> None:
-        """Take in a task that runs at once; Rejection says why not."""
+        """Submit an immediate task. Raise Rejection if it is refused."""
         asked.vehicle.joint.end_driving_of(asked.client.key, now=now)
         if not self._is_repeat(asked, draft, confirmation=0, now=now):
             task = self.take_in(asked.rights, asked.vehicle, draft, runs_now=True, now=now)
             self._await_commit(asked, task, now=now)
 
     def submit_draft(self, asked: CommandRequest, draft: Draft, *, now: float) -> Task:
-        """Take in a task that a command means without naming it; Rejection says why not."""
+        """Submit a task that a command implies. Raise Rejection if it is refused."""
         task = self.take_in(asked.rights, asked.vehicle, draft, now=now)
         self._await_commit(asked, task, now=now)
         return task
 
     def submit_plan(self, rights: Rights, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
-        """Take in an uploaded plan, of which nothing is said yet; Rejection says why not."""
+        """Submit an uploaded plan; the caller acknowledges it. Raise Rejection if it is refused."""
         task = self.take_in(rights, vehicle, draft, now=now)
         self._deduplicator.remember(task, at=now, now=now)
         return task
@@ -164,9 +164,9 @@ class Submissions:
         ends_driving_of: Hashable | None = None,
         now: float,
     ) -> Task:
-        """Take a new task in, of whatever origin. Rejection says why not.
+        """Submit a new task of any origin. Raise Rejection if it is refused.
 
-        ``why_not``: in words, why it does not count though it could run now.
+        ``why_not``: text why it is refused as stale, if all other checks pass; "" if it is not.
         """
         self.check_open()
         if runs_now:
@@ -181,9 +181,9 @@ class Submissions:
         return vehicle.tasks.submit(draft, now=now)
 
     def known_plan(self, draft: Draft, *, begun_at: float, now: float) -> TaskId | None:
-        """Return the task that a plan is already, uploaded a moment before: its ack may be lost.
+        """Return the task of an equal plan uploaded just before, whose ack may be lost, or None.
 
-        So may be the ack of this copy: from here on the next one counts.
+        This copy's ack may be lost, too, so the time for a further copy starts again.
         """
         known = self._deduplicator.known(draft, confirmation=1, origin=None, now=begun_at)
         task = None if known is None else self._registry.get(known.task_id)
@@ -193,7 +193,7 @@ class Submissions:
         return task.id
 
     def take_back(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
-        """A submission was not stored in time: it is none."""
+        """Undo a submission that was not stored in time."""
         self._deduplicator.forget(task)
         self._store_is_away = True
         current = self._registry.get(task.id)
@@ -201,7 +201,7 @@ class Submissions:
             vehicle.tasks.withdraw(current, now=now)
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
-        """A client wants a vehicle to stand: what it asks for next is another wish."""
+        """Note that a client halted a vehicle: a return that it requests next is a new task."""
         self._deduplicator.held(submitter, vehicle.system_id)
 
     def _priority_of(self, submitter: Submitter) -> int:
@@ -212,7 +212,7 @@ class Submissions:
         return priorities.get(submitter.place, by_address)
 
     def _check_reach(self, vehicle: Vehicle, goal: GoTo) -> None:
-        """A slip of a digit in a place is a drive that nobody meant."""
+        """Raise Rejection for a place too far away, by a typing error, or outside the fence."""
         far = vehicle.where.distance_to(goal)
         longest = self._settings.driving.max_distance
         if far is not None and far > longest:
@@ -222,7 +222,7 @@ class Submissions:
             raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
 
     def check_open(self) -> None:
-        """Raise Rejection while nothing new is taken in."""
+        """Raise Rejection while new submissions are refused."""
         if self._is_closing:
             raise Rejection(R.RATE_LIMITED, "the server is shutting down")
         if self._store_is_away:
@@ -234,19 +234,19 @@ class Submissions:
         self.gate.hold(Submitted(asked, task), now=now)
 
     def _accept(self, submitted: Submitted, *, now: float) -> None:
-        """The submission is durable: acknowledge it with the task's id, and tell of it."""
+        """Acknowledge a durable submission with the task's id, and tell all clients."""
         asked, task = submitted
         for each in self._undecided.pop(task.id):
             _acknowledge(each, task.id)
         self._tell_queued(asked, task, now=now)
 
     def _tell_queued(self, asked: CommandRequest, task: Task, *, now: float) -> None:
-        """Tell everybody of a task; a station that has it wait for a button, as a warning."""
+        """Tell all clients of a new task; as a warning to a station that must press a button."""
         tasks, source, goal = asked.vehicle.tasks, asked.vehicle.server_address, describe(task.goal)
         paused, is_blocked = tasks.paused, True
         if tasks.immediate == task.id:
             words, is_blocked = f"Task {task.id} begins now: {goal}", False
-        elif paused:  # who queued it may not be who paused
+        elif paused:  # somebody else may have paused
             words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
             words += f". {goal}"
         elif tasks.is_held_ahead:
@@ -274,8 +274,8 @@ class Submissions:
     def _is_repeat(
         self, asked: CommandRequest, draft: Draft, *, confirmation: int, now: float
     ) -> bool:
-        """Whether a submission came before; it is answered then."""
-        # of places only, to compare them
+        """Whether a submission came before; if so, answer it."""
+        # only to compare places
         origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
         known = self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
         if known is not None:
@@ -283,7 +283,7 @@ class Submissions:
         return known is not None
 
     def _answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
-        """The same submission again: the same answer, or none yet if it has none yet."""
+        """Give a repeated submission the answer of the first, once that has one."""
         if known.task_id in self._undecided:
             askers = self._undecided[known.task_id]
             if asked.answers_to not in {each.answers_to for each in askers}:
@@ -291,7 +291,7 @@ class Submissions:
             return
         _acknowledge(asked, known.task_id)
         task = self._registry.get(known.task_id)
-        # one click of QGroundControl's is a command and an item: two messages, and nothing twice
+        # one click in QGroundControl sends a command and an item: not a repeat to be told
         is_other_message = task is not None and task.command != asked.command.command
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
@@ -301,7 +301,7 @@ class Submissions:
 
 
 def _acknowledge(asked: CommandRequest, task_id: TaskId) -> None:
-    """Name the task, and have a client that reads it told of its state, nonce and all."""
+    """Acknowledge with the task's id; a client that reads TASK_STATUS gets that, with its nonce."""
     asked.answer(MavResult.ACCEPTED, task_id)
     if asked.client.uses_dialect:
         asked.client.statuses.changed(task_id)

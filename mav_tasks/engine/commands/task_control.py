@@ -1,6 +1,6 @@
-"""Commands about tasks that are there: cancel, clear, modify, release, change speed.
+"""Commands on existing tasks: cancel, clear, modify, release, change speed.
 
-Each gives the id of the task acted on, 0 for none or many; a Rejection says why not.
+Each returns the id of the task that it acted on, 0 for none or many, or raises Rejection.
 """
 
 from dataclasses import replace
@@ -28,7 +28,7 @@ GROUND_OR_AIR = 1  # DO_CHANGE_SPEED, highest param1: airspeed counts as ground 
 
 
 class TaskControl:
-    """What clients may do to tasks."""
+    """The commands of clients on existing tasks."""
 
     def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
         self._registry = registry
@@ -39,7 +39,7 @@ class TaskControl:
         self._settings = settings
 
     def act(self, asked: CommandRequest, *, now: float) -> int:
-        """Do what a command asks for."""
+        """Execute one of these commands; return the task's id, or 0."""
         match asked.command.command:
             case MavCmd.TASK_CANCEL:
                 return self._cancel(asked, now=now)
@@ -62,9 +62,9 @@ class TaskControl:
         is_late: bool,
         now: float,
     ) -> None:
-        """COMMAND_CANCEL: call off a client's latest task of a command, if it is not over.
+        """COMMAND_CANCEL: cancel a client's latest task of a command, if it is not over.
 
-        ``is_late``: it has waited while the server stood still. What is held since stays so.
+        ``is_late``: the message waited while the server was stalled. A held task then stays held.
         """
         task = self._registry.latest(submitter, command, vehicle=vehicle.system_id)
         if task is None or (is_late and task.state is TaskState.HELD):
@@ -73,7 +73,7 @@ class TaskControl:
             vehicle.joint.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: CommandRequest, *, now: float) -> int:
-        """Call one task off; a copy gets the first one's answer, and calls off no other."""
+        """Cancel one task. A copy gets the answer of the first, and cancels no other task."""
         first = asked.receiver.answer_to_counted_copy(asked.command, now=now)
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
@@ -87,7 +87,7 @@ class TaskControl:
             raise Rejection(R.NOT_FOUND, "no task is running")
         task = active if task_id == 0 and active is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "cancel")
-        if asked.client.is_late and task.state is TaskState.HELD:  # others would go on
+        if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
             words = f"it waited while the server stood still, and task {task.id} is held since"
             raise Rejection(R.STALE, words)
         asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
@@ -99,7 +99,7 @@ class TaskControl:
         return 0
 
     def _release(self, asked: CommandRequest, *, now: float) -> int:
-        """Release or skip a held task; a copy decides nothing about what is held since."""
+        """Release or skip a held task. A copy has no effect on a task held since the first."""
         copy = asked.receiver.answer_to_copy(asked.command, now=now)
         if copy is not None:
             words = f"task {copy.result_param2}: that was decided a moment ago"
@@ -163,7 +163,7 @@ def _words(task: Task) -> str:
 
 
 def _modified(task: Task, command: Command, *, now: float) -> Terms:
-    """Return a task's terms with one of them changed."""
+    """Return a task's terms with one property changed."""
     terms = task.terms
     wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
     if task.state not in WAITING and wanted in _OF_WAITING:
@@ -195,7 +195,7 @@ _OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
 
 
 def _label(label: str, command: Command) -> str:
-    """Return a label with the piece put in that a command carries."""
+    """Return the label with the piece in a command put in."""
     if command.frame is None:
         words = "LABEL: a float is too coarse, send it as COMMAND_INT"
         raise Rejection(R.BAD_PARAMETER, words)

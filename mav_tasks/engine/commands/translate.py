@@ -1,6 +1,6 @@
-"""Where tasks become messages: results, statuses, words. Pure functions.
+"""Converts tasks and events to messages: results, statuses, texts. Pure functions.
 
-Commands become tasks in ``goals``.
+``goals`` converts commands to tasks.
 """
 
 from math import isfinite, nan
@@ -35,9 +35,9 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
 
-NEVER = 0xFFFFFFFF  # TASK_QUEUE_STATUS.heartbeat_age: none came
+NEVER = 0xFFFFFFFF  # TASK_QUEUE_STATUS.heartbeat_age: no heartbeat came
 
-#: the wire answer of each refusal; what is not listed is DENIED
+#: MAV_RESULT of each refusal reason; DENIED for all others
 RESULT_OF: dict[int, MavResult] = {
     R.QUEUE_FULL: MavResult.TEMPORARILY_REJECTED,
     R.QUOTA: MavResult.TEMPORARILY_REJECTED,
@@ -55,7 +55,7 @@ RESULT_OF: dict[int, MavResult] = {
     R.VEHICLE_SILENT: MavResult.FAILED,
 }
 
-#: what the person who reads that a task waits may do about it
+#: texts why a task waits, and what a person can do about it
 WAITS_FOR = {
     R.VEHICLE_SILENT: "the rover is silent",
     R.OTHER_CONTROLLER: "somebody else drives",
@@ -67,10 +67,10 @@ WAITS_FOR = {
     R.LOSS_FAILSAFE: f"it would not stand without us; {SET_FAILSAFE}",
 }
 
-#: why a task or a queue does not go on: as somebody has asked, or nothing that needs a hand
+#: reasons to wait or stop that somebody asked for, or that need no action: told as INFO
 CALM = frozenset(
     {
-        R.VEHICLE_SILENT,  # of which a warning has told
+        R.VEHICLE_SILENT,  # a warning was sent already
         R.OTHER_CONTROLLER,
         R.NO_POSITION,
         R.NOT_READY,
@@ -85,9 +85,9 @@ CALM = frozenset(
     }
 )
 
-STATES = tuple(state.name.lower() for state in TaskState)  # in words, by number
+STATES = tuple(state.name.lower() for state in TaskState)  # names, by number
 
-FINISHED = 1.0  # param4 of REQUEST_MESSAGE(TASK_STATUS, 0): tasks that are over
+FINISHED = 1.0  # param4 of REQUEST_MESSAGE(TASK_STATUS, 0): finished tasks
 
 UNIT_NONE = 0  # TASK_UNIT
 UNIT_METRES = 1
@@ -95,13 +95,13 @@ UNIT_RADIANS = 2
 UNIT_SECONDS = 3
 FLOAT32_MAX = 3.4e38
 UNKNOWN_POSITION = 65535
-LAST_POSITION = 65534  # or behind it: a queue may be longer than the field can say
+LAST_POSITION = 65534  # this or a later position: a queue may be longer than the field allows
 UNKNOWN_PROGRESS = 255
 TEXT = 50  # bytes of TASK_STATUS.text
 
 
 def result_of(reason: int) -> MavResult:
-    """Return the MAV_RESULT that a refusal is acknowledged with."""
+    """Return the MAV_RESULT for a refusal reason."""
     return RESULT_OF.get(reason, MavResult.DENIED)
 
 
@@ -116,7 +116,7 @@ def task_status(
 ) -> m.TaskStatus:
     """Return the TASK_STATUS of a task of this vehicle, for the client at ``reader``.
 
-    ``forecast``: of the vehicle's tasks; None: its place and times are not asked for.
+    ``forecast``: of the vehicle's tasks; None to leave out its queue position and forecast times.
     """
     reason = wait_reason(tasks, task)
     ahead = position(tasks, task) if forecast is not None else None
@@ -158,7 +158,7 @@ def task_status(
 def task_timing(
     task: Task, timing: Timing | None, *, period: float, reader: Address, now: float
 ) -> m.TaskTiming:
-    """Return the TASK_TIMING of a task; ``period`` of its vehicle's setpoints is in seconds."""
+    """Return the TASK_TIMING of a task; ``period`` is that of its vehicle's setpoints, in s."""
     return m.TaskTiming(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
         task_id=task.id,
@@ -178,7 +178,7 @@ def queue_status(
 ) -> m.TaskQueueStatus:
     """Return the TASK_QUEUE_STATUS of a vehicle; ``counts`` are its tasks by TASK_STATE.
 
-    ``heard_at``: when its last heartbeat came, None: there was none in this run.
+    ``heard_at``: time of its last heartbeat, None if it was not heard in this run.
     """
     active = tasks.active
     age = NEVER if heard_at is None else min(max(1, round((now - heard_at) * 1000)), NEVER - 1)
@@ -197,9 +197,9 @@ def queue_status(
 
 
 def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
-    """Return (vehicle, severity, words) for the people at ground stations, or None.
+    """Return (vehicle, severity, text) for people at ground stations, or None.
 
-    What went as asked is INFO; WARNING and ERROR are for what needs a hand.
+    INFO: it went as requested. WARNING and ERROR: somebody should act.
     """
     match event:
         case TaskChanged(new=TaskState.EXECUTING):
@@ -239,7 +239,7 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
 
 
 def _severity(reason: TaskReason) -> MavSeverity:
-    """Return how a station says that a task or a queue does not go on.
+    """Return the severity of a text that a task or queue waits or stops for this reason.
 
     QGroundControl shows NOTICE and worse in red, and its megaphone stays a warning triangle.
     """
@@ -247,29 +247,29 @@ def _severity(reason: TaskReason) -> MavSeverity:
 
 
 def message_id_of(command: Command) -> int:
-    """Return the message id in param1 of REQUEST_MESSAGE and its kind; -1 for nonsense."""
+    """Return the message id in param1 of REQUEST_MESSAGE and similar commands; -1 if invalid."""
     return _whole(command.params[0])
 
 
 def task_id_of(command: Command) -> int:
-    """Return the task id in param2 of REQUEST_MESSAGE for what is about tasks; -1 for nonsense."""
+    """Return the task id in param2 of REQUEST_MESSAGE for task messages; -1 if invalid."""
     large = large_number(command.params[1])
     number = _whole(command.params[1]) if large is None else large
     return number if large is not None or number <= EXACT else -1
 
 
 def first_index_of(command: Command) -> int:
-    """Return the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 for nonsense."""
+    """Return the first index in param3 of REQUEST_MESSAGE(TASK_STATUS, 0); -1 if invalid."""
     return _whole(command.params[2])
 
 
 def is_of_finished(command: Command) -> bool:
-    """Return whether param4 of REQUEST_MESSAGE(TASK_STATUS, 0) asks for tasks that are over."""
+    """Whether param4 of REQUEST_MESSAGE(TASK_STATUS, 0) asks for finished tasks."""
     return command.params[3] == FINISHED
 
 
 def _float32(value: float) -> float:
-    """Return a number that a float32 can hold; NaN, unknown, for one beyond all sense."""
+    """Return a number that fits a float32; NaN (unknown) if it is too large."""
     return value if abs(value) < FLOAT32_MAX else nan
 
 
@@ -278,13 +278,13 @@ def _whole(value: float) -> int:
 
 
 def _leg(task: Task) -> Leg | None:
-    """The leg that is being driven; before the start the first one, if it can be known by then."""
+    """Return the present leg; before the start the first one, or None if it is not known yet."""
     goal = present_goal(task.goal, task.progress)
     return first_leg(goal) if task.progress.anchor is None else leg_of(goal, task.progress)
 
 
 def _size_of(leg: Leg | None) -> tuple[int, float]:
-    """Return the whole of a leg, and in which TASK_UNIT that is."""
+    """Return the TASK_UNIT of a leg, and its whole length in that unit."""
     match leg:
         case None:
             return UNIT_NONE, 0.0
@@ -297,7 +297,7 @@ def _size_of(leg: Leg | None) -> tuple[int, float]:
 
 
 def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
-    """Return how much of a task is done, if so much of the leg is that is ``length`` as a whole."""
+    """Return how much of a task is done, in percent; ``length`` is that of its present leg."""
     if task.state is TaskState.COMPLETED:
         return 100
     if task.progress.anchor is None:
@@ -307,7 +307,7 @@ def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
-    """Return the item of a plan that is being driven, of other tasks the leg; and of how many."""
+    """Return the present item of a plan, or else the present leg; and the number of them."""
     if isinstance(goal, Plan):
         count = goal.item_count
         step = goal.item_number(max(progress.step, goal.first)) - 1
@@ -316,7 +316,7 @@ def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:
 
 
 def _words(task: Task, reason: TaskReason, says: str) -> str:
-    """Return a task, its state and the reason in words; ``says``: the vehicle's own about that."""
+    """Return a task, its state and reason as text; ``says``: the vehicle's own text on it."""
     label = f" '{task.terms.label}'" if task.terms.label else ""
     words = f"{describe(task.goal)}{label}: {STATES[task.state]}"
     if not reason:
@@ -325,5 +325,5 @@ def _words(task: Task, reason: TaskReason, says: str) -> str:
 
 
 def _cut(text: str, size: int) -> bytes:
-    """Return a text in UTF-8, as many whole characters as fit."""
+    """Return a text in UTF-8, cut to as many whole characters as fit."""
     return text.encode()[:size].decode(errors="ignore").encode()

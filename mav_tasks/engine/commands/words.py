@@ -1,4 +1,4 @@
-"""What a client's word does to a rover, by what it says: see ``policy`` for what it may be."""
+"""Classifies a command or message by its content: whether it halts a rover or lets it go."""
 
 from mav_tasks.engine.commands.goals import has_place
 from mav_tasks.engine.policy import (
@@ -15,15 +15,15 @@ from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetMode
 from mav_tasks.services.command_receiver import REPEATED, Command, command_of
 from mav_tasks.services.persona import Persona
 
-#: the commands that are something else by what they say
+#: commands whose parameters decide their row
 AMBIGUOUS = frozenset({MavCmd.COMPONENT_ARM_DISARM, MavCmd.DO_PAUSE_CONTINUE, MavCmd.DO_REPOSITION})
 SET_MODE = int(MavCmd.DO_SET_MODE)
-#: each of these means one task, whatever copies of it come
+#: commands that end tasks: a copy must not end later ones
 OF_ONE_TASK = (MavCmd.TASK_CANCEL, MavCmd.TASK_CLEAR)
 
 
 def row_said(command: Command) -> Row:
-    """Return the row of a command by what it says; of a mode ``ModeRequests`` knows more."""
+    """Return the row of a command by its content; ``ModeRequests`` looks closer at modes."""
     if command.command in AMBIGUOUS:
         match command.command, command.params[0]:
             case MavCmd.COMPONENT_ARM_DISARM, 0.0:
@@ -36,7 +36,7 @@ def row_said(command: Command) -> Row:
 
 
 def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
-    """Return what a command does that has this row."""
+    """Return the kind of a command with this row; HOLD is a HALT, any other mode a GO."""
     if command.command != SET_MODE:
         return row.kind
     is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
@@ -44,7 +44,7 @@ def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
 
 
 def kind_of_message(message: Message | None, persona: Persona) -> Kind:
-    """Return what a client's message does, as far as its order within a moment matters."""
+    """Return the kind of a client's message, by which a batch of them is ordered."""
     if isinstance(message, SetMode):
         return Kind.HALT if message.custom_mode == persona.hold_mode else Kind.GO
     if isinstance(message, CommandLong | CommandInt):
@@ -54,10 +54,11 @@ def kind_of_message(message: Message | None, persona: Persona) -> Kind:
 
 
 def halts_again(command: Command, persona: Persona, *, after: float) -> bool:
-    """Whether a copy of a word makes a rover stand, the very same packet ``after`` so many seconds.
+    """Whether a command is executed again when the same packet comes ``after`` so many seconds.
 
-    Some senders do not count their packets: it may be another word, and is acknowledged. Who calls
-    a task off means that one task; whatever runs, or all of them, are others after a while.
+    Every halt is: some senders do not count their packets, so it may be a new command. TASK_CANCEL
+    by id is not, as it means one task. TASK_CANCEL without an id and TASK_CLEAR are executed again
+    after REPEATED seconds, when they mean other tasks.
     """
     if command.command in OF_ONE_TASK:
         is_by_id = command.command == MavCmd.TASK_CANCEL and command.params[0] != 0.0

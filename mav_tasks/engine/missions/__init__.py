@@ -1,1 +1,1 @@
-"""Missions, fences and rally points: taken in, kept, shown and reported on."""
+"""Missions, fences and rally points: upload, storage, download and progress reports."""

@@ -1,8 +1,8 @@
-"""Fence and rally items ↔ what the task domain makes of them. Pure functions.
+"""Checks fence and rally items, and converts them to fences and places. Pure functions.
 
-MAVLink common.xml, MAV_CMD_NAV_FENCE_*: the corners of a polygon are as many items one after the
-other as param1 of each says. A return point is kept for the vehicle and not used here. A circle of
-radius 0 means "no circle": MAVSDK's programs send it so.
+MAVLink common.xml, MAV_CMD_NAV_FENCE_*: a polygon's corners are consecutive items, and param1 of
+each is their number. A return point is kept for the vehicle and not used here. A circle of radius 0
+means "no circle": MAVSDK's programs send it so.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ CIRCLES = {
 
 
 def check_fence_item(item: Item, seq: int, *, count: int) -> None:
-    """Raise a Rejection that names what is wrong with one item of a fence."""
+    """Raise Rejection if an item of a fence with ``count`` items is bad."""
     if item.command == MavCmd.NAV_FENCE_RETURN_POINT:
         _place(item)
     elif item.command in CORNERS:
@@ -48,14 +48,14 @@ def check_fence_item(item: Item, seq: int, *, count: int) -> None:
 
 
 def check_rally_item(item: Item, seq: int) -> None:
-    """The same for a rally point."""
+    """Raise Rejection if a rally point is bad."""
     if item.command != MavCmd.NAV_RALLY_POINT:
         raise _unsupported(item, seq, "rally points")
     _place(item)
 
 
 def fence_of(items: Sequence[Item]) -> Fence:
-    """Return the fence of items of which each was found good; Rejection when they make none."""
+    """Return the fence of checked items. Raise Rejection if they make no valid fence."""
     zones: list[Zone] = []
     seq = 0
     while seq < len(items):
@@ -84,7 +84,7 @@ def fence_of(items: Sequence[Item]) -> Fence:
 
 
 def fence_for_vehicle(items: Sequence[Item]) -> tuple[Item, ...]:
-    """Return the items of a fence that a vehicle is sent: autopilots refuse what is no circle."""
+    """Return the fence items to send to a vehicle: autopilots refuse circles of radius 0."""
     return tuple(item for item in items if not _is_no_circle(item))
 
 

@@ -1,7 +1,7 @@
-"""A mission item that means "go there now": ArduPilot's older way, with ``current`` 2.
+"""Handles a mission item with ``current`` 2: "go there now", ArduPilot's older way.
 
-QGroundControl sends it beside DO_REPOSITION as long as it does not know whether the autopilot has
-that; both are one task. It is answered by a MISSION_ACK.
+QGroundControl sends it beside DO_REPOSITION while it does not know whether the autopilot supports
+that; both are one task. The answer is a MISSION_ACK.
 """
 
 from math import inf
@@ -26,22 +26,22 @@ GO_THERE, ONLY_HIGHER = 2, 3  # MISSION_ITEM.current
 
 
 class GuidedItemRequest(CommandRequest):
-    """The same as asked by a command, but for the answer."""
+    """A request by mission item, answered with a MISSION_ACK."""
 
     @property
     def is_go_to(self) -> bool:
-        """It is nothing else."""
+        """True: the item is always a "go to"."""
         return True
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Acknowledge it; only acceptance comes this way."""
+        """Send the MISSION_ACK of an accepted item; ``refuse`` sends all others."""
         assert result is MavResult.ACCEPTED, "refusals have a result of their own"
         self._ack(MavMissionResult.ACCEPTED, opaque_id=result_param2)
 
     def refuse(
         self, refusal: Rejection, *, result: MavResult | None = None, now: float
     ) -> SubmissionRefused:
-        """Answer with what is wrong, and say it in words; gives it for the audit log."""
+        """Answer with the result and a text; return the event for the audit log."""
         del result
         self._ack(result_of(refusal))
         self.tell(refusal.text, MavSeverity.WARNING, now=now)
@@ -56,7 +56,7 @@ class GuidedItemRequest(CommandRequest):
 
 
 class GoToItems:
-    """What becomes of such items."""
+    """The handler of "go to" items."""
 
     def __init__(self, submissions: Submissions, registry: TaskRegistry) -> None:
         self._submissions = submissions
@@ -71,7 +71,7 @@ class GoToItems:
         *,
         now: float,
     ) -> None:
-        """Take in a "go to"; what only changes the height is accepted, and does nothing here."""
+        """Submit a "go to". An item that only changes the altitude is accepted without effect."""
         asked = GuidedItemRequest(
             client, vehicle, packet, Pending(_command_of(message), packet.raw, now)
         )
@@ -89,7 +89,7 @@ class GoToItems:
 
 
 def _command_of(message: m.MissionItem | m.MissionItemInt) -> Command:
-    """Return the command that an item stands for; a place out of range is infinite."""
+    """Return the command that an item stands for; a place out of range becomes infinite."""
     item = item_of(message)
     x, y = (inf, inf) if item is None else (float(item.x), float(item.y))
     first = (message.param1, message.param2, message.param3, message.param4)

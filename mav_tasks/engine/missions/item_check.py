@@ -1,7 +1,6 @@
-"""What each item of an upload is worth, as it comes; and the plan that they all make.
+"""Checks each item of an upload as it comes, and makes the plan of all of them.
 
-An upload is refused at the first item that cannot be part of a plan, so that its client learns
-which one it is.
+An upload is refused at the first bad item, so that its client learns which one it is.
 """
 
 from mav_tasks.engine.commands.goals import bad
@@ -27,16 +26,16 @@ R = TaskReason
 
 
 class ItemCheck:
-    """Looks at the items of uploads to one address, one upload after the other."""
+    """The item check of uploads to one address, one upload after the other."""
 
     def __init__(self, vehicle: Vehicle, component: int, settings: Settings) -> None:
         self._vehicle = vehicle
         self._is_at_autopilot = component == AUTOPILOT
         self._settings = settings
         self._read_by: tuple[int, MissionParseOptions] | None = (
-            None  # length of the plan, and the manner
+            None  # item count and options of ``_read``
         )
-        self._read: list[tuple[Item, Step]] = []  # each item is read once: that takes its time
+        self._read: list[tuple[Item, Step]] = []  # each item is parsed once: it takes time
         self._refusal: Rejection | None = None
 
     def __repr__(self) -> str:
@@ -47,12 +46,12 @@ class ItemCheck:
         self._settings = settings
 
     def take_refusal(self) -> Rejection | None:
-        """Return why an item was refused, None if none was since the last call."""
+        """Return why an item was refused since the last call, or None."""
         refusal, self._refusal = self._refusal, None
         return refusal
 
     def __call__(self, kind: int, seq: int, item: Item, count: int) -> MavMissionResult | None:
-        """Whether an item can be part of a plan; the ones before it were asked about."""
+        """Return None if an item may be part of a plan, else the result. Call in order of items."""
         if kind not in STORED:
             return MavMissionResult.UNSUPPORTED
         try:
@@ -70,7 +69,7 @@ class ItemCheck:
         return None
 
     def plan_of(self, items: tuple[Item, ...], *, now: float) -> ParsedMission:
-        """Return the plan of a whole upload; Rejection says why it is none."""
+        """Return the plan of a whole upload. Raise Rejection if it makes none."""
         count = len(items)
         steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
         wanted = plan_of(items, steps, has_home=self._manner.has_home, now=now)
@@ -87,7 +86,7 @@ class ItemCheck:
 
     def _step(self, item: Item, seq: int, *, count: int) -> Step:
         manner = self._manner
-        if (count, manner) != self._read_by:  # in the middle of an upload all is read anew
+        if (count, manner) != self._read_by:  # in the middle of an upload: parse all items again
             self._read_by = count, manner
             self._read.clear()
         read = self._read
@@ -99,7 +98,7 @@ class ItemCheck:
         return step
 
     def _check_place(self, step: GoTo, seq: int) -> None:
-        """Whether a place is within reach, and it and the way from the one before in the fence."""
+        """Raise Rejection for a place too far away, outside the fence, or reached across it."""
         name = f"item {number_of(seq, has_home=self._manner.has_home)}"
         far, longest = self._vehicle.where.distance_to(step), self._settings.driving.max_distance
         if far is not None and far > longest:
@@ -108,7 +107,7 @@ class ItemCheck:
         if not self._vehicle.where.is_within_fence(step):
             raise Rejection(R.OUTSIDE_FENCE, f"{name} is outside the fence")
         steps: list[Step] = [step]
-        for number in range(min(seq, len(self._read)) - 1, -1, -1):  # as far as the last place
+        for number in range(min(seq, len(self._read)) - 1, -1, -1):  # back to the last place
             steps.insert(0, self._read[number][1])
             if isinstance(steps[0], GoTo):
                 break

@@ -1,4 +1,4 @@
-"""What clients of the mission protocol are told: messages to one of them, and why not in words."""
+"""Answers to one client of the mission protocol: messages, and texts of refusals."""
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -13,20 +13,20 @@ from mav_tasks.tasks.registry import TaskRegistry
 
 
 class MissionAnswers:
-    """Answers to whoever asked, while that client is still there."""
+    """The sender of answers, for as long as their client is there."""
 
     def __init__(self, gcs: GcsSide, registry: TaskRegistry) -> None:
         self._gcs = gcs
         self._registry = registry
 
     def client(self, sender: Sender) -> GcsClient | None:
-        """Return the client that a sender is at, if it is still there."""
+        """Return the client of a mission sender, None if it is gone."""
         assert isinstance(sender.key, tuple), "only MissionServers.receive makes senders"
         key, _signed_by = sender.key
         return self._gcs.client(key)
 
     def send(self, told: ToClient) -> None:
-        """Send a message in the name of the address that was spoken to."""
+        """Send a message in the name of the address that the client addressed."""
         client = self.client(told.sender)
         if client is not None:
             client.outlet.send(told.message, told.sender.addressed)
@@ -36,7 +36,7 @@ class MissionAnswers:
         self.send(ToClient(sender, m.MissionAck(*sender.address, result, kind)))
 
     def tell(self, sender: Sender, vehicle: Vehicle, words: str, *, now: float) -> None:
-        """Say in words why not."""
+        """Send a warning text to the sender's client."""
         client = self.client(sender)
         if client is not None:
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
@@ -44,10 +44,10 @@ class MissionAnswers:
     def refused(
         self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, message_id: int, now: float
     ) -> None:
-        """Say why a request was refused: to its client, and in the log; 0: it is an upload."""
+        """Tell the client why a request was refused, and record it; ``message_id`` 0: an upload."""
         client = self.client(sender)
         if client is not None and not client.may_be_refused(now=now):
-            return  # a flood of them fills neither disk nor net
+            return  # a flood of refusals fills neither disk nor network
         if client is not None:
             client.tell_refusal(refusal.text, vehicle.server_address, now=now)
         reason, actor = TaskReason(refusal.reason), str(sender.address)

@@ -1,4 +1,4 @@
-"""Clearing plans: a mission that has not begun, and what the vehicle keeps as well."""
+"""Clears plans: a mission that is not being driven, fence and rally points."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -20,22 +20,22 @@ from mav_tasks.tasks.task import Task, TaskId
 
 R = TaskReason
 
-#: has begun, and is not being driven: a stock autopilot, too, clears a mission in HOLD
+#: active, but not being driven: a stock autopilot, too, clears a mission in HOLD
 AT_REST = frozenset({TaskState.PAUSED, TaskState.HELD})
 
 
 class _Cleared(NamedTuple):
-    """Plans that a vehicle has no more, as asked for by a client."""
+    """Plans that a client cleared."""
 
     vehicle: Vehicle
     sender: Sender
-    asked: int  # the kind, or all of them
-    before: tuple[tuple[int, Stored], ...]  # by kind
+    asked: int  # the plan type, or all of them
+    before: tuple[tuple[int, Stored], ...]  # by plan type
     task: Task | None
 
 
 class MissionClearing:
-    """Sees to MISSION_CLEAR_ALL."""
+    """The handler of MISSION_CLEAR_ALL."""
 
     def __init__(
         self,
@@ -57,10 +57,10 @@ class MissionClearing:
     def clear(
         self, vehicle: Vehicle, sender: Sender, kind: int, *, is_late: bool, now: float
     ) -> None:
-        """Forget plans of a kind, or of all; the answer comes once that is durable.
+        """Clear plans of one type, or of all; answer once that is durable.
 
-        ``is_late``: it has waited while the server stood still. What is held since stays so, as
-        others would go on.
+        ``is_late``: the message waited while the server was stalled. A held mission is then not
+        cleared, because the next tasks would start.
         """
         kinds: list[int] = list(STORED) if kind == MavMissionType.ALL else [kind]
         if kinds[0] not in STORED:
@@ -90,7 +90,7 @@ class MissionClearing:
         *,
         now: float,
     ) -> None:
-        """One kind after the other, what the vehicle keeps first there; then the answer."""
+        """Clear one type after the other, bounds on the vehicle first; then hold the answer."""
         actor = str(sender.address)
         if not kinds:
             task = (
@@ -129,7 +129,7 @@ class MissionClearing:
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ERROR)
 
     def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
-        """End a mission that was interrupted: without its plan nobody could have it go on."""
+        """Cancel an interrupted mission: without its plan nobody could resume it."""
         current = None if task is None else self._registry.get(task.id)
         if current is not None and current.state in AT_REST:
             vehicle.joint.cancel(current, kill=False, actor=actor, now=now)

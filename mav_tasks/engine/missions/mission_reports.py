@@ -1,8 +1,8 @@
-"""How missions fare, told to clients: MISSION_CURRENT, MISSION_ITEM_REACHED; and what they order.
+"""Reports mission progress to clients, and sends the mission's commands to the vehicle.
 
-In the name of the autopilot, because clients listen to nobody else about missions. The vehicle's
-own messages of the mission protocol are withheld meanwhile: two sources would contradict each
-other.
+MISSION_CURRENT and MISSION_ITEM_REACHED go out in the name of the autopilot, because clients accept
+them from no other component. The vehicle's own messages of the mission protocol are withheld: two
+sources would contradict each other.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
 INTERVAL = 1.0  # s, of MISSION_CURRENT
-ENDS_TOLD = 5  # times more that the last item's MISSION_ITEM_REACHED is sent; PX4 does 10
-#: of the vehicle, when the server has its missions
+ENDS_TOLD = 5  # repeats of the last item's MISSION_ITEM_REACHED; PX4 sends 10
+#: messages of the vehicle that are withheld while the server has its missions
 REPLACED = frozenset(
     {
         m.MissionAck.id,
@@ -50,15 +50,15 @@ REPLACED = frozenset(
 
 @dataclass(slots=True)
 class _Last:
-    """The last item that a mission has reached."""
+    """The last item that a mission reached."""
 
     task_id: TaskId
     step: int
-    left: int = ENDS_TOLD  # times to say so again, when the mission is over
+    left: int = ENDS_TOLD  # repeats left, after the mission's end
 
 
 class MissionReports:
-    """What clients are told of missions without asking."""
+    """The sender of mission progress to clients."""
 
     def __init__(
         self,
@@ -86,11 +86,11 @@ class MissionReports:
         self._timer.set(self._next_at if self._claims else inf)
 
     def replaces(self, packet: Packet) -> bool:
-        """Whether a vehicle's packet is not shown, because the server speaks of missions."""
+        """Whether a vehicle's packet is withheld, because the server reports on missions."""
         return self._claims and packet.message_id in REPLACED
 
     def publish(self, events: list[Event], *, now: float) -> None:
-        """Tell of items that were reached, and of what is driven next; send what is ordered."""
+        """Report items reached and the current item; send the mission's commands to the vehicle."""
         changed: set[int] = set()
         for event in events:
             match event:
@@ -118,7 +118,7 @@ class MissionReports:
                     self._tell_end_again(vehicle, self._last[vehicle.system_id])
 
     def _tell_end_again(self, vehicle: Vehicle, last: _Last) -> None:
-        """Who has missed the last item would take the mission for unfinished for ever."""
+        """Repeat the last item: a client that missed it would never see the mission finished."""
         task = self._plans.shown(vehicle)
         if task is None or task.id != last.task_id or last.left == 0:
             return
@@ -138,7 +138,7 @@ class MissionReports:
             vehicle.perform(performed(item, Address(vehicle.system_id, AUTOPILOT)), now=now)
 
     def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:
-        """Say what the vehicle would not do of what a plan orders; the plan goes on."""
+        """Record plan commands that the vehicle refused or did not answer; the plan goes on."""
         for answered in vehicle.requests.take_unperformed():
             ack, command = answered.ack, answered.command
             what = "no answer" if ack is None else f"refused, result {ack.result}"

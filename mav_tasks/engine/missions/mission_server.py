@@ -1,6 +1,6 @@
-"""The mission protocol towards clients: which message is for which end, and downloads.
+"""Dispatches clients' mission protocol messages by address and plan type, and serves downloads.
 
-What becomes of uploads is in ``mission_uploads``, clearing in ``mission_clearing``.
+``mission_uploads`` handles whole uploads, ``mission_clearing`` MISSION_CLEAR_ALL.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 
-#: what clients speak the mission protocol with
+#: messages of the mission protocol from clients
 MESSAGES = (
     m.MissionCount,
     m.MissionItem,
@@ -64,24 +64,24 @@ MissionMessage = (
 
 
 class _Desk:
-    """Uploads to, and downloads from, one address, of plans of one type."""
+    """The uploads to and downloads from one address, of one plan type."""
 
     def __init__(
         self, check: ItemCheck, form: RequestForm, timers: Timers, ask_again: Callable[..., None]
     ) -> None:
-        """``ask_again`` is called with the desk when an item is to be asked for again."""
+        """``ask_again`` is called with the desk when an item is to be requested again."""
         self.uploads = UploadSession(check, form)
         self.sender = MissionSender()
         self._timer = timers.timer(Turn.UPLOADS, partial(ask_again, self))
 
     def plan(self) -> None:
-        """Have the next item asked for again, or the upload given up, when that is due."""
+        """Set the timer to the upload's next repeated request or time-out."""
         due = self.uploads.receiver.next_deadline()
         self._timer.set(inf if due is None else due)
 
 
 class MissionServers:
-    """The ends of uploads and downloads at all addresses."""
+    """The servers of the mission protocol at all addresses."""
 
     def __init__(
         self,
@@ -117,8 +117,8 @@ class MissionServers:
     def receive(
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
     ) -> bool:
-        """See to a client's message; False: it is not for us."""
-        # an item more does nothing to the vehicle: what does touches it
+        """Handle a client's message. Return False if it is not for the server."""
+        # most messages leave the vehicle as it is; the others mark it dirty
         vehicle = self._vehicles.look_at(message.target_system)
         if vehicle is None:
             return False
@@ -127,7 +127,7 @@ class MissionServers:
         if not at_server and (component != AUTOPILOT or not self._settings.claim):
             return False
         desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
-        who = (client.key, client.signed_by.name)  # one endpoint may have several keys
+        who = (client.key, client.signed_by.name)  # an endpoint may have several keys
         sender = Sender(who, packet.source, Address(vehicle.system_id, component))
         if self._is_refused(client, vehicle, sender, packet, message, now=now):
             return True
@@ -141,7 +141,7 @@ class MissionServers:
                 rank = client.rights.rank
                 desk.uploads.receiver.count(message, sender, rank=rank, now=now)
             case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
-                self._vehicles.mark_dirty(vehicle)  # never an item of a plan, whatever is under way
+                self._vehicles.mark_dirty(vehicle)  # never a plan item, even during an upload
                 self._go_to.receive(client, vehicle, packet, message, now=now)
             case m.MissionItem() | m.MissionItemInt():
                 desk.uploads.receiver.item(message, sender, now=now)
@@ -186,9 +186,9 @@ class MissionServers:
         *,
         now: float,
     ) -> bool:
-        """Whether a client may not write what it writes; it has been told so then."""
+        """Whether a message is refused because of the client's role; if so, answer it."""
         if isinstance(message, m.MissionSetCurrent) or getattr(message, "current", 0) in GO_TO:
-            return False  # these are answered, and refused, in their own ways
+            return False  # these are checked and answered elsewhere
         kind = getattr(message, "mission_type", MISSION)
         row = row_of(packet.message_id, message)
         try:
@@ -203,7 +203,7 @@ class MissionServers:
         return False
 
     def _ask_again(self, vehicle: Vehicle, desk: _Desk, *, now: float) -> None:
-        """Ask again, and give up in the end."""
+        """Request an item again, or end the upload after its time-out."""
         self._vehicles.mark_dirty(vehicle)
         desk.uploads.receiver.handle_deadline(now=now)
         self._uploads.flush(desk.uploads, vehicle, now=now)
@@ -221,7 +221,7 @@ class MissionServers:
         return desk
 
     def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
-        """What an address has to show: the task server, of missions, the one that is driven."""
+        """Return the plan to download; the task server's mission is the active one, if any."""
         active = vehicle.tasks.active
         if kind == MISSION and component != AUTOPILOT and active and isinstance(active.goal, Plan):
             return Stored(active.id, unpacked(active.goal.source))
@@ -240,7 +240,7 @@ class MissionServers:
     def _set_current(
         self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float
     ) -> None:
-        """The message MISSION_SET_CURRENT; MAVSDK waits for this very number, for ever."""
+        """Handle MISSION_SET_CURRENT. MAVSDK waits for an answer with this number for ever."""
         try:
             self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
             if self._plans.go_on_with(vehicle, seq, now=now) is None:

@@ -1,8 +1,8 @@
-"""What becomes of plans that clients upload: refused, a task, or stored; and when that is said.
+"""Decides about whole uploads: refuses, submits or stores them; acknowledges them when durable.
 
-To the autopilot's address goes one mission, which waits until it is started, as on an autopilot; to
-the task server's go as many as one likes, each queued at once. Fence and rally points are the
-vehicle's, whichever address they were sent to.
+The autopilot's address has one mission, which is staged until it is started, as on an autopilot.
+The task server's address takes any number; each is queued at once. Fence and rally points belong to
+the vehicle, at either address.
 """
 
 from dataclasses import replace
@@ -40,7 +40,7 @@ from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
 
 R = TaskReason
 
-#: for what reason the receiver itself has ended an upload, by its answer
+#: reason of an upload that the receiver itself ended, by its MAV_MISSION_RESULT
 ENDED = {
     MavMissionResult.DENIED: R.NOT_ALLOWED,
     MavMissionResult.NO_SPACE: R.QUEUE_FULL,
@@ -49,13 +49,13 @@ ENDED = {
 
 
 def refusal_of(result: int, words: str) -> Rejection:
-    """Return why the receiver has ended an upload with this MAV_MISSION_RESULT."""
+    """Return why the receiver itself ended an upload with this MAV_MISSION_RESULT."""
     reason = ENDED.get(MavMissionResult(result), R.BAD_PARAMETER)
     return Rejection(reason, f"upload: {words or 'an item cannot be read'}")
 
 
 class UploadSession:
-    """Where uploads to one address are taken in."""
+    """The receiver of uploads to one address, and their item check."""
 
     def __init__(self, check: ItemCheck, form: RequestForm) -> None:
         self.check = check
@@ -63,7 +63,7 @@ class UploadSession:
 
 
 class _Mission(NamedTuple):
-    """A mission that was taken in as a task, in the place of another plan if it is staged."""
+    """A mission submitted as a task; if staged, it replaced the plan ``before``."""
 
     desk: UploadSession
     vehicle: Vehicle
@@ -73,19 +73,19 @@ class _Mission(NamedTuple):
 
 
 class _Kept(NamedTuple):
-    """Fence or rally points, or no mission, in the place of what was stored ``before``."""
+    """Fence or rally points, or an empty mission, that replaced the plan ``before``."""
 
     desk: UploadSession
     vehicle: Vehicle
     kind: int
     plan_id: int
     before: Stored
-    task: Task | None  # of the mission until now
+    task: Task | None  # of the mission before
     actor: str
 
 
 class MissionUploads:
-    """Decides about whole uploads, and tells their clients."""
+    """The decision about whole uploads, and the answers to their clients."""
 
     def __init__(
         self,
@@ -115,9 +115,9 @@ class MissionUploads:
         refusal: Rejection | None = None,
         now: float,
     ) -> None:
-        """Send what a desk has to say, and decide about the plans that are whole.
+        """Send a session's messages, and decide about its complete uploads.
 
-        ``refusal`` is why the plan was refused that has just been decided about.
+        ``refusal``: why the upload just decided about was refused.
         """
         outgoing, uploads = desk.receiver.take()
         for told in outgoing:
@@ -151,21 +151,21 @@ class MissionUploads:
             raise Rejection(R.NOT_ALLOWED, f"task {task.id} has begun: cancel it first")
 
     def _is_nothing(self, vehicle: Vehicle, upload: Upload) -> bool:
-        """Whether a mission is none: not an item, or only the home that comes before all others."""
+        """Whether a mission is empty: no item, or only ArduPilot's home item."""
         is_staged = upload.sender.addressed.component_id == AUTOPILOT
         return len(upload.items) <= (vehicle.persona.has_home_item and is_staged)
 
     def _take_in(
         self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
     ) -> None:
-        """A mission: a task that waits to be started, or is queued."""
+        """Submit a mission as a task, staged or queued."""
         sender = upload.sender
         is_staged = sender.addressed.component_id == AUTOPILOT
         wanted = desk.check.plan_of(upload.items, now=now)
         terms = replace(wanted.terms, is_staged=is_staged, is_cruising=is_staged)
         nonce = 0 if is_staged else wanted.nonce
         draft = self._draft(vehicle, wanted.plan, terms, sender, nonce=nonce)
-        # a long plan may take longer to come again than it is remembered
+        # ``begun_at``: a long plan may come again later than submissions are remembered
         known = None
         if not is_staged:
             known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
@@ -192,7 +192,7 @@ class MissionUploads:
 
     def _accept(self, mission: _Mission, *, now: float) -> None:
         desk, vehicle, sender, task, before = mission
-        self._vehicles.get(vehicle.system_id)  # something may begin there
+        self._vehicles.get(vehicle.system_id)  # marks it dirty: a task may start
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
         self.flush(desk, vehicle, now=now)
         replaced = self._registry.get(TaskId(before.plan_id))
@@ -216,13 +216,13 @@ class MissionUploads:
     def _replace(
         self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
     ) -> None:
-        """Fence and rally points, which the vehicle keeps as well, and the empty mission."""
+        """Store an empty mission, or fence or rally points, which the vehicle gets first."""
         if upload.mission_type == MISSION:
             self._store(desk, vehicle, upload, now=now)
             return
         kind, items = upload.mission_type, upload.items
         if kind == MavMissionType.FENCE:
-            fence_of(items)  # a Rejection leaves the one before in force
+            fence_of(items)  # if it raises, the fence before stays in force
             items = fence_for_vehicle(items)
         store = partial(self._store, desk, vehicle, upload)
         refuse = partial(self._refuse, desk, vehicle)
@@ -257,7 +257,7 @@ class MissionUploads:
         self.flush(desk, vehicle, refusal=refusal, now=now)
 
     def refused(self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, now: float) -> None:
-        """Say why an upload was refused: to its client, and in the log."""
+        """Tell the client why an upload was refused, and record it."""
         self._answers.refused(sender, vehicle, refusal, message_id=0, now=now)
 
     def _check_replaced(self, client: GcsClient, vehicle: Vehicle, submitter: Submitter) -> None:

@@ -1,8 +1,7 @@
-"""Mission items → a plan of the task domain; a Rejection names what is wrong. Pure functions.
+"""Parses mission items into a plan; a Rejection names the bad item. Pure functions.
 
-What an item asks for is what the command of the same number asks for (``goals``); here is what only
-plans have: places that are passed, jumps, conditions, and commands that the vehicle is to carry
-out itself.
+An item means the same as the command of its number (``goals``). Here is what only plans have:
+places to pass without stopping, jumps, conditions, and commands that the vehicle itself executes.
 """
 
 from collections.abc import Callable, Sequence
@@ -57,9 +56,9 @@ MAX_JUMPS = 65_535
 NO_CHANGE, DEFAULT = -1.0, -2.0  # DO_CHANGE_SPEED, param2
 GROUND_OR_AIR = 1  # the same, highest param1: airspeed counts as ground speed
 NOBODY = Address(0, 0)
-HERE = (0, NOT_GIVEN)  # what x and y are where no place is meant
+HERE = (0, NOT_GIVEN)  # values of x and y that mean no place
 
-#: what the vehicle carries out itself: cameras, gimbals, servos, relays, its home
+#: commands that the vehicle executes: cameras, gimbals, servos, relays, its home
 PERFORMED = frozenset(
     {
         MavCmd.DO_SET_HOME,
@@ -70,7 +69,7 @@ PERFORMED = frozenset(
     }
 )
 
-#: mission result of each refusal; of a parameter it is that parameter's
+#: mission result by refusal reason; a bad parameter has a result of its own
 RESULT_OF: dict[int, MavMissionResult] = {
     R.BAD_PARAMETER: MavMissionResult.INVALID,
     R.VEHICLE_SILENT: MavMissionResult.ERROR,
@@ -81,20 +80,20 @@ RESULT_OF: dict[int, MavMissionResult] = {
 
 
 class MissionParseOptions(NamedTuple):
-    """By what items are read: the ways of a vehicle, and the server's limits."""
+    """How items are parsed: the vehicle's conventions, and the server's limits."""
 
-    has_home: bool  # the first one is home, as ArduPilot has it
+    has_home: bool  # item 0 is home, as with ArduPilot
     ability: Ability
     driving: Driving
 
     @classmethod
     def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "MissionParseOptions":
-        """Return that of a vehicle; ``is_staged``: the plan is for the autopilot itself."""
+        """Return the options of a vehicle; ``is_staged``: the plan is for the autopilot."""
         return cls(persona.has_home_item and is_staged, Ability.of(persona), driving)
 
 
 class ParsedMission(NamedTuple):
-    """What a plan asks for: its steps, the terms that it names for itself, and its nonce, or 0."""
+    """A plan, with the terms and the nonce (or 0) of its options item."""
 
     plan: Plan
     terms: Terms
@@ -109,7 +108,7 @@ def result_of(refusal: Rejection) -> MavMissionResult:
 
 
 def step_of(item: Item, seq: int, *, count: int, manner: MissionParseOptions) -> Step:
-    """Return what an item asks for. Rejection names the item by its number in the file."""
+    """Return the step of an item. Raise Rejection that names the item's number in the file."""
     if manner.has_home and seq == 0:
         return Nothing()
     name = number_of(seq, has_home=manner.has_home)
@@ -141,7 +140,7 @@ def _step_of(item: Item, *, count: int, driving: Driving) -> Step:
 
 
 def steps_of(items: Sequence[Item], *, manner: MissionParseOptions) -> tuple[Step, ...]:
-    """Return what all items of a plan ask for."""
+    """Return the steps of all items of a plan."""
     return tuple(
         step_of(item, seq, count=len(items), manner=manner) for seq, item in enumerate(items)
     )
@@ -150,7 +149,7 @@ def steps_of(items: Sequence[Item], *, manner: MissionParseOptions) -> tuple[Ste
 def plan_of(
     items: Sequence[Item], steps: tuple[Step, ...], *, has_home: bool, now: float
 ) -> ParsedMission:
-    """Return the plan of items and of what they ask for; Rejection when they make no plan."""
+    """Return the plan of items and their steps. Raise Rejection if they make no plan."""
     has_options = bool(items) and items[-1].command == MavCmd.TASK_OPTIONS
     plan = Plan(steps, packed(items), has_home=has_home, has_options=has_options)
     loop = loops_in_vain(plan)
@@ -161,7 +160,7 @@ def plan_of(
 
 
 def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
-    """Return the command that an item is for the vehicle itself."""
+    """Return the command of an item that the vehicle executes."""
     p1, p2, p3, p4 = map(_given, (item.param1, item.param2, item.param3, item.param4))
     p7 = _given(item.z)
     if item.frame == MavFrame.MISSION:
@@ -172,7 +171,7 @@ def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
 
 
 def _given(value: float) -> float:
-    """Return a number for the vehicle: never NaN, which aborts some."""
+    """Return a number for the vehicle: 0 for NaN, which makes some autopilots abort."""
     return 0.0 if isnan(value) else value
 
 
@@ -191,7 +190,7 @@ def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
 
 
 def _nonce_of(items: Sequence[Item]) -> int:
-    """Return the client's mark in the options; what can be none is not looked at."""
+    """Return the nonce of the options item, 0 if it has no valid one."""
     marks = [item.x for item in items if item.command == MavCmd.TASK_OPTIONS]
     return marks[-1] if marks and 0 < marks[-1] <= MAX_NONCE else 0
 
@@ -231,7 +230,7 @@ def _nothing(_command: Command, _count: int, _driving: Driving) -> Step:
 
 
 def _take_options(command: Command, _count: int, _driving: Driving) -> Step:
-    _options(command, now=0.0)  # only looked at here
+    _options(command, now=0.0)  # only to check them
     return Nothing()
 
 
@@ -259,7 +258,7 @@ def _speed(command: Command, _count: int, driving: Driving) -> Step:
         return Nothing()
     if wish == DEFAULT:
         return SetSpeed(None)
-    # planners leave speeds of aircraft in there; the limit is kept all the same
+    # planners leave speeds of aircraft there: bound them to the limit
     return SetSpeed(min(number(command, 2, "speed", low=MIN_SPEED, high=inf), driving.max_speed))
 
 

@@ -1,7 +1,7 @@
-"""The plans of each vehicle: what is stored, which mission is shown, starting and going on with it.
+"""The stored plans of each vehicle: mission start, jumps to an item, and MISSION_CURRENT.
 
-A mission at the autopilot's address is staged: a task that waits until it is started. Started again
-when it is over, it is another task.
+A mission at the autopilot's address is staged: a task that waits until it is started. If it is
+started again after its end, it becomes a new task.
 """
 
 from collections.abc import Mapping
@@ -29,12 +29,12 @@ R, S = TaskReason, TaskState
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
 NOT_STARTED = 2  # MISSION_STATE
-STARTED_TWICE = 2.5  # s in which a second wish to start means the first: MAVSDK sends two
+STARTED_TWICE = 2.5  # s in which a second start counts as the first: MAVSDK sends two
 
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """A plan as it came, and the id by which clients know it."""
+    """A plan as uploaded, and the id by which clients know it."""
 
     plan_id: int
     items: tuple[Item, ...]
@@ -51,7 +51,7 @@ class _Started(NamedTuple):
 
 
 class Plans:
-    """The plans of all vehicles."""
+    """The store of all vehicles' plans, and the start of missions."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Plans:
         self._stored = {
             key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
         }
-        self._first: dict[int, int] = {}  # by vehicle: the item with which the next start begins
+        self._first: dict[int, int] = {}  # by vehicle: the item at which the next start begins
         self._started: dict[int, _Started] = {}  # the last start of each vehicle
         for (system_id, kind), stored in self._stored.items():
             self._apply_bounds(system_id, kind, stored.items)
@@ -81,18 +81,18 @@ class Plans:
         return self._stored.get((vehicle, kind), NOTHING)
 
     def shown(self, vehicle: Vehicle) -> Task | None:
-        """Return the mission that clients are shown: the one that is driven, else the staged."""
+        """Return the mission that clients are shown: the active one, else the staged one."""
         active = vehicle.tasks.active
         if active is not None and isinstance(active.goal, Plan):
             return active
         return self.task(vehicle)
 
     def task(self, vehicle: Vehicle) -> Task | None:
-        """Return the task that the staged mission is, while it is remembered."""
+        """Return the task of the staged mission, None if it is not remembered."""
         return self._registry.get(TaskId(self.stored(vehicle.system_id, MISSION).plan_id))
 
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
-        """Let a plan take the place of the one before; NOTHING: there is none any more."""
+        """Store a plan in place of the one before; NOTHING removes it."""
         if kind == MISSION and stored.items != self.stored(vehicle.system_id, MISSION).items:
             vehicle.parts.forget_start()
         self._stored[vehicle.system_id, kind] = stored
@@ -112,7 +112,7 @@ class Plans:
     def end(
         self, vehicle: Vehicle, task: Task, reason: TaskReason, *, actor: str, now: float
     ) -> None:
-        """Call off a mission that has not begun."""
+        """Cancel a mission that has not started."""
         if task.state not in WAITING:
             return
         vehicle.tasks.cancel(task, kill=False, reason=reason, actor=actor, now=now)
@@ -120,20 +120,20 @@ class Plans:
     def let_go(
         self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
     ) -> None:
-        """A mission is not the vehicle's any more: if it has not begun, it never will."""
+        """Drop a removed mission: cancel it if it has not started."""
         current = None if task is None else self._registry.get(task.id)
         if current is not None:
             self.end(vehicle, current, reason, actor=actor, now=now)
         self._first.pop(vehicle.system_id, None)
 
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
-        """Let the next start begin with this item; 0: with the first."""
+        """Let the next start begin at this item; 0 is the first."""
         self._first[vehicle.system_id] = first
 
     # starting and jumping
 
     def check_start(self, rights: Rights, vehicle: Vehicle, submitter: Submitter) -> None:
-        """Raise Rejection unless a client may start, or move on, the plans that are there."""
+        """Raise Rejection unless a client may start the vehicle's plans, or jump in them."""
         rights.require(SUBMITTER, "start a plan")
         if vehicle.tasks.paused:
             rights.require(OPERATOR, "start a plan while tasks are paused")
@@ -146,10 +146,10 @@ class Plans:
     def start(
         self, vehicle: Vehicle, submitter: Submitter, *, first: int, now: float
     ) -> Task | Draft:
-        """Start or continue the staged mission.
+        """Start or resume the staged mission; or resume an active plan, if no staged one is new.
 
-        Gives the task; or, when that is over, the draft of another one to be submitted, after
-        which ``restarted`` is called. Rejection when there is nothing to start, or it must not be.
+        Return the task; or, if it is over, the draft of a new one: submit that, then call
+        ``restarted``. Raise Rejection if there is nothing to start, or it must not start now.
         """
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
@@ -184,7 +184,7 @@ class Plans:
         return task
 
     def _check_queue(self, vehicle: Vehicle) -> None:
-        """A start ends no more than a pause: of the rest a person must say that all is well."""
+        """Raise Rejection if the queue is paused for another reason than an operator's pause."""
         paused = vehicle.tasks.paused
         if paused and paused is not R.OPERATOR:
             words = f"paused, {words_of(paused)}: continue first"
@@ -196,7 +196,7 @@ class Plans:
             raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
 
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
-        """Of a paused queue the mission alone goes on; what others have paused stays so."""
+        """Resume an active mission and its queue; start a waiting one, even in a paused queue."""
         vehicle.joint.leave_manual(now=now)
         if task.state in ACTIVE:
             if vehicle.tasks.paused:
@@ -210,7 +210,7 @@ class Plans:
         vehicle.joint.wake(now=now)
 
     def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
-        """A start was not stored in time: it is none."""
+        """Undo a start that was not stored in time."""
         current = self._registry.get(task.id)
         self._started.pop(vehicle.system_id, None)
         if current is not None and current.state in WAITING:
@@ -218,7 +218,7 @@ class Plans:
             vehicle.tasks.modify(current, terms, actor=SERVER, now=now)
 
     def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
-        """The mission was submitted anew: clients know it by that task's id from now on."""
+        """Start a mission that was submitted again; its plan id becomes the new task's id."""
         stored = replace(self.stored(vehicle.system_id, MISSION), plan_id=task.id)
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
         self._set_going(vehicle, task, actor=str(task.submitter), now=now)
@@ -232,7 +232,7 @@ class Plans:
     def _is_started_again(
         self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
     ) -> bool:
-        """Whether a client means the start that it has just asked for in another way."""
+        """Whether a client repeats, perhaps in another way, the start that it just requested."""
         started = self._started.get(vehicle.system_id)
         if started is None or now - started.at > STARTED_TWICE:
             return False
@@ -252,7 +252,7 @@ class Plans:
         return Draft(vehicle.system_id, command, plan, submitter, terms=terms)
 
     def go_on_with(self, vehicle: Vehicle, seq: int, *, now: float) -> Task | None:
-        """Let the mission go on with another item; None: it will begin with that when started.
+        """Jump to an item of the mission and return its task; None: the next start begins there.
 
         Raise Rejection if there is no such item.
         """
@@ -271,7 +271,7 @@ class Plans:
         return task
 
     def begins_with(self, vehicle: Vehicle, seq: int) -> str:
-        """Return the text to a client that has chosen an item of a mission that does not run."""
+        """Return the text to a client that chose the item at which the next start begins."""
         number = number_of(seq, has_home=self._has_home(vehicle))
         return f"Mission begins with item {number} when started"
 
@@ -284,7 +284,7 @@ class Plans:
     # showing
 
     def current(self, vehicle: Vehicle, *, seq: int | None = None) -> m.MissionCurrent:
-        """Return MISSION_CURRENT; ``seq`` instead of the item that is driven."""
+        """Return MISSION_CURRENT; ``seq`` replaces the number of the current item."""
         task, system_id = self.shown(vehicle), vehicle.system_id
         stored = self.stored(system_id, MISSION)
         count = len(stored.items)
@@ -293,7 +293,7 @@ class Plans:
         chosen, state = self._first.get(system_id), _mission_state(task, has_plan=bool(count))
         at = chosen or 0
         if chosen is not None and task is not None and task.state in TERMINAL:
-            state = NOT_STARTED  # over, and to begin again with another item
+            state = NOT_STARTED  # over, and an item was chosen for the next start
         elif task is not None and task.progress.step >= 0:
             at = min(task.progress.step, max(count - 1, 0))
         return m.MissionCurrent(
@@ -307,18 +307,18 @@ class Plans:
         )
 
     def item_of(self, task: Task, step: int) -> Item:
-        """Return an item of a task's plan as it came."""
+        """Return an item of a task's plan as uploaded."""
         return item_at(plan_of_task(task).source, step)
 
 
 def plan_of_task(task: Task) -> Plan:
-    """Return the plan of a task that is known to be one."""
+    """Return the plan of a mission task."""
     assert isinstance(task.goal, Plan), "the task of a mission is a plan"
     return task.goal
 
 
 def waits_for_start(task: Task) -> bool:
-    """Whether a task is a mission that nobody has started."""
+    """Whether a task is a staged mission that was not started."""
     return task.state in WAITING and task.terms.is_staged
 
 

@@ -1,4 +1,4 @@
-"""Fence and rally points go to the vehicle first, which keeps them where we cannot watch."""
+"""Writes fence and rally points to the vehicle first, which enforces them without the server."""
 
 from typing import Protocol
 
@@ -13,19 +13,19 @@ R = TaskReason
 
 
 class GoOn(Protocol):
-    """What is done when the vehicle has it."""
+    """Called once the vehicle has the plan, or does not support it."""
 
     def __call__(self, *, now: float) -> None: ...
 
 
 class Refuse(Protocol):
-    """What is done when something is refused."""
+    """Called if the vehicle refuses the plan, or does not answer."""
 
     def __call__(self, refusal: Rejection, *, now: float) -> None: ...
 
 
 class WriteThrough:
-    """Writes plans to vehicles before they are stored here."""
+    """The writer of plans to vehicles, before they are stored here."""
 
     def __init__(self, vehicles: VehicleSide) -> None:
         self._vehicles = vehicles
@@ -40,9 +40,9 @@ class WriteThrough:
         *,
         now: float,
     ) -> None:
-        """Go on once the vehicle has it; one that has no such thing may do without.
+        """Write a plan to the vehicle, then call ``go_on``, also if it does not support the plan.
 
-        What it refuses, or does not answer, changes nothing here.
+        If the vehicle refuses it or does not answer, call ``refuse``: nothing is stored then.
         """
 
         def done(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001  # the vehicle's

@@ -1,7 +1,7 @@
-"""Who may send what, and what of it goes on to a rover: the one table that this is decided from.
+"""The policy table: which role may send which message or command, and what goes on to a rover.
 
-Pure. ``row_of_command`` and ``row_of_message`` know a number only; ``row_of`` looks at what is
-said, too. It is printed into dialects/README.md by tools/policy_table.py.
+All such decisions come from it. Pure. ``row_of_command`` and ``row_of_message`` know the number
+only; ``row_of`` looks at the content, too. tools/policy_table.py prints it to dialects/README.md.
 """
 
 from dataclasses import replace
@@ -32,18 +32,18 @@ __all__ = [
     "row_of_message",
 ]
 
-#: MISSION_ITEM.current: go there now, at once or to this altitude; of ArduPilot
+#: MISSION_ITEM.current of ArduPilot: go to this place now, or to this altitude
 GO_TO = (2, 3)
 _NOT_THERE_YET = replace(UNKNOWN, is_claimed=True)
 
 
 def is_task_command(number: int) -> bool:
-    """Whether a command is one of those set aside for tasks, there yet or not."""
+    """Whether a command number is reserved for tasks, in use or not."""
     return number in TASK_COMMANDS
 
 
 def row_of_command(number: int) -> Row:
-    """Return the row of a command by its number: of the most that it can be."""
+    """Return the row of a command by its number: the most dangerous that it can be."""
     row = COMMANDS.get(number)
     return row or (_NOT_THERE_YET if is_task_command(number) else UNKNOWN)
 
@@ -54,7 +54,7 @@ def row_of_message(message_id: int) -> Row:
 
 
 def row_of(message_id: int, message: m.Message | None) -> Row:
-    """Return the row of a message by what it says; None is of no known kind, and unverified."""
+    """Return the row of a message by its content; ``message`` None: unknown and unverified."""
     if isinstance(message, m.FileTransferProtocol) and file_transfer.reads(message):
         return READ_FILE
     if isinstance(message, m.MissionItem | m.MissionItemInt) and message.current in GO_TO:

@@ -1,6 +1,6 @@
-"""The commands, MAV_CMD of MAVLink's ``common`` and ``ardupilotmega`` sets and our own.
+"""The policy of commands, MAV_CMD of MAVLink's ``common`` and ``ardupilotmega`` sets and our own.
 
-Judged by what a rover does that is sent the command, not by what it is meant for in a plan.
+A row says what a rover does that is sent the command, not what the command means in a plan.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from dataclasses import replace
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTER
 from mav_tasks.engine.policy.row import UNKNOWN, Kind, Row
 
-#: numbers set aside for tasks
+#: numbers reserved for tasks
 TASK_COMMANDS = range(54000, 54050)
 
 ACTS = Row("", Kind.ACTION, OPERATOR, "servos, relays, cameras, gimbals, home, steps of a plan")
@@ -18,7 +18,7 @@ GOES = Row("", Kind.GO, OPERATOR, "arms, changes the mode, starts the rover's ow
 MOVES = Row(
     "", Kind.MOTION, OPERATOR, "drives to a place, at a speed, to a course", needs_grant=True
 )
-#: turns wheels, or stops the autopilot: never while it is driven, nor by who may not do the rest
+#: turns wheels, or stops the autopilot: never while it is driven, and only with role safety
 SERVICES = Row(
     "",
     Kind.MOTION,
@@ -31,12 +31,12 @@ SUBMITS = Row("", Kind.WISH, SUBMITTER, "asks for a task", is_claimed=True)
 
 
 def named(row: Row, names: str) -> dict[int, Row]:
-    """Return the rows of what is all the same to us, by number: of "1 THIS, 2 THAT"."""
+    """Return equal rows for several names, by number; ``names`` is like "1 THIS, 2 THAT"."""
     pairs = (each.split() for each in names.split(","))
     return {int(number): replace(row, name=name) for number, name in pairs}
 
 
-#: what a command is by what it says; its number's own row is then that of the most that it can be
+#: rows of commands by content; the row of their number is that of the most dangerous content
 DISARM = Row(
     "COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms, urgently and always"
 )
@@ -57,7 +57,7 @@ START = Row(
     "starts what the server drives itself",
     is_claimed=True,
 )
-#: rows that no number has for itself
+#: rows that have no number of their own
 BY_WORDS = (DISARM, PAUSE, PAUSE_HERE, HOLD, START)
 
 OURS = {
@@ -70,7 +70,7 @@ OURS = {
     54013: Row("TASK_RELEASE", Kind.GO, SUBMITTER, "a task of one's own", is_claimed=True),
 }
 
-#: standard commands that the server sees to itself
+#: standard commands that the server handles
 CLAIMED = {
     **named(
         replace(SUBMITS, elsewhere=MOVES),
@@ -124,7 +124,7 @@ CLAIMED = {
     ),
 }
 
-#: that go on to the rover
+#: commands that are forwarded to the rover
 PASSED_ON = {
     **named(
         ASKS,

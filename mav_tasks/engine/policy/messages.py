@@ -1,6 +1,6 @@
-"""The messages that a client may send, of MAVLink's ``common`` and ``ardupilotmega`` sets.
+"""The policy of messages from clients, of MAVLink's ``common`` and ``ardupilotmega`` sets.
 
-COMMAND_LONG and COMMAND_INT are in no row: what they carry is, see ``commands``.
+COMMAND_LONG and COMMAND_INT have no row: the commands in them have, see ``commands``.
 """
 
 from collections.abc import Mapping
@@ -13,10 +13,10 @@ from mav_tasks.engine.policy.row import Kind, Row
 SETS = Row("", Kind.WISH, SAFETY, "parameters, files, logs", is_bound=True)
 TELLS = Row("", Kind.TELL, OPERATOR, "what corrects, acknowledges or identifies")
 UPLOADS = Row("", Kind.WISH, SUBMITTER, "a mission", is_claimed=True, elsewhere=ACTS)
-#: a packet in a packet: what is in it nobody has looked at
+#: a packet in a packet, whose content is not checked
 CARRIES = Row("", Kind.MOTION, SAFETY, "what may carry anything, firmware too", is_bound=True)
 
-#: what a message is by what it says; its number's own row is then that of what it mostly is
+#: rows of messages by content; the row of their number is that of the most common content
 READ_FILE = replace(
     ASKS, name="FILE_TRANSFER_PROTOCOL: list, read", about="opcodes that change no file"
 )
@@ -37,7 +37,7 @@ BOUNDING_PLAN = Row(
     is_bound=True,
     elsewhere=BOUNDS,
 )
-#: rows that no number has for itself
+#: rows that have no number of their own
 BY_WORDS = (READ_FILE, GO_TO_ITEM, BOUNDING_PLAN)
 
 MESSAGES: Mapping[int, Row] = {
