@@ -93,7 +93,7 @@ class Queueing:
 class Clients:
     """Limits and defaults for clients."""
 
-    max_clients: int = 64  # endpoints on all client links; one more replaces the longest silent
+    max_clients: int = 64  # endpoints on all client links; one more replaces a silent one
     forget_after: float = 60.0  # s, a client silent for longer is forgotten
     push_lost: float = 5.0  # s, a push address silent for longer gets heartbeats only
     stream_interval: float = 0.1  # s between telemetry messages of one id, unless requested

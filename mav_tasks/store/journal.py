@@ -121,7 +121,7 @@ def _events(
 
 
 def _connect(path: Path) -> sqlite3.Connection:
-    """Open a file read-only; as immutable if SQLite cannot write its -shm file and no WAL exists."""
+    """Open a file read-only; as immutable if SQLite cannot write its index and no WAL exists."""
     try:
         return _checked(path, "mode=ro")
     except sqlite3.OperationalError:

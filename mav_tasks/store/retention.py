@@ -43,7 +43,7 @@ class Trimmer:
         return len(ids)
 
     def _delete_others(self, connection: sqlite3.Connection) -> int:
-        """Delete the oldest events without a task above MOST_OTHERS, so that they never fill a disk."""
+        """Delete the oldest events without a task above MOST_OTHERS: a client could fill a disk."""
         query = "SELECT count(*) FROM journal WHERE task_id IS NULL"
         (count,) = connection.execute(query).fetchone()
         excess = min(count - MOST_OTHERS, SWEEP)
