@@ -1,6 +1,6 @@
-"""A MAVLink task server for ground rovers, and the library to give it tasks.
+"""A MAVLink task server for ground rovers, and its client library.
 
-What is public is here; each name loads what it needs when it is first used::
+This module exports the public API. Each name imports its module when it is first used::
 
     from mav_tasks import Client, Move
 """
@@ -76,7 +76,7 @@ _HOMES = {
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
-__all__ = sorted(_HOME_OF)  # noqa: PLE0605  # strings, all of them
+__all__ = sorted(_HOME_OF)  # noqa: PLE0605  # all of them are strings
 
 
 def __getattr__(name: str) -> Any:

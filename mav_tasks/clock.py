@@ -1,7 +1,7 @@
-"""The server's clock: seconds since the machine was started, also of those in which it was asleep.
+"""The server's clock: seconds since boot, including the time for which the machine was suspended.
 
-CLOCK_MONOTONIC, which asyncio's timers go by, does not count a suspended machine on Linux: a rover
-would be driven on after it as if nothing had been. Elsewhere CLOCK_MONOTONIC is what there is.
+asyncio's timers use CLOCK_MONOTONIC, which stops while a Linux machine is suspended: the server
+would not notice the gap, and drive a rover on. Other systems have only CLOCK_MONOTONIC.
 """
 
 import time
@@ -10,5 +10,5 @@ _CLOCK: int = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 
 
 def boot_time() -> float:
-    """Return the seconds since the machine was started; it never goes back."""
+    """Return the seconds since boot; the value never decreases."""
     return time.clock_gettime(_CLOCK)

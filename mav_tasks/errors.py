@@ -1,27 +1,27 @@
-"""One exception tree; everything that this package raises on purpose is in it.
+"""The exceptions that this package raises on purpose, in one tree.
 
 ::
 
     MavTasksError
-    ├── UsageError            the operator can mend it: one clear line, exit code 2
-    │   ├── LinkUrlError      a link URL that says nothing we can open
+    ├── UsageError            the operator can fix it: one clear line, exit code 2
+    │   ├── LinkUrlError      a malformed link URL
     │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
     │   ├── InsecureLinkError a link beyond loopback without a key
     │   ├── StoreError        a store that cannot be opened or read at start
-    │   ├── RecordError       records that cannot be kept, or one that cannot be read
-    │   ├── PlanFileError     a mission file that cannot be read or understood
-    │   ├── ConfigError       a configuration that cannot be read or is not valid: all its faults
-    │   │   └── KeyRingError  a file of keys, the same; no secret is in the words
-    │   └── SettingError      a value that a setting cannot have
-    ├── Rejection             a request refused: reason code and words for the client
-    ├── ClientError           what a script asked of a task server came to nothing
-    │   ├── NoAnswer          nobody answered in time
-    │   ├── Refused           the server said no, and why
-    │   ├── NoSuchVehicle     it is not clear which rover is meant, or it is not there
-    │   └── TaskFailed        a task ended in another way than completed
-    └── IllegalTransition     our own mistake: a move that the lifecycle table lacks
+    │   ├── RecordError       a record that cannot be written or read
+    │   ├── PlanFileError     a mission file that cannot be read or parsed
+    │   ├── ConfigError       an unreadable or invalid configuration, with all its faults
+    │   │   └── KeyRingError  an unreadable or invalid key ring; the text contains no secret
+    │   └── SettingError      an invalid value of a setting
+    ├── Rejection             a refused request: reason code, and text for the client
+    ├── ClientError           a request to a task server failed
+    │   ├── NoAnswer          no answer in time
+    │   ├── Refused           the server refused, with its reason
+    │   ├── NoSuchVehicle     no such rover, or several and none was named
+    │   └── TaskFailed        a task ended in another state than completed
+    └── IllegalTransition     a bug: a transition that the lifecycle table lacks
 
-Bytes from outside never raise: they are parsed to a value or counted (see ``mavlink``).
+Received bytes never raise: they are parsed to a value, or counted (see ``mavlink``).
 """
 
 
@@ -30,11 +30,11 @@ class MavTasksError(Exception):
 
 
 class UsageError(MavTasksError):
-    """What the operator asked for cannot be done; the text says what to change."""
+    """A usage error; the message says how to fix it."""
 
 
 class LinkUrlError(UsageError):
-    """A link URL could not be understood."""
+    """A link URL could not be parsed."""
 
 
 class LinkOpenError(UsageError):
@@ -46,27 +46,27 @@ class InsecureLinkError(UsageError):
 
 
 class StoreError(UsageError):
-    """A store cannot be opened, or what it holds cannot be read.
+    """A store that cannot be opened, or whose contents cannot be read.
 
-    Only at start: what the disk does later is no exception but an outcome (``NotKept``).
+    Only raised at start: a later disk failure is an outcome (``NotKept``), not an exception.
     """
 
 
 class RecordError(UsageError):
-    """Records of a run cannot be kept where they are to be, or one of them cannot be read."""
+    """A record of a run that cannot be written to its folder, or that cannot be read."""
 
 
 class PlanFileError(UsageError):
-    """A mission file cannot be read, or what it says is not clear enough to drive.
+    """A mission file that cannot be read, or that is not clear enough to be driven.
 
-    The text names the file, and the part of it: "yard.plan: item 3: latitude 91 not in -90..90".
+    The text names the file and the faulty part: "yard.plan: item 3: latitude 91 not in -90..90".
     """
 
 
 class ConfigError(UsageError):
-    """A configuration that cannot be read, or whose values cannot be.
+    """A configuration that cannot be read, or that has invalid values.
 
-    ``faults`` has all that is wrong with it, one line each, which names where it stands.
+    ``faults`` lists every fault, one line each; each line names the place.
     """
 
     def __init__(self, *faults: str) -> None:
@@ -75,22 +75,22 @@ class ConfigError(UsageError):
 
 
 class KeyRingError(ConfigError):
-    """A key ring that cannot be read or kept, or that has no such key; no secret is in the words.
+    """A key ring that cannot be read or written, or that lacks a key.
 
-    ``faults`` as those of a configuration.
+    The text contains no secret. ``faults`` is as in ConfigError.
     """
 
 
 class SettingError(UsageError):
-    """A value that a setting cannot have; the text names the setting and its range."""
+    """An invalid value of a setting; the text names the setting and its range."""
 
 
 class Rejection(MavTasksError):
-    """A client's request refused.
+    """A client's request was refused.
 
-    ``reason`` is a TASK_REASON number of the dialect (100 and above); the MAV_RESULT that goes on
-    the wire follows from it by a table (``engine/commands/translate.py``), so that the task domain
-    can refuse without knowing MAVLink. ``param`` is the parameter that is wrong, 1 to 7, 0: none.
+    ``reason`` is a TASK_REASON number of the dialect (100 and above). A table in
+    ``engine/commands/translate.py`` maps it to the MAV_RESULT on the wire, so that the task domain
+    can refuse without knowing MAVLink. ``param`` is the wrong parameter, 1 to 7; 0: none.
     """
 
     def __init__(self, reason: int, text: str, *, param: int = 0) -> None:
@@ -101,14 +101,14 @@ class Rejection(MavTasksError):
 
 
 class ClientError(MavTasksError):
-    """What a script asked of a task server came to nothing."""
+    """A client's request to a task server failed."""
 
 
 class NoAnswer(ClientError):
-    """Nobody answered in time; what was asked for may have been done all the same.
+    """No answer came in time. The server may nevertheless have done what was requested.
 
-    ``nonce`` is that of a submission, 0 of anything else: submitted again with it, it is the same
-    task.
+    ``nonce`` is the nonce of a submission, 0 for any other request. A submission that is repeated
+    with its nonce does not create a second task.
     """
 
     def __init__(self, text: str, *, nonce: int = 0) -> None:
@@ -117,10 +117,10 @@ class NoAnswer(ClientError):
 
 
 class Refused(ClientError):
-    """The server said no. ``reason`` is a TASK_REASON number of the dialect, 0 if it gave none.
+    """The server refused. ``reason`` is a TASK_REASON number of the dialect, 0 if it gave none.
 
-    ``result`` is the MAV_RESULT, or of a plan the MAV_MISSION_RESULT. After a
-    TEMPORARILY_REJECTED (1) the same may be asked for again later.
+    ``result`` is the MAV_RESULT, or the MAV_MISSION_RESULT of a plan. After TEMPORARILY_REJECTED
+    (1) the client may repeat the request later.
     """
 
     def __init__(self, text: str, *, result: int, reason: int) -> None:
@@ -134,10 +134,10 @@ class NoSuchVehicle(ClientError):
 
 
 class TaskFailed(ClientError):
-    """A task ended in another way than completed, or the server does not know it any more.
+    """A task ended in another state than completed, or the server no longer knows it.
 
-    ``state`` and ``reason`` are TASK_STATE and TASK_REASON numbers of the dialect, ``state`` 0
-    (UNKNOWN) if the server does not know the task.
+    ``state`` and ``reason`` are TASK_STATE and TASK_REASON numbers of the dialect. ``state`` is 0
+    (UNKNOWN) if the server no longer knows the task.
     """
 
     def __init__(self, text: str, *, task_id: int, state: int, reason: int) -> None:
@@ -148,4 +148,4 @@ class TaskFailed(ClientError):
 
 
 class IllegalTransition(MavTasksError):
-    """A task was moved along an edge that the lifecycle table does not have."""
+    """A bug: the lifecycle table lacks the transition that was requested for a task."""

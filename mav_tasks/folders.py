@@ -1,12 +1,13 @@
-"""Folders for what is its owner's alone: keys, records, the store."""
+"""Private folders, for keys, records and the store."""
 
 from pathlib import Path
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder unless it is there, and those above it that are not, for nobody else to enter.
+    """Create a folder and its missing parents with mode 0700; raise OSError if that fails.
 
-    ``Path.mkdir`` gives those above what the umask leaves, which may be everything. OSError.
+    ``Path.mkdir(parents=True)`` would create the parents with the mode that the umask allows, which
+    may let everybody in. Folders that exist keep their mode.
     """
     missing = [each for each in folder.parents if not each.exists()]
     for each in (*reversed(missing), folder):

@@ -1,6 +1,6 @@
-"""The whole server on memory links, in its caller's time: for tests and demonstrations.
+"""The whole server on memory links, in the caller's virtual time: for tests and demonstrations.
 
-It is the same engine, store and pump as the runner's; only sockets, clock and signals are missing.
+It uses the same engine, store and pump as the runner, without sockets, clock and signals.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ VEHICLE_LINK = "server:vehicles"
 
 
 class InMemoryServer:
-    """A server on a MemoryNet: clients find it as CLIENT_LINK, it finds ``vehicles`` by name."""
+    """A server on a MemoryNet: clients address CLIENT_LINK, the server addresses ``vehicles``."""
 
     def __init__(
         self,
@@ -33,12 +33,12 @@ class InMemoryServer:
         store: Store | None = None,
         restored: Restored | None = None,
         observers: Sequence[EngineObserver] = (),
-        wall_offset: float | None = None,  # UTC less the caller's time, s; None: not known
+        wall_offset: float | None = None,  # UTC minus the caller's time, s; None: unknown
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: tuple[Key, ...] | None = None,
         now: float = 0.0,
     ) -> None:
-        """``policies`` by CLIENT_LINK and VEHICLE_LINK; ``keys`` None: there is no key ring."""
+        """``policies``: by CLIENT_LINK and VEHICLE_LINK. ``keys``: None if there is no key ring."""
         self.engine = Engine(settings or Settings(), now=now, restored=restored)
         self.store = store or MemoryStore()
         self.pump = Pump(self.engine, self.store, self._send, observers=observers)
@@ -55,11 +55,11 @@ class InMemoryServer:
         self.pump.turn(now=now)
 
     def next_deadline(self) -> float | None:
-        """Return when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` must be called next, if nothing arrives before."""
         return None if self.pump.is_over else self.engine.next_deadline()
 
     def turn(self, *, now: float) -> None:
-        """Read the links, and do what is due."""
+        """Read the links, handle a due deadline, and send and store the results."""
         if self.pump.is_over:
             return
         for link in self._links.values():
@@ -72,7 +72,7 @@ class InMemoryServer:
         self.pump.turn(now=now)
 
     def shut_down(self, *, now: float) -> None:
-        """Begin the orderly end; it is there once ``pump.is_over``, a second later at the most."""
+        """Begin the orderly shutdown; ``pump.is_over`` is set within ``watch.shutdown`` seconds."""
         self.pump.handle(Shutdown(), now=now)
         self.pump.turn(now=now)
 

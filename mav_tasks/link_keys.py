@@ -1,4 +1,4 @@
-"""Whether the keys that links need are in the ring: UsageError says which is not."""
+"""Checks that the key ring has the keys that the links need."""
 
 from mav_tasks.errors import InsecureLinkError, KeyRingError, UsageError
 from mav_tasks.key_ring.ring import KeyRing
@@ -8,9 +8,9 @@ from mav_tasks.settings import Links
 
 
 def check_keys(links: Links, ring: KeyRing | None, *, where: str) -> None:
-    """Raise UsageError for a link whose key there is not, or that nobody could sign for.
+    """Raise UsageError if a link's key is missing or of the wrong side, or no client could sign.
 
-    ``ring`` None: there is none, ``where`` it would be.
+    ``ring``: None if there is no key ring. ``where``: the path of the key ring, for the message.
     """
     for link in links_of(links):
         if link.policy.key:
@@ -39,7 +39,7 @@ def _check_key(link: ConfiguredLink, ring: KeyRing, where: str) -> None:
 
 
 def in_words(link: ConfiguredLink, *, has_ring: bool) -> str:
-    """Return what is asked of signatures on a link; without keys and questions nothing."""
+    """Return a link's signing policy for the startup line; "" if there is nothing to say."""
     own = f", key {link.policy.key}" if link.policy.key else ""
     if link.policy.takes_unsigned:
         return f", unsigned, too{own}" if has_ring else own

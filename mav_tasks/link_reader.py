@@ -1,7 +1,7 @@
-"""Reads the links that have something, and after a standstill of this process all of them at once.
+"""Reads the readable links; after a stall of this process, all of them as one backlog.
 
-A word that was sent before a STOP must not count after it because its link is read later: what
-waited on several links is therefore handed over as a whole, with how long each piece had waited.
+A command that was sent before a STOP must not take effect after it because its link is read later.
+After a stall the packets of all links are therefore returned together, each with its waiting time.
 """
 
 import selectors
@@ -14,15 +14,15 @@ from mav_tasks.links.base import Link, PeerChange, PeerState, StampedLink, Strea
 
 DRAIN = 64  # datagrams read from one link before the others have their turn
 MOST_ROUNDS = 256  # of DRAIN from each link: more than the receive buffer of a UDP link holds
-SETTLES = 0.5  # s; for so long what stuck at the sender of a stalled stream follows what is here
+SETTLES = 0.5  # s after a stall, for which a stream's sender may still deliver stalled bytes
 
 Note = Callable[[StreamLink, list[PeerChange]], None]
 
 
 class LinkReader:
-    """Reads without waiting; ``note`` is told what becomes of peers, in order with what they sent.
+    """Reads links without waiting; calls ``note`` with peer changes, in order with the data.
 
-    Times are those of the server's clock.
+    Times are of the server's clock.
     """
 
     def __init__(self, sides: Sequence[tuple[Link, LinkSide]], *, note: Note) -> None:
@@ -32,18 +32,18 @@ class LinkReader:
             self._selector.register(link.fileno(), selectors.EVENT_READ, (link, side))
         self._streams = {link.name: link for link, _ in sides if isinstance(link, StreamLink)}
         self._gone: dict[str, tuple[StreamLink, list[PeerChange]]] = {}
-        self._stood_still = 0.0  # s, the last time that it did
+        self._stood_still = 0.0  # s, length of the last stall
         self._settled_at = -inf
 
     def __repr__(self) -> str:
         return f"LinkReader({len(self._selector.get_map())} links)"
 
     def close(self) -> None:
-        """Let the links go."""
+        """Close the selector; the links stay open."""
         self._selector.close()
 
     def readable(self) -> tuple[list[Link], list[Link]]:
-        """Return the links that have something now, of clients and of vehicles."""
+        """Return the readable links: those to clients, those to vehicles."""
         clients: list[Link] = []
         vehicles: list[Link] = []
         for key, _ in self._selector.select(0):
@@ -52,7 +52,7 @@ class LinkReader:
         return clients, vehicles
 
     def read(self, link: Link, *, now: float) -> Packets:
-        """Read one link. ``note_gone`` belongs behind what is made of it."""
+        """Read one link. Call ``note_gone`` after the engine has handled the packets."""
         datagrams = self._received(link)
         waited: Sequence[float] = ()
         if now < self._settled_at and link.is_stream:
@@ -62,17 +62,17 @@ class LinkReader:
         return Packets(link.name, datagrams, waited)
 
     def read_late(self, seconds: float, *, wall_is_even: bool, now: float) -> tuple[Packets, ...]:
-        """Read all links, clients' first, after nothing was read for so long.
+        """Read all links, clients' first, after a stall of so many seconds.
 
-        The kernel's stamps say nothing if the wall clock was set meanwhile: then all of it counts
-        as being as old as it can be.
+        If the wall clock was set during the stall (not ``wall_is_even``), kernel timestamps are
+        useless: then everything counts as having waited for the whole stall.
         """
         self._stood_still, self._settled_at = seconds, now + SETTLES
         came: dict[str, tuple[list[tuple[Peer, bytes]], list[float]]] = {}
         for _ in range(MOST_ROUNDS):
             has_more = False
             for link in chain(*self.readable()):
-                if link.name in self._gone:  # what comes after that is of another connection
+                if link.name in self._gone:  # later data belongs to another connection
                     continue
                 if wall_is_even and isinstance(link, StampedLink):
                     datagrams, waited = link.receive_stamped(DRAIN, longest=seconds)
@@ -88,7 +88,7 @@ class LinkReader:
         return tuple(Packets(name, *both) for name, both in came.items() if both[0])
 
     def note_gone(self) -> None:
-        """Tell who went after what was read of them."""
+        """Report the peers that went down, after their last data was handled."""
         gone, self._gone = self._gone, {}
         for link, changes in gone.values():
             self._note(link, changes)
@@ -97,7 +97,7 @@ class LinkReader:
         stream = self._streams.get(link.name)
         if stream is None:
             return link.receive(DRAIN)
-        while before := stream.take_changes():  # to tell of some may show others
+        while before := stream.take_changes():  # noting some may cause others
             self._note(stream, before)
         pieces = stream.receive(DRAIN)
         changes = stream.take_changes()

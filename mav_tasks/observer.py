@@ -1,7 +1,7 @@
-"""The seam for whoever keeps a record of a run: told all that goes into the engine and out of it.
+"""The observer interface: recorders and logs see every engine input and output.
 
-An observer is called between a packet and its answer: it takes a note, and does its work elsewhere.
-It never raises, never waits, and changes nothing.
+An observer is called between a packet and its answer, so it only queues what it saw and does its
+work elsewhere. It never raises, never blocks, and changes nothing.
 """
 
 import logging
@@ -15,25 +15,25 @@ log = logging.getLogger("mav_tasks")
 
 
 class EngineObserver(Protocol):
-    """Who is told, in the order in which things happen; ``now`` as the engine was told it."""
+    """Sees inputs and outputs in the order in which they happen; ``now`` is the engine's."""
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """The engine was given an input, or (None) told that a deadline has come."""
+        """Note an input that the engine is about to handle; None is a deadline."""
         ...
 
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
-        """The engine gave these; the packets are on their way, the events not yet stored."""
+        """Note the engine's output; the packets were sent, the events are not yet stored."""
         ...
 
     def close(self) -> None:
-        """The run is over; what is still to be written may be waited for."""
+        """End the record; this call may wait until everything is written."""
         ...
 
 
 class EngineObservers:
-    """All of them. One that fails is let go: no vehicle stops because a record of it ends."""
+    """All observers. One that raises is removed, so that no vehicle stops because of a record."""
 
     def __init__(self, observers: Sequence[EngineObserver]) -> None:
         self._all = tuple(observers)
@@ -42,25 +42,25 @@ class EngineObservers:
         return f"EngineObservers({list(self._all)})"
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """Tell each what the engine is given."""
+        """Pass an input to each observer."""
         if self._all:
             self._tell(lambda observer: observer.on_input(item, now=now))
 
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
-        """Tell each what the engine has given."""
+        """Pass the engine's output to each observer."""
         if self._all:
             self._tell(lambda observer: observer.on_output(packets, events, now=now))
 
     def close(self) -> None:
-        """Let each end."""
+        """Close each observer."""
         self._tell(lambda observer: observer.close())
 
     def _tell(self, say: Callable[[EngineObserver], None]) -> None:
         for observer in self._all:
             try:
                 say(observer)
-            except Exception:  # whatever our own mistake is, the vehicle drives on
+            except Exception:  # a bug in an observer must not stop the vehicle
                 log.exception("internal error: %s ends here", observer)
                 self._all = tuple(each for each in self._all if each is not observer)

@@ -1,7 +1,7 @@
-"""A probe on a real link: sockets, one timer, signals. It decides nothing.
+"""The I/O shell of a probe: a real link, one timer, signals. It decides nothing.
 
-Whatever ends it, zero and HOLD leave, and disarming; only after a SIGKILL there is nobody who could
-send them, and the rover's own time-out must stop it.
+However the probe ends, it sends zero velocity, HOLD and disarming. Only after SIGKILL it cannot:
+then the rover's own setpoint time-out must stop the rover.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ from mav_tasks.mavlink.stream import StreamSplitter
 from mav_tasks.probe.probe import Options, Probe
 
 DRAIN = 64  # datagrams read before the loop has another turn
-LAST_WORDS = 3  # times that they are sent: a datagram may be lost
+LAST_WORDS = 3  # times that the emergency stop packets are sent: a datagram may be lost
 
 
 async def run_probe(
@@ -33,10 +33,11 @@ async def run_probe(
     key: Key | None = None,
     on_stage: Callable[[str], None],
 ) -> tuple[Probe, int]:
-    """Probe the rover at a link until it is over; gives the probe, and a signal's number or 0.
+    """Probe the rover at a link; return the finished probe, and the number of a signal or 0.
 
-    With a ``key`` all is signed, and nothing else is believed. ``on_stage`` gets in words what it
-    is about. LinkUrlError, LinkOpenError and InsecureLinkError say what is wrong with the link.
+    With a ``key`` the probe signs its packets and drops packets that are not signed with the key.
+    ``on_stage`` is called with a text for each stage. Raise LinkUrlError, LinkOpenError or
+    InsecureLinkError if the link cannot be used.
     """
     parsed = parse_url(url)
     if not (insecure or key is not None or is_nearby(parsed)):
@@ -53,7 +54,7 @@ async def run_probe(
 
 
 class _Face:
-    """Turns the probe: reading, one timer, sending."""
+    """The probe's driver: reads, arms one timer, sends."""
 
     def __init__(
         self,
@@ -85,7 +86,7 @@ class _Face:
         return f"_Face({self._link.name}, {self.probe!r})"
 
     def close(self) -> None:
-        """Stop the rover if that is still to be done, and give the link back."""
+        """Send the probe's emergency stop packets, if it has any, and close the link."""
         for timer in (self._timer, self._tending):
             if timer is not None:
                 timer.cancel()
@@ -96,7 +97,7 @@ class _Face:
         self._link.close()
 
     def _on_signal(self, number: int) -> None:
-        if self.signal:  # a second one is not waited for; close() has the last words
+        if self.signal:  # a second signal ends at once; close() stops the rover
             self._finish()
             return
         self.signal = number
@@ -121,16 +122,16 @@ class _Face:
             self._take_changes(self._link)
 
     def _guarded(self, turn: Callable[[], None]) -> None:
-        """Do something, send what follows; our own mistake ends it, and is raised where it began.
+        """Run a turn, send its packets, and arm the timer.
 
-        The time is looked at first: a tick that is due does not wait for what came meanwhile.
+        If the turn raises, send the emergency stop packets and let ``run_probe`` raise the error.
         """
         if self.over.done():
             return
         try:
             turn()
             self._flush()
-        except Exception as error:  # noqa: BLE001  # a rover must not drive on for it
+        except Exception as error:  # noqa: BLE001  # the rover must be stopped first
             self._send_last_words()
             self.over.set_exception(error)
             return

@@ -1,7 +1,7 @@
-"""Engine, store and links, turned by whoever knows the time. It decides nothing.
+"""Moves data between engine, store and links, in the caller's time. It decides nothing.
 
-What must be durable first the engine holds back by itself: whatever ``take_packets`` gives may
-leave at once, and so it leaves before the events of the same turn reach the store.
+The engine itself holds back packets that must wait for the store. Packets from ``take_packets`` may
+therefore be sent at once, before the events of the same turn reach the store.
 """
 
 import logging
@@ -19,7 +19,7 @@ log = logging.getLogger("mav_tasks")
 
 
 class Pump:
-    """Engine, store and links, turned by whoever knows the time."""
+    """One turn of the server: an input goes in, packets go to the links, events to the store."""
 
     def __init__(
         self,
@@ -37,17 +37,17 @@ class Pump:
         self.is_over = False
 
     def handle(self, item: Input, *, now: float) -> None:
-        """Take one input in; ``turn`` brings out what follows."""
+        """Give the engine one input; ``turn`` sends and stores the results."""
         self._observers.on_input(item, now=now)
         self.engine.handle(item, now=now)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Do what the time asks for; ``turn`` brings out what follows."""
+        """Let the engine handle a due deadline; ``turn`` sends and stores the results."""
         self._observers.on_input(None, now=now)
         self.engine.handle_deadline(now=now)
 
     def turn(self, *, now: float) -> None:
-        """Send and store until nothing is left to do."""
+        """Send packets and store events until the store has no more outcomes to report."""
         noted: list[Event] = []
         while True:
             packets = self.engine.take_packets()
@@ -65,19 +65,19 @@ class Pump:
             for outcome in outcomes:
                 self._note_outcome(outcome)
                 self.handle(_input_of(outcome), now=now)
-        self._note(noted)  # last: whoever waits for an answer does not wait for the log
+        self._note(noted)  # last, so that no answer waits for the log
 
     def close(self) -> None:
-        """Let the observers end."""
+        """Close the observers."""
         self._observers.close()
 
     def send_last_words(self) -> None:
-        """Stop every vehicle that is being driven; of the engine it needs its signature at most."""
+        """Send the prepared packets that stop each driven vehicle; the engine only signs them."""
         for outgoing in self.engine.emergency_stop_packets:
             sealed = outgoing
-            with suppress(Exception):  # a rover that asks for no signature takes it without one
+            with suppress(Exception):  # a rover without signing takes it unsigned
                 sealed = self.engine.signatures.sealed_late(outgoing)
-            with suppress(Exception):  # what fails for one must not keep it from the next
+            with suppress(Exception):  # one failure must not keep the others from stopping
                 self._send(sealed)
 
     def _note_outcome(self, outcome: Outcome) -> None:

@@ -1,7 +1,8 @@
 """QGroundControl's actions files: buttons of its fly view that send a command.
 
-QGroundControl 5 reads "MavlinkActions", 4.3 and 4.4 "CustomActions"; what is in them is the same.
-A button asks for no numbers, and JSON has no NaN: so each action says all seven parameters.
+QGroundControl 5 reads "MavlinkActions", 4.3 and 4.4 read "CustomActions"; the contents are the
+same. A button cannot prompt for numbers, and JSON has no NaN, so each action has all seven
+parameters.
 """
 
 import json
@@ -17,13 +18,13 @@ from mav_tasks.whole_file import write_whole
 MAVLINK_ACTIONS, CUSTOM_ACTIONS = "MavlinkActions", "CustomActions"
 FILE_TYPES = (MAVLINK_ACTIONS, CUSTOM_ACTIONS)
 FILE_NAME = "mav-tasks.json"
-PRIORITY = 5.0  # a parameter that is left out is 0, and that is the lowest
+PRIORITY = 5.0  # an omitted parameter is 0, which is the lowest priority
 MAX_COMMAND = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One button: what is on it, and the command with its parameters."""
+    """One button: its label and description, and the command with its parameters."""
 
     label: str
     description: str
@@ -38,8 +39,8 @@ def _task(
     return Action(label, description, command, (*first, 0.0, 0.0, 0.0, priority))
 
 
-#: QGroundControl shows three of a row, and inserts one of its own in front while a rover is armed:
-#: what stops a rover comes first, and the order stays as it is
+#: QGroundControl shows three in a row, and inserts one of its own in front while a rover is armed:
+#: the buttons that stop a rover come first, and the order must not change
 ACTIONS = (
     Action("STOP", "Stop at once, until continued", MavCmd.TASK_STOP, (0.0,)),
     Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
@@ -57,9 +58,9 @@ ACTIONS = (
 
 
 def parse_action(text: str) -> Action:
-    """Read ``LABEL=COMMAND,param1,...,param7``; UsageError says what is wrong with it.
+    """Parse ``LABEL=COMMAND,param1,...,param7``; raise UsageError if it is malformed.
 
-    What is left out of a task's command is as not given: 0, and the usual priority.
+    Omitted parameters are 0; an omitted priority of a task command is PRIORITY.
     """
     label, equals, rest = text.partition("=")
     command, *given = rest.split(",")
@@ -104,9 +105,9 @@ def file_of(
 
 
 def install(documents: Path, actions: Sequence[Action], *, component: int) -> list[Path]:
-    """Write both files to where QGroundControl looks, below ``documents``; gives their paths.
+    """Write both files to QGroundControl's folders below ``documents``; return their paths.
 
-    UsageError says why one cannot be written.
+    Raise UsageError if one cannot be written.
     """
     written = []
     for file_type in FILE_TYPES:

@@ -1,8 +1,8 @@
-"""The I/O shell: one loop, one timer, one pump; signals and the orderly end. It decides nothing.
+"""The I/O shell: one loop, one timer, one pump; signals and orderly shutdown. It decides nothing.
 
-The engine's time is ``boot_time``, which goes on while the machine is asleep; the loop's does not,
-so the timer is set by how long is left. Every TEND_PERIOD the loop wakes at least: two callbacks
-further apart than STOOD_STILL tell that this process, or the machine, stood still.
+The engine's time is ``boot_time``, which goes on while the machine is suspended. The loop's time
+does not, so the timer is set to the remaining time. The loop wakes at least every TEND_PERIOD: if
+two callbacks are further apart than STOOD_STILL, this process or the machine has stalled.
 """
 
 import asyncio
@@ -42,25 +42,25 @@ from mav_tasks.store import Kept, Store
 
 log = logging.getLogger("mav_tasks")
 
-EACH_TAKES = 1e-4  # s, to take one in, until it is known what those of a link take
-LEARNT = 0.2  # the part that the latest count for in that: one may be slow by chance
-SLOWER = 4.0  # times what was known, at the most, do they count for
-TURN = 1e-3  # s, for which datagrams are taken in even when a setpoint is due
-STOOD_STILL = 0.3  # s between two callbacks; data older than that steer nothing
-WALL_EVEN = 0.1  # s, by which the wall clock's offset may differ and a stamp still tells an age
+EACH_TAKES = 1e-4  # s to handle one datagram: the first estimate for each link
+LEARNT = 0.2  # weight of the latest sample in the moving average: one may be slow by chance
+SLOWER = 4.0  # a slow sample counts as at most this multiple of the estimate
+TURN = 1e-3  # s, for which datagrams are handled even if a setpoint is due
+STOOD_STILL = 0.3  # s between two callbacks: a stall; older telemetry must not steer
+WALL_EVEN = 0.1  # s, by which the wall clock's offset may differ, for stamps to tell an age
 WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 
-HANGUP = 0.2  # s after SIGHUP, when it is seen whether the terminal is gone
+HANGUP = 0.2  # s after SIGHUP, when the runner checks whether the terminal is gone
 
 EXIT_FAILED = 70  # EX_SOFTWARE: the engine itself failed
 
 
-#: of a link of which nothing else is said
+#: the default of a link without a policy
 TAKES_ALL = LinkPolicy()
 
 
 def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> LinkChanged:
-    """Return the input that says that a link is up."""
+    """Return the engine input for a link that is up."""
     return LinkChanged(
         link.name,
         side,
@@ -75,7 +75,7 @@ def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> 
 
 
 def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion:
-    """Return the input that says what became of a peer."""
+    """Return the engine input for a change of a peer."""
     match change.state:
         case PeerState.UP | PeerState.DOWN as state:
             return PeerChanged(link.name, change.peer, up=state is PeerState.UP)
@@ -84,28 +84,31 @@ def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion:
 
 
 class Reload(Protocol):
-    """Whoever reads the settings again when they may be others."""
+    """The interface of ``config.reload``: reads the settings again."""
 
     @property
     def was_asked(self) -> bool:
-        """Whether it was asked for before the runner ran."""
+        """Whether SIGHUP came before the runner ran."""
 
     def begin(self, put: Callable[[Settings], Mapping[str, float]]) -> None:
-        """Read them in its own time, and give them to ``put``, which gives what clients set."""
+        """Read the settings in the background, then call ``put``.
+
+        ``put`` returns the parameters that clients have set.
+        """
 
 
 class Keys(Protocol):
-    """Whoever knows the keys, and when they change."""
+    """The interface of the key ring: the keys, and their changes."""
 
     @property
     def keys(self) -> tuple[Key, ...] | None:
-        """Those in force; None: there is no key ring."""
+        """The keys in force; None if there is no key ring."""
 
     def begin(self, put: Callable[[tuple[Key, ...]], None]) -> None:
-        """Give each change to ``put`` from now on, in the loop."""
+        """Call ``put`` in the loop after each change from now on."""
 
     def close(self) -> None:
-        """Give no more."""
+        """Stop reporting changes."""
 
 
 class Runner:
@@ -124,7 +127,7 @@ class Runner:
         keys: Keys | None = None,
         clock: Callable[[], float] = boot_time,
     ) -> None:
-        """``policies`` by the names of links; one without takes unsigned packets."""
+        """``policies``: by link name. A link without a policy accepts unsigned packets."""
         self._clock = clock
         self._reload = reload
         self._policies = policies or {}
@@ -139,18 +142,18 @@ class Runner:
         self._pump = Pump(engine, store, self._send, observers=observers)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._due = inf  # when the timer comes, by the engine's time
+        self._due = inf  # when the timer fires, in the engine's time
         self._reader: LinkReader | None = None
         self._ran_at = inf  # when the last callback began
         self._wall_seen = 0.0  # the wall clock's offset then
         self._over: asyncio.Future[int] | None = None
-        #: s, that a datagram of a link takes with all that it has sent: to many clients, longer
+        #: s to handle a datagram of a link and send the results: longer with many clients
         self._each_takes = dict.fromkeys(self._links, EACH_TAKES)
         self._wall_offset: float | None = None
         self._is_ending = False
 
     async def run(self) -> int:
-        """Serve until SIGINT or SIGTERM; gives the exit code."""
+        """Serve until SIGINT or SIGTERM; return the exit code."""
         self._loop = asyncio.get_running_loop()
         self._over = self._loop.create_future()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -186,7 +189,7 @@ class Runner:
             self._pump.close()
 
     def _on_readable(self, reader: LinkReader) -> None:
-        """Read every link that has something, so that nothing depends on whose turn comes first."""
+        """Read all readable links together, so that the order of callbacks does not matter."""
         self._wake()
         clients, vehicles = reader.readable()
         of_each = [reader.read(link, now=self._ran_at) for link in clients]
@@ -201,13 +204,13 @@ class Runner:
         reader.note_gone()
 
     def _wake(self) -> None:
-        """Look whether this process stood still: then what came meanwhile is taken in first."""
+        """Check whether this process has stalled: if so, handle the backlog first."""
         now, before = self._clock(), self._ran_at
         wall, wall_before = time.time() - now, self._wall_seen
         self._ran_at, self._wall_seen = now, wall
         if self._reader is None or now - before <= STOOD_STILL:
             return
-        self._due = inf  # the timer is set anew: the loop does not count a suspended machine
+        self._due = inf  # the timer must be set again: the loop's clock stood still while suspended
         wall_is_even = abs(wall - wall_before) < WALL_EVEN
         packets = self._reader.read_late(now - before, wall_is_even=wall_is_even, now=now)
         self._guarded(Backlog(packets) if packets else None)
@@ -217,7 +220,7 @@ class Runner:
         return sum(len(each.datagrams) * self._each_takes[each.link] for each in several)
 
     def _take_in(self, packets: Packets) -> None:
-        """Take in what came, but let no setpoint wait for all of it."""
+        """Handle packets in portions, so that no setpoint waits for all of them."""
         assert self._over is not None
         link, datagrams, waited = packets.link, packets.datagrams, packets.waited
         while datagrams and not self._over.done():
@@ -260,7 +263,7 @@ class Runner:
         self._guarded(None)
 
     def _close_store(self) -> None:
-        """What it says to the last goes to the log: there is nobody else to tell."""
+        """Close the store; log its last outcomes, as the engine no longer takes them."""
         self._store.close()
         for outcome in self._store.take_outcomes():
             if not isinstance(outcome, Kept):
@@ -269,20 +272,20 @@ class Runner:
     def _on_signal(self) -> None:
         assert self._loop is not None
         self._is_ending = True
-        for number in (signal.SIGINT, signal.SIGTERM):  # a second one is not waited for
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second signal ends at once
             self._loop.add_signal_handler(number, self._leave_at_once)
         self._guarded(Shutdown())
 
     def _on_hangup(self, reload: Reload) -> None:
-        """Read the settings again; but if it is the terminal that is gone, end."""
+        """Read the settings again; if the terminal is gone, shut down instead."""
         assert self._loop is not None
-        if self._terminals:  # the signal may come a moment before it is
+        if self._terminals:  # SIGHUP may come a moment before the terminal is gone
             self._loop.call_later(HANGUP, self._end_or_begin, reload)
         else:
             reload.begin(self._put)
 
     def _end_or_begin(self, reload: Reload) -> None:
-        if self._is_ending:  # of a closing terminal the kernel tells, and the shell
+        if self._is_ending:  # kernel and shell both send SIGHUP when a terminal closes
             return
         if all(map(os.isatty, self._terminals)):
             reload.begin(self._put)
@@ -290,7 +293,7 @@ class Runner:
             self._on_signal()
 
     def _put(self, settings: Settings) -> Mapping[str, float]:
-        """Take new settings into force; gives what clients have set, which comes before them."""
+        """Put new settings into force; return the parameters of clients, which override them."""
         before = self._pump.engine.not_in_force
         self._guarded(SettingsChanged(settings))
         for why in self._pump.engine.not_in_force:
@@ -299,7 +302,7 @@ class Runner:
         return self._pump.engine.parameters
 
     def _begin_keys(self, keys: Keys) -> None:
-        """Before the first packet, the keys; and from then on as they change."""
+        """Give the engine the keys before its first packet, and later their changes."""
         if keys.keys is not None:
             self._put_keys(keys.keys)
         keys.begin(self._put_keys)
@@ -312,17 +315,17 @@ class Runner:
         self._finish(0)
 
     def _guarded(self, item: Input | None) -> None:
-        """One turn of the pump, for an input or (None) for the time.
+        """Run one turn of the pump, for an input or (None) for a deadline.
 
-        If the engine fails, stop the vehicles and end: no zombie. What comes after that, or after
-        an end at once, is not taken in: a setpoint must not follow the last words.
+        If the engine raises, stop the vehicles and end: no zombie. Ignore inputs after the end: a
+        setpoint must not follow the emergency stop packets.
         """
         if self._over is not None and self._over.done():
             return
         try:
             self._turn(item)
-        except Exception:  # whatever our own mistake is, a vehicle must not drive on for it
-            self._pump.send_last_words()  # first: a traceback reads files, from whatever disk
+        except Exception:  # a bug of ours must not let a vehicle drive on
+            self._pump.send_last_words()  # first: a traceback reads files, from a slow disk perhaps
             log.critical("internal error: stopping every vehicle and ending", exc_info=True)
             self._finish(EXIT_FAILED)
 
@@ -344,9 +347,10 @@ class Runner:
         self._rearm(self._loop)
 
     def _rearm(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Have the timer come in time, or too early: then it is for nothing, and set again.
+        """Move the timer forward if the next deadline is earlier; never move it back.
 
-        Most deadlines only move on, with each packet. To set the timer anew each time costs more.
+        Most packets move a deadline back. A timer that fires too early costs less than setting it
+        after each packet.
         """
         due = self._pump.engine.next_deadline()
         if due is None or self._due <= due:
@@ -373,5 +377,5 @@ class Runner:
             link.send(outgoing.peer, outgoing.data)
 
     def _is_over_for(self, outgoing: Outgoing) -> bool:
-        """Whether it was made before this process stood still: then it must not leave any more."""
+        """Whether a packet is too old to send, because this process stalled after making it."""
         return self._clock() > outgoing.until

@@ -1,4 +1,4 @@
-"""Starts a server from its settings: links, store, runner."""
+"""The composition root: starts a server from its settings, with links, store and runner."""
 
 import asyncio
 import gc
@@ -40,9 +40,9 @@ from mav_tasks.tasks.restored import Restored
 
 
 def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
-    """Run until a signal; gives the exit code. UsageError says what the operator can mend.
+    """Run a server until a signal; return the exit code. Raise UsageError if it cannot start.
 
-    With ``reload`` SIGHUP reads the configuration again.
+    With ``reload``, SIGHUP reads the configuration again.
     """
     links, retention = settings.links, settings.engine.retention
     for _, fault in faults_of(links):
@@ -65,7 +65,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
         vehicle_links = [
             _open(opened, link.url, TO_VEHICLES) for link in asked if link.side == "vehicles"
         ]
-        gc.disable()  # many tasks are read: it would look through them again and again
+        gc.disable()  # many tasks are loaded: each collection would scan them
         journal = open_store(settings.store or None, retention)
         opened.callback(journal.close)
         note_latest(path_of_store(settings.store or None))
@@ -92,15 +92,15 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
 
 
 def _leave_before_serving(_number: int, _frame: object) -> None:
-    """Nothing is driven yet: an orderly end is simply to go."""
+    """Exit at once: no vehicle is driven yet."""
     raise SystemExit(0)
 
 
 def tame_collector() -> None:
-    """Let the cycle collector work again, but never look through everything that is kept.
+    """Enable the cycle collector again, but avoid full collections.
 
-    With 100,000 tasks that takes a third of a second, in which no setpoint leaves. Nothing here is
-    kept in cycles; what little is made in some is young when it goes.
+    With 100,000 tasks a full collection takes a third of a second, in which no setpoint is sent.
+    No long-lived object here is in a cycle; the few objects in cycles die young.
     """
     gc.freeze()
     gc.set_threshold(10_000, 20, 1_000_000)
@@ -108,7 +108,7 @@ def tame_collector() -> None:
 
 
 def open_store(path: str | None, retention: Retention | None = None) -> SqliteStore | MemoryStore:
-    """Open the store at a path; None: in the user's data folder. StoreError says why not."""
+    """Open the store at a path, or in the user's data folder if None; raise StoreError."""
     chosen = path_of_store(path)
     if chosen is None:
         return MemoryStore()
@@ -120,9 +120,9 @@ def open_store(path: str | None, retention: Retention | None = None) -> SqliteSt
 
 
 def _watched_ring(links: Links) -> RingWatch:
-    """Return the key ring, and look at it for changes later; UsageError if the links need others.
+    """Return a watch on the key ring; raise UsageError if the links need other keys.
 
-    That the user's own is not there is no fault: then there is none yet.
+    The default key ring may be missing: then there are no keys yet.
     """
     path = path_of_ring(links.keys)
     loaded: Loaded | None = None
@@ -151,7 +151,7 @@ async def _run(
     say: Callable[[str], None],
 ) -> int:
     now = boot_time()
-    engine = Engine(settings.engine, now=now, restored=restored)  # what the store gave back
+    engine = Engine(settings.engine, now=now, restored=restored)
     for why in engine.not_in_force:
         say(f"not in force, though set before: {why}")
     recorders = observers(settings.recording, settings.engine, restored, now=now)
@@ -179,14 +179,14 @@ def _in_words(parameters: Mapping[str, float]) -> str:
 
 
 def _say(words: str, *, as_json: bool) -> None:
-    """Tell who started the server; that nobody listens is no reason not to serve."""
-    if sys.stdout is None:  # closed from the beginning
+    """Print a line for the person who started the server; a closed stdout is no error."""
+    if sys.stdout is None:  # it was closed at start
         return
     line = f"mav-tasks: {words}"
-    if as_json:  # both outputs together are to be JSON
+    if as_json:  # stdout and stderr together must be JSON lines
         line = json.dumps({"time": utc_text(time.time()), "level": "info", "message": words})
     try:
         sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
-    except OSError:  # nor shall the interpreter fail for it when it ends
+    except OSError:  # or the interpreter would fail to flush it at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,4 +1,4 @@
-"""A file that is there as a whole or as it was: no reader, and no crash, finds half of it."""
+"""Atomic file writes: a reader sees the old or the new contents, also after a crash."""
 
 import os
 import stat
@@ -10,12 +10,12 @@ FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write or replace a file of the user's choosing. OSError: it is as it was before.
+    """Write or replace a file; raise OSError, with the old contents in place, if that fails.
 
-    It keeps its mode; a new one has what the umask leaves, as any document. A link stays one, and
-    what is no file (a terminal, a pipe) is written to as it is.
+    An existing file keeps its mode; a new one gets the umask's. A symbolic link is followed. A
+    terminal or a pipe is written to directly.
     """
-    path = Path(os.path.realpath(path))  # Path.resolve has an error of its own for a ring of links
+    path = Path(os.path.realpath(path))  # Path.resolve raises another error for a symlink loop
     mode = _mode_of(path)
     if mode is not None and not stat.S_ISREG(mode):
         path.write_text(text, encoding="utf-8")

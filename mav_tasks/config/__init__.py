@@ -1,4 +1,4 @@
-"""The configuration: a TOML file, the environment and flags, over the defaults of the settings.
+"""The configuration: a TOML file, the environment and flags override the settings' defaults.
 
-``sources`` names them, ``configuration`` makes settings of them, each file here does one step.
+``configuration`` merges the sources into settings; ``toml_file`` and ``words`` read the sources.
 """

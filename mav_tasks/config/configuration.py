@@ -1,4 +1,4 @@
-"""All sources together: settings, and for each key who said its value."""
+"""Merges all sources into settings, and remembers for each key which source set it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ FILE_NAME = "config.toml"
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """Settings, and by the key's name what was given; what was not is as by default."""
+    """Settings, and the given values by key name; other keys have defaults."""
 
     settings: ServerSettings
     given: Mapping[str, Given]
@@ -27,10 +27,9 @@ class Configuration:
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """Where the configuration comes from; it can be read more than once.
+    """The sources of the configuration; ``load`` can be called more than once.
 
-    ``file`` is what was asked for: None for the one in the user's folder if there is one, "" for
-    none at all.
+    ``file``: the requested file; None: the one in the user's folder, if it exists; "": no file.
     """
 
     file: str | None
@@ -38,7 +37,7 @@ class Sources:
     flags: Sequence[words.Flag] = ()
 
     def load(self) -> Configuration:
-        """Read them all; ConfigError has every fault of all of them."""
+        """Read all sources; raise ConfigError with all their faults."""
         path = chosen_file(self.file, self.environment)
         layers = [words.of_environment(self.environment), words.of_flags(self.flags)]
         if path is not None:
@@ -56,7 +55,7 @@ class Sources:
 
 
 def names_no_file(asked: str | None, environment: Mapping[str, str]) -> bool:
-    """Whether nothing of the user's folder is to be read."""
+    """Whether the user requested no file ("")."""
     return _named(asked, environment) == ""
 
 
@@ -65,24 +64,24 @@ def _named(asked: str | None, environment: Mapping[str, str]) -> str | None:
 
 
 def chosen_file(asked: str | None, environment: Mapping[str, str]) -> Path | None:
-    """Return the file to read: the one asked for, that of the environment, the user's; or None."""
+    """Return the requested file, or the environment's, or the one in the user's folder, or None."""
     named = _named(asked, environment)
     if named is not None:
         return Path(named) if named else None
     usual = usual_file()
     try:
         return usual if usual.exists() else None
-    except OSError:  # it cannot be looked at: reading it says why
+    except OSError:  # reading the file will report the error
         return usual
 
 
 def usual_file() -> Path:
-    """Return where the user's own file is, if there is one."""
+    """Return the path of the file in the user's configuration folder."""
     return user_config_path("mav-tasks", appauthor=False) / FILE_NAME
 
 
 def merged(layers: Sequence[Layer], *, file: Path | None = None) -> Configuration:
-    """Return settings of layers, the later before the earlier; ConfigError has all their faults."""
+    """Return the settings of layers; later layers override. Raise ConfigError with all faults."""
     given: dict[str, Given] = {}
     for layer in layers:
         given |= layer.given
@@ -103,7 +102,7 @@ def _faults(layers: Sequence[Layer]) -> list[str]:
 def _faults_together(
     settings: ServerSettings, given: Mapping[str, Given], faulty: frozenset[str]
 ) -> Iterator[str]:
-    """What is wrong with values that are good each for itself."""
+    """Yield the faults of valid values that contradict each other."""
     for key, bound in BOUNDED:
         if faulty.isdisjoint((key.name, bound.name)):
             try:
@@ -116,7 +115,7 @@ def _faults_together(
 
 
 def _names(name: str, other: str, given: Mapping[str, Given]) -> str:
-    """Return where a key stands; if it does not, where the other one does."""
+    """Return the place of a key, or, if no source gives it, that of the other key."""
     if name in given:
         return given[name].names()
     return f"{given[other].where}: {name}" if other in given else name

@@ -1,4 +1,4 @@
-"""What one source says: values for keys, and all that is wrong with it."""
+"""The values that one source gives to keys, and the faults of the source."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,11 +9,11 @@ from mav_tasks.errors import SettingError
 from mav_tasks.setting_keys.key import Key
 from mav_tasks.setting_keys.literals import literal
 
-LONGEST = 60  # characters of what is wrong that are shown
+LONGEST = 60  # characters shown of a wrong value
 
 
 class Source(Enum):
-    """Who says a value; each comes before the one above it."""
+    """The kinds of sources; each overrides the ones above it."""
 
     DEFAULT = "default"
     FILE = "file"
@@ -24,7 +24,7 @@ class Source(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A value that a source gives to a key; ``where`` in words, such as ``config.toml:3``."""
+    """A value that a source gives to a key; ``where``: the place, such as ``config.toml:3``."""
 
     key: Key
     kept: object
@@ -32,22 +32,22 @@ class Given:
     where: str
 
     def names(self) -> str:
-        """Return where it stands and, unless that says it, of which key."""
+        """Return the place for a message, with the key's name if the place lacks it."""
         return f"{self.where}: {self.key.name}" if self.source is Source.FILE else self.where
 
 
 @dataclass(slots=True)
 class Layer:
-    """All that one source gives, by the key's name, and its faults."""
+    """The values of one source by key name, and its faults."""
 
     source: Source
     given: dict[str, Given] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
-    #: keys whose value here is none
+    #: names of keys with an invalid value in this source
     faulty: set[str] = field(default_factory=set)
 
     def take(self, key: Key, plain: object, where: str) -> None:
-        """Take a plain value, or note what is wrong with it."""
+        """Add a plain value, or note its fault."""
         try:
             given = Given(key, key.shape.kept(plain), self.source, where)
         except SettingError as error:
@@ -58,7 +58,7 @@ class Layer:
             self.given[key.name] = given
 
     def read(self, key: Key, text: str, where: str) -> None:
-        """Take a value from a text, or note what is wrong with it."""
+        """Parse a text and add its value, or note its fault."""
         try:
             plain = key.shape.read(text)
         except SettingError as error:
@@ -67,22 +67,22 @@ class Layer:
             self.take(key, plain, where)
 
     def refuse(self, key: Key, fault: str) -> None:
-        """Note that what is said of a key is wrong."""
+        """Note a fault of a key."""
         self.faulty.add(key.name)
         self.faults.append(fault)
 
 
 def shown(plain: object) -> str:
-    """Return a value on one line, and not too much of it."""
+    """Return a value as text on one line, cut to LONGEST."""
     try:
         words = plain if isinstance(plain, str) and plain.isprintable() else literal(plain)
-    except (ValueError, RecursionError):  # a number of thousands of digits, a list in lists
+    except (ValueError, RecursionError):  # thousands of digits, or deeply nested lists
         words = f"a {type(plain).__name__} too large to show"
     return words if len(words) <= LONGEST else f"{words[: LONGEST - 1]}…"
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return "; did you mean …?" if a known name is near, else nothing."""
+    """Return "; did you mean …?" if a known name is similar, else ""."""
     names = list(known)
     near = get_close_matches(name[:LONGEST], names, n=1) or [
         each for each in names if each.rpartition(".")[2] == name

@@ -1,6 +1,6 @@
-"""Profiles of rovers as TOML files: one a rover, which ``mav-tasks probe`` writes and serve reads.
+"""Profiles of rovers as TOML files, one a rover: ``mav-tasks probe`` writes, serve reads them.
 
-All that is read is checked: what a file says is driven by.
+Every value is checked, because a profile changes how a rover is driven.
 """
 
 import os
@@ -23,7 +23,7 @@ from mav_tasks.settings import Turning, VehicleProfile
 NONE = "none"
 SUFFIX = ".toml"
 MOST_FILES = 1000
-MODE = 0o600  # it says which machine is whose, and what it cannot do
+MODE = 0o600  # private: a profile identifies a rover and tells its weaknesses
 
 _YES_NO = Choice(("yes", "no"))
 _SHAPES: Mapping[str, Shape] = {
@@ -61,7 +61,7 @@ _MEANINGS = {
 
 
 def usual_folder() -> Path:
-    """Return where profiles are, unless told otherwise."""
+    """Return the default folder of profiles."""
     return user_config_path("mav-tasks", appauthor=False) / "vehicles"
 
 
@@ -72,7 +72,7 @@ def file_name(profile: VehicleProfile) -> str:
 
 
 def read(place: str) -> tuple[VehicleProfile, ...]:
-    """Return all profiles of a file or a folder, as the setting names it; ConfigError."""
+    """Return all profiles of the setting's file or folder; raise ConfigError with all faults."""
     if place == NONE:
         return ()
     if place:
@@ -100,7 +100,7 @@ def read(place: str) -> tuple[VehicleProfile, ...]:
 
 
 def profile_of(text: str, *, name: str) -> VehicleProfile:
-    """Return the profile that a TOML text is; ConfigError has all that is wrong with it."""
+    """Return the profile of a TOML text; raise ConfigError with all faults."""
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -122,7 +122,7 @@ def profile_of(text: str, *, name: str) -> VehicleProfile:
 
 
 def text_of(profile: VehicleProfile) -> str:
-    """Return a profile as TOML; what is not known is left out."""
+    """Return a profile as TOML, without unknown values."""
     lines = ["# What mav-tasks probe has measured of a rover. Key vehicles.profiles names it."]
     for field in fields(profile):
         value = getattr(profile, field.name)
@@ -136,9 +136,9 @@ def text_of(profile: VehicleProfile) -> str:
 
 
 def write(profile: VehicleProfile, output: str | None) -> Path:
-    """Keep a profile in a file, or in the usual folder; ConfigError says why not.
+    """Write a profile to ``output`` or the default folder; raise ConfigError if that fails.
 
-    Whoever reads it meanwhile finds the old one or the new one, whole. Nobody else may read it.
+    The file is private, and replaced atomically.
     """
     path = usual_folder() / file_name(profile) if output is None else _expanded(output)
     part = path.with_name(f"{path.name}.{os.getpid()}.part")

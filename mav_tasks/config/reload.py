@@ -1,6 +1,6 @@
-"""The configuration read again while the server runs: what can change does, the rest is told.
+"""Reads the configuration again while the server runs; applies live keys, reports the others.
 
-It is read in a thread of its own: a slow disk must not keep a setpoint.
+A separate thread reads it: a slow disk must not delay a setpoint.
 """
 
 import asyncio
@@ -22,12 +22,12 @@ from mav_tasks.settings import ServerSettings, Settings
 
 log = logging.getLogger("mav_tasks")
 
-#: takes settings of the engine into force; gives what clients have set as parameters
+#: puts the engine's settings into force; returns the parameters that clients have set
 Put = Callable[[Settings], Mapping[str, float]]
 
 
 class Change(NamedTuple):
-    """A key whose value is another one now; ``is_taken`` if that is in force without a restart."""
+    """A key with a new value; ``is_taken`` if it is in force without a restart."""
 
     key: Key
     old: object
@@ -41,11 +41,11 @@ class Change(NamedTuple):
 
 
 class Reload:
-    """Reads the same sources again, on SIGHUP; made and used by one loop, but for the reading."""
+    """Reads the same sources again on SIGHUP; used in the loop's thread, except for the reading."""
 
     def __init__(self, sources: Sources, configuration: Configuration) -> None:
         self._sources = sources
-        if configuration.file is not None:  # the same one again, if it is there or not
+        if configuration.file is not None:  # read the same file, even if it is gone
             self._sources = Sources(
                 str(configuration.file), sources.environment, flags=sources.flags
             )
@@ -54,22 +54,22 @@ class Reload:
         self._is_asked_again = False
         #: the file that was read at the start
         self.file: Path | None = configuration.file
-        #: SIGHUP has come before there was a loop
+        #: whether SIGHUP came before the loop ran
         self.was_asked = False
 
     def note(self, _number: int, _frame: object) -> None:
-        """Take SIGHUP before the loop does."""
+        """Handle a SIGHUP that comes before the loop runs."""
         self.was_asked = True
 
     def begin(self, put: Put) -> None:
-        """Read, and then take into force what can be; called in the loop."""
+        """Start to read; then apply live keys with ``put``. Called in the loop."""
         if self._is_reading:
             log.warning("configuration: still being read")
             self._is_asked_again = True
             return
         self._is_reading = True
         loop = asyncio.get_running_loop()
-        # A daemon: the server ends, however long the disk takes.
+        # A daemon thread: a stuck disk must not keep the server from ending.
         threading.Thread(target=self._read, args=(loop, put), daemon=True).start()
 
     def _read(self, loop: asyncio.AbstractEventLoop, put: Put) -> None:
@@ -78,7 +78,7 @@ class Reload:
             outcome = self._sources.load().settings
         except ConfigError as error:
             outcome = error
-        except Exception:  # our own mistake must not leave us reading for ever
+        except Exception:  # a bug of ours must not block later reloads
             log.exception("configuration: internal error")
             outcome = ConfigError("it could not be read")
         with suppress(RuntimeError):  # the loop has ended meanwhile
@@ -119,14 +119,14 @@ class Reload:
 
 
 def taken(before: ServerSettings, wanted: ServerSettings) -> ServerSettings:
-    """Return the settings before, with what can change while the server runs as it is wanted."""
+    """Return the settings ``before`` with the live keys of ``wanted``."""
     settings = before
     for key in KEYS.values():
         if key.is_live:
             settings = key.put(settings, key.of(wanted))
-    known = wanted.engine.profiles  # no key: what the file has that one names
+    known = wanted.engine.profiles  # not a key: contents of files that a key names
     settings = replace(settings, engine=replace(settings.engine, profiles=known))
-    for key, bound in BOUNDED:  # of one that changes and one that does not, both stay
+    for key, bound in BOUNDED:  # if a live key now exceeds its bound, both keep their old values
         try:
             check_bounds(settings, key, bound)
         except SettingError:
@@ -138,7 +138,7 @@ def taken(before: ServerSettings, wanted: ServerSettings) -> ServerSettings:
 def changes_of(
     before: ServerSettings, wanted: ServerSettings, *, in_force: ServerSettings
 ) -> Iterator[Change]:
-    """Yield each key that is wanted otherwise than it was."""
+    """Yield each key whose wanted value differs from the value before."""
     for key in KEYS.values():
         if key.of(wanted) != key.of(before):
             is_taken = key.of(in_force) == key.of(wanted)
@@ -146,5 +146,5 @@ def changes_of(
 
 
 def set_level(level: str) -> None:
-    """Say from now on what is at least of this level: a word of ``log.level``."""
+    """Set the lowest level logged: a word of ``log.level``."""
     log.setLevel(level.upper())

@@ -1,4 +1,4 @@
-"""What is in force, key by key, and who says so: for people as TOML, for scripts as JSON."""
+"""Reports the values in force with their sources: as TOML for people, as JSON for scripts."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +16,10 @@ ENGINE = "engine."
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """Return the keys that are meant, of a table all; UsageError names what is none. None: all."""
+    """Return the named keys, and all keys of a named table; without names, all keys.
+
+    Raise UsageError for an unknown name.
+    """
     found: list[str] = []
     for name in names:
         if name in PLACES:
@@ -30,7 +33,7 @@ def chosen(names: Sequence[str]) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One key: its plain value, its unit, and who says it."""
+    """One key: plain value, unit, and source."""
 
     key: str
     value: object
@@ -40,18 +43,18 @@ class Entry:
 
 
 class Report:
-    """The configuration, and over it what clients have set as MAVLink parameters."""
+    """The configuration, overridden by the MAVLink parameters that clients have set."""
 
     def __init__(self, configuration: Configuration, parameters: Mapping[str, float]) -> None:
         self._configuration = configuration
         self._parameters = parameters
         self._engine, why_not = with_all(configuration.settings.engine, parameters)
         self._why_not = why_not
-        #: why some of the parameters have no effect
+        #: a text for each parameter without effect
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
 
     def entry(self, name: str) -> Entry:
-        """Return one key."""
+        """Return the entry of one key."""
         key, given = KEYS[name], self._configuration.given.get(name)
         parameter = NAMES.get(name, "")
         if parameter in self._parameters and parameter not in self._why_not:
@@ -63,7 +66,7 @@ class Report:
         return Entry(name, value, key.shape.unit, given.source, given.where)
 
     def as_toml(self, names: Iterable[str]) -> str:
-        """Return a line for each key, which ``config check`` takes as a file."""
+        """Return a line for each key; the text is a valid configuration file."""
         entries = [self.entry(name) for name in names]
         lines = [f"{entry.key} = {literal(entry.value)}" for entry in entries]
         width = min(max(map(len, lines)), 48)
@@ -73,7 +76,7 @@ class Report:
         )
 
     def as_json(self, names: Iterable[str]) -> str:
-        """Return the file that was read, and each key."""
+        """Return a JSON object with the file that was read, and each key."""
         file = self._configuration.file
         told = {
             "file": None if file is None else str(file),

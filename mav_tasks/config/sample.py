@@ -1,4 +1,4 @@
-"""The sample of a configuration file: each key with its meaning, and commented out its default."""
+"""The sample configuration file: each key with its meaning, and its default commented out."""
 
 from textwrap import wrap
 

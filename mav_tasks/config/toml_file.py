@@ -1,4 +1,4 @@
-"""A TOML file as values for keys, each with its line."""
+"""Reads a TOML file as values for keys, each with its line number."""
 
 import re
 import stat
@@ -13,9 +13,9 @@ from mav_tasks.errors import ConfigError
 from mav_tasks.setting_keys.literals import literal
 from mav_tasks.setting_keys.table import KEYS, PLACES
 
-LARGEST = 256_000  # bytes of a file that are read
-MOST_FAULTS = 50  # told of one file; more of them say no more
-#: a key of 32 parts or more: ``tomllib`` takes memory by the square of their number
+LARGEST = 256_000  # bytes, maximum size of a file
+MOST_FAULTS = 50  # reported for one file
+#: a key of 33 parts or more: ``tomllib`` needs memory by the square of their number
 _DEEP = re.compile(r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _AT_LINE = re.compile(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", re.DOTALL)
@@ -24,9 +24,9 @@ _TABLES = {path[:count] for path in _KEYS for count in range(1, len(path))}
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file; ConfigError says why not."""
+    """Return the text of a file; raise ConfigError if it cannot be read."""
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # a pipe may never give anything, or only once
+        if not stat.S_ISREG(path.stat().st_mode):  # a pipe may block, or be readable only once
             raise ConfigError(f"{path}: not a file")
         with path.open("rb") as file:
             data = file.read(LARGEST + 1)
@@ -36,7 +36,7 @@ def read_text(path: Path) -> str:
 
 
 def decoded(data: bytes, *, name: str) -> str:
-    """Return the text of a file's bytes; ConfigError says why not."""
+    """Return the text of a file's bytes; raise ConfigError if too large or not UTF-8."""
     if len(data) > LARGEST:
         raise ConfigError(f"{name}: larger than {LARGEST // 1000} kB")
     try:
@@ -47,16 +47,16 @@ def decoded(data: bytes, *, name: str) -> str:
 
 
 class Parsed(NamedTuple):
-    """A TOML text: what it says, and the line of each key and table."""
+    """A parsed TOML text: its values, and the line of each key and table."""
 
     values: Mapping[str, Any]
     lines: Mapping[toml_lines.Path, int]
 
 
 def parsed(text: str, *, name: str) -> Parsed:
-    """Return what a TOML text says; ConfigError, in which ``name`` is the file's, why it says none.
+    """Parse a TOML text; raise ConfigError, with the file's ``name``, if it is invalid.
 
-    The fault never has words of the text in it, beyond one character.
+    The error quotes at most one character of the text, which may contain secrets.
     """
     if deep := _DEEP.search(text):
         line = text.count("\n", 0, deep.start()) + 1
@@ -65,13 +65,13 @@ def parsed(text: str, *, name: str) -> Parsed:
         return Parsed(tomllib.loads(text), toml_lines.lines_of(text.replace("\r\n", "\n")))
     except RecursionError:
         raise ConfigError(f"{name}: tables or lists too deep") from None
-    except ValueError as error:  # also of Python: a number of thousands of digits
+    except ValueError as error:  # also from int(): a number of thousands of digits
         last = len(text.rstrip().splitlines()) or 1
         raise ConfigError(_fault_of(str(error), name, last=last)) from None
 
 
 def layer_of(text: str, *, name: str) -> Layer:
-    """Return what a TOML text says; ``name`` is the file's, for the faults."""
+    """Return the layer of a TOML text; ``name``: the file's, for the faults."""
     layer = Layer(Source.FILE)
     try:
         found = parsed(text, name=name)

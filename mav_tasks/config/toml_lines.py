@@ -1,6 +1,6 @@
-"""On which line of a TOML text each key stands: ``tomllib`` does not say.
+"""Finds the line of each key in a TOML text, because ``tomllib`` does not report lines.
 
-It reads no values, and takes it that ``tomllib`` has understood the text.
+It skips values, and relies on ``tomllib`` having accepted the text.
 """
 
 import re
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 Path = tuple[str, ...]
 
-DEEPEST = 8  # parts of a path that are told apart; no key has so many
+DEEPEST = 8  # maximum parts of a recorded path; no key has so many
 
 _TOKEN = re.compile(
     r"""
@@ -36,7 +36,7 @@ class _Token(NamedTuple):
 
 
 def lines_of(text: str) -> Mapping[Path, int]:
-    """Return the line, from 1, of each key and each table by its path."""
+    """Return the line, counted from 1, of each key and table, by path."""
     finder = _Finder(text)
     finder.read_all()
     return finder.lines
@@ -89,14 +89,14 @@ class _Finder:
                 return
 
     def _key(self, *, before: Path) -> Path:
-        """Read a key with its dots; each table that it names is noted where it is named first."""
+        """Read a dotted key; record for each of its tables the line of the first mention."""
         path, began = before, self._at
         while self._kind() in ("bare", "text") or self._text() == ".":
             if self._text() != "." and len(path) < DEEPEST:
                 path = (*path, _name(self._text()))
                 self.lines.setdefault(path, self._tokens[self._at].line)
             self._at += 1
-        if self._at == began:  # no TOML: go on all the same
+        if self._at == began:  # not TOML: skip a token, so that the loop ends
             self._at += 1
         return path
 
@@ -123,7 +123,7 @@ def _tokens(text: str) -> list[_Token]:
 
 
 def _name(text: str) -> str:
-    """Return the name that a part of a key means."""
+    """Return the name of a bare or quoted part of a key."""
     if not text.startswith('"'):
         return text.strip("'")
     return str(tomllib.loads(f"x = {text}")["x"])

@@ -1,4 +1,4 @@
-"""The environment and the flags of a command as values for keys."""
+"""Reads environment variables and command-line flags as values for keys."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from mav_tasks.config.given import Layer, Source, shown, suggestion
 from mav_tasks.setting_keys.table import KEYS
 
 PREFIX = "MAV_TASKS_"
-FILE_VARIABLE = "MAV_TASKS_CONFIG"  # which file is read; "" for none
-SERVER_VARIABLE = "MAV_TASKS_SERVER"  # to which server the commands of a client speak
-SIGN_VARIABLE = "MAV_TASKS_SIGN"  # with which key they sign
-STORE_VARIABLE = "MAV_TASKS_STORE"  # shorter than the rule, as it was before there was one
+FILE_VARIABLE = "MAV_TASKS_CONFIG"  # the configuration file; "" for none
+SERVER_VARIABLE = "MAV_TASKS_SERVER"  # the server that client commands address
+SIGN_VARIABLE = "MAV_TASKS_SIGN"  # the key with which client commands sign
+STORE_VARIABLE = "MAV_TASKS_STORE"  # not ..._STORE_PATH: older than the naming rule
 
 
-#: they are no keys
+#: variables that set no key
 OTHERS = (FILE_VARIABLE, SERVER_VARIABLE, SIGN_VARIABLE)
 
 
@@ -27,7 +27,7 @@ VARIABLES: Mapping[str, str] = {variable_of(name): name for name in KEYS}
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """One flag of a command, or ``--set``: a text, or a plain value, for a key by its name."""
+    """One flag of a command, or ``--set``: a text or a plain value for a named key."""
 
     where: str
     name: str
@@ -35,7 +35,7 @@ class Flag:
 
 
 def of_environment(environment: Mapping[str, str]) -> Layer:
-    """Return what the environment says."""
+    """Return the layer of the environment variables."""
     layer = Layer(Source.ENVIRONMENT)
     for variable in sorted(environment):
         if variable in OTHERS or not variable.startswith(PREFIX):
@@ -49,7 +49,7 @@ def of_environment(environment: Mapping[str, str]) -> Layer:
 
 
 def of_flags(flags: Sequence[Flag]) -> Layer:
-    """Return what the flags say; one key is said by one of them."""
+    """Return the layer of the flags; two flags for one key are a fault."""
     layer = Layer(Source.FLAG)
     for flag in flags:
         key = KEYS.get(flag.name)
@@ -69,11 +69,11 @@ def of_flags(flags: Sequence[Flag]) -> Layer:
 
 
 def flag_of_set(text: str) -> Flag:
-    """Return the flag that ``--set KEY=VALUE`` is; its value None where there is no "="."""
+    """Return the flag for ``--set KEY=VALUE``; its value is None if "=" is missing."""
     name, equals, value = text.partition("=")
     return Flag(f"--set {name.strip()}", name.strip(), value.strip() if equals else None)
 
 
 def given_flags(*flags: tuple[str, str, object]) -> list[Flag]:
-    """Return the flags of those (flag, key, value) that were given: whose value is not None."""
+    """Return the flags of (flag, key, value) triples whose value is not None."""
     return [Flag(where, name, value) for where, name, value in flags if value is not None]

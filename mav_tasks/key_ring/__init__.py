@@ -1,5 +1,5 @@
-"""The key ring: the secrets with which packets are signed, in a file that only its user can read.
+"""The key ring: the secrets that sign packets, in a private file.
 
-``ring`` is what it holds, ``toml_form`` how that is written, ``ring_file`` where, and who may read
-it, ``watch`` has a running server take changes at once. No error, ``repr`` or log has a secret.
+``ring`` has the entries, ``toml_form`` the format, ``ring_file`` the file and its permissions;
+``watch`` applies changes to a running server. No error, ``repr`` or log contains a secret.
 """

@@ -1,8 +1,8 @@
-"""How a secret of 32 bytes comes about: by chance, as digits, or out of a passphrase.
+"""Makes a secret of 32 bytes: random, from hex digits, or from a passphrase.
 
-Of passphrases the two ways that ground stations have, so that one passphrase gives the same secret
-at both ends. A signature lets whoever hears it try passphrases at home, by the million with SHA-256
-alone: a short one is none.
+The two derivations from passphrases are those of ground stations, so that one passphrase gives the
+same secret at both ends. A listener can try passphrases on a signature offline, millions of them
+with plain SHA-256: so short passphrases are refused.
 """
 
 import hashlib
@@ -26,22 +26,25 @@ _DIGITS = re.compile(rf"[0-9a-fA-F]{{{2 * KEY_LENGTH}}}")
 
 
 def generated() -> bytes:
-    """Return a secret that nobody has."""
+    """Return a random secret."""
     return secrets.token_bytes(KEY_LENGTH)
 
 
 def from_hex(text: str) -> bytes:
-    """Return the secret that 64 hexadecimal digits are; KeyRingError."""
+    """Return the secret of 64 hexadecimal digits; raise KeyRingError for another text."""
     if not _DIGITS.fullmatch(text):
         raise KeyRingError(f"expected {2 * KEY_LENGTH} hexadecimal digits")
     secret = bytes.fromhex(text)
-    if not any(secret):  # SETUP_SIGNING means "none" by it
+    if not any(secret):  # in SETUP_SIGNING it means "no key"
         raise KeyRingError("all digits are zero: that is no key")
     return secret
 
 
 def from_passphrase(passphrase: str, how: str) -> bytes:
-    """Return the secret of a passphrase; ``how`` is one of PASSPHRASES. KeyRingError."""
+    """Return the secret of a passphrase; raise KeyRingError if it is too short.
+
+    ``how`` is one of PASSPHRASES.
+    """
     if len(passphrase) < LEAST_PASSPHRASE:
         raise KeyRingError(f"a passphrase has at least {LEAST_PASSPHRASE} characters")
     data = passphrase.encode("utf-8", "surrogateescape")

@@ -1,8 +1,8 @@
-"""What a key ring holds. An entry that was revoked stays: it is known as such.
+"""The entries of a key ring. A revoked entry stays, marked as revoked.
 
-So a ring whose only key was revoked is still a ring, and that key cannot come back by mistake. Its
-secret is retired: nothing is signed or believed by it, but the records of runs in which it counted
-can be replayed.
+So a ring whose only key was revoked is not empty, and a revoked key cannot be added again by
+mistake. The secret of a revoked key is retired: no packet is signed with it or accepted by it, but
+records of earlier runs can be replayed.
 """
 
 import re
@@ -14,17 +14,17 @@ from mav_tasks.errors import KeyRingError
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import ROLES
 
-VEHICLE = "vehicle"  # of a key that vehicles sign with; no client has rights by it
+VEHICLE = "vehicle"  # kind of a key of vehicles; it gives a client no rights
 KINDS = (*ROLES, VEHICLE)
-MOST_KEYS = 64  # with a secret; each is tried on a packet of somebody unknown
-#: as TOML, a link URL and a command line take it without quotes
+MOST_KEYS = 64  # usable keys; each is tried on a packet from an unknown sender
+#: names that TOML, a link URL and a command line accept without quotes
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 NAMES = "expected 1 to 32 letters, digits, - and _, a letter or digit first"
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One key with what is known of it; ``kind`` is a role, or VEHICLE."""
+    """One key with its metadata; ``kind`` is a role, or VEHICLE."""
 
     name: str
     kind: str
@@ -36,7 +36,7 @@ class Entry:
 
     @property
     def is_usable(self) -> bool:
-        """Whether packets may be signed with it."""
+        """Whether the key is not revoked."""
         return bool(self.key.secret)
 
 
@@ -53,26 +53,26 @@ class KeyRing:
 
     @property
     def usable(self) -> tuple[Key, ...]:
-        """Those that packets may be signed with."""
+        """The keys that are not revoked."""
         return tuple(entry.key for entry in self.entries if entry.is_usable)
 
     @property
     def secrets(self) -> dict[str, bytes]:
-        """All secrets by fingerprint, the retired ones too: for replays, and nothing else."""
+        """All secrets by fingerprint, also retired ones: only for replays."""
         secrets = {
             entry.key.fingerprint: entry.key.secret or entry.retired for entry in self.entries
         }
         return {fingerprint: secret for fingerprint, secret in secrets.items() if secret}
 
     def usable_key(self, name: str) -> Key:
-        """Return a key to sign with; KeyRingError says why there is none."""
+        """Return a key to sign with; raise KeyRingError if it is missing or revoked."""
         entry = self._entry(name)
         if not entry.is_usable:
             raise KeyRingError(f"key {name} was revoked{_on(entry.revoked)}")
         return entry.key
 
     def with_added(self, entry: Entry) -> "KeyRing":
-        """Return the ring with one more entry; KeyRingError says why it cannot be in it."""
+        """Return the ring with one more entry; raise KeyRingError if known, or the ring is full."""
         for each in self.entries:
             if each.name == entry.name:
                 was = f"was revoked{_on(each.revoked)}" if each.revoked else "is there already"
@@ -85,14 +85,14 @@ class KeyRing:
         return KeyRing((*self.entries, entry))
 
     def with_revoked(self, name: str, *, at: datetime) -> "KeyRing":
-        """Return the ring in which nobody signs with a key any more. KeyRingError."""
+        """Return the ring with a key revoked; raise KeyRingError if it is missing or revoked."""
         secret = self.usable_key(name).secret
         return self._with(
             name, lambda it: replace(it, key=without_secret(it.key), revoked=at, retired=secret)
         )
 
     def with_forgotten(self, name: str) -> "KeyRing":
-        """Return the ring without the secret of a revoked key. KeyRingError if it is in use."""
+        """Return the ring without a revoked key's secret; raise KeyRingError if it is in use."""
         if self._entry(name).is_usable:
             raise KeyRingError(f"key {name} is in use: revoke it first")
         return self._with(name, lambda it: replace(it, retired=b""))
@@ -109,9 +109,9 @@ class KeyRing:
 
 
 def key_of(name: str, kind: str, secret: bytes) -> Key:
-    """Return the key of an entry: what its holder may do is nothing to clients if vehicles have it.
+    """Return the key of an entry; its role is "" if its kind is VEHICLE.
 
-    KeyRingError: it cannot be named so, or there is no such role.
+    Raise KeyRingError for an invalid name or kind.
     """
     if not NAME.fullmatch(name):
         raise KeyRingError(f"{name[:40]!a}: no name of a key: {NAMES}")
@@ -121,7 +121,7 @@ def key_of(name: str, kind: str, secret: bytes) -> Key:
 
 
 def without_secret(key: Key) -> Key:
-    """Return a key as it is once it was revoked."""
+    """Return a key without its secret, as revoked keys are."""
     return Key(key.name, b"", role=key.role, fingerprint=key.fingerprint)
 
 

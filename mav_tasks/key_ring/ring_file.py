@@ -1,4 +1,4 @@
-"""Where a key ring is kept: a file that its user alone can read and write, or it is none."""
+"""The key ring's file: it is refused unless only its user can read and write it."""
 
 import os
 import stat
@@ -19,19 +19,19 @@ from mav_tasks.key_ring.toml_form import ring_of, text_of
 FILE_NAME = "keys.toml"
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
-#: what changes when a file does: device, inode, times of data and of state, size
+#: identifies a version of a file: device, inode, mtime, ctime, size
 Mark = tuple[int, int, int, int, int]
 
 
 class Loaded(NamedTuple):
-    """A ring, and the mark of the file that it was read from."""
+    """A ring, and the mark of its file."""
 
     ring: KeyRing
     mark: Mark
 
 
 def path_of_ring(text: str) -> Path:
-    """Return where the ring is: "" is in the user's configuration folder. KeyRingError."""
+    """Return the ring's path, for "" in the user's configuration folder; raise KeyRingError."""
     if not text:
         return user_config_path("mav-tasks", appauthor=False) / FILE_NAME
     try:
@@ -47,9 +47,9 @@ def mark_of(found: os.stat_result) -> Mark:
 
 
 def load(path: Path) -> Loaded:
-    """Read a ring; KeyRingError says why not, or what is wrong with it."""
+    """Read a ring; raise KeyRingError if it is unreadable, not private or invalid."""
     try:
-        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe: no waiting
+        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # never block on a pipe
         try:
             found = os.fstat(number)
             _check(path, found)
@@ -69,12 +69,12 @@ def load(path: Path) -> Loaded:
 
 
 def change(path: Path, to: Callable[[KeyRing], KeyRing]) -> None:
-    """Have a ring, or a new one if there is none, become what ``to`` gives. KeyRingError.
+    """Replace a ring, or an empty one if there is no file, by ``to(ring)``; raise KeyRingError.
 
-    Who reads it meanwhile reads the one or the other, and of two who change it one waits.
+    The change is atomic for readers, and a lock serializes concurrent changes.
     """
     try:
-        path = path.resolve()  # a link stays one
+        path = path.resolve()  # a symbolic link stays
         make_private(path.parent)
         with _locked(path.parent):
             ring = load(path).ring if path.exists() else KeyRing()
@@ -110,7 +110,7 @@ def _locked(folder: Path) -> Iterator[int]:
 
 def _write(path: Path, text: str) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}")
-    with suppress(FileNotFoundError):  # of one that ended in the middle
+    with suppress(FileNotFoundError):  # left by a crashed process
         beside.unlink()
     number = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     try:

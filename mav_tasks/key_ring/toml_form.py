@@ -1,4 +1,4 @@
-"""A key ring as TOML: a table ``[keys.NAME]`` for each. Faults name key and line, and no value."""
+"""A key ring as TOML: one table ``[keys.NAME]`` a key. Faults name key and line, never a value."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -21,12 +21,12 @@ HEADER = """\
 # "mav-tasks keys" writes it anew at each change: comments are lost then.
 """
 _FINGERPRINT = re.compile(r"[0-9a-f]{16}")
-_DIGITS = re.compile(r"[0-9A-Fa-f]{33,}")  # longer than any name: perhaps a secret at a wrong place
+_DIGITS = re.compile(r"[0-9A-Fa-f]{33,}")  # longer than any name: perhaps a misplaced secret
 _MOST_FAULTS = 20
 
 
 def ring_of(text: str, *, name: str) -> KeyRing:
-    """Return the ring that a text is; KeyRingError has its faults, ``name`` is the file's."""
+    """Return the ring of a TOML text; raise KeyRingError with all faults. ``name``: the file's."""
     try:
         values, lines = parsed(text, name=name)
     except ConfigError as error:
@@ -54,7 +54,7 @@ def ring_of(text: str, *, name: str) -> KeyRing:
 
 
 def text_of(ring: KeyRing) -> str:
-    """Return the text of a ring."""
+    """Return a ring as TOML."""
     return HEADER + "".join(f"\n{table}" for table in map(_table, ring.entries))
 
 

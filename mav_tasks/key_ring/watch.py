@@ -1,7 +1,7 @@
-"""The key ring of a running server: a change is in force at once, without being told of it.
+"""Watches the key ring of a running server: a change of the file takes effect at once.
 
-A thread looks at the file, and reads it: a stuck disk must not keep a setpoint. A ring that is
-broken, or gone, changes nothing: the keys in force stay, so that no door opens by it.
+A thread polls and reads the file: a stuck disk must not delay a setpoint. If the ring is invalid or
+missing, the keys in force stay, so that a fault never gives access.
 """
 
 import asyncio
@@ -17,20 +17,20 @@ from mav_tasks.mavlink.signing import Key
 
 log = logging.getLogger("mav_tasks")
 
-LOOK = 0.1  # s, between two looks at the file
-AGAIN = 10  # looks, until a file that could not be read is tried again, though it is the same
+LOOK = 0.1  # s between two polls of the file
+AGAIN = 10  # polls, after which an unreadable file is read again though it is unchanged
 
-#: takes keys into force
+#: puts keys into force
 Put = Callable[[tuple[Key, ...]], None]
 
 
 class RingWatch:
-    """Watches one file; ``begin`` and ``close`` belong to the loop's thread."""
+    """Watches one file; call ``begin`` and ``close`` in the loop's thread."""
 
     def __init__(self, path: Path, loaded: Loaded | None) -> None:
-        """``loaded`` is what is in force; None: there was no file."""
+        """``loaded``: the ring in force; None: there was no file."""
         self.path = path
-        #: in force; None: there is no ring
+        #: the keys in force; None: there is no ring
         self.keys = None if loaded is None else loaded.ring.keys
         self._mark: Mark | None = None if loaded is None else loaded.mark
         self._is_over = threading.Event()
@@ -40,13 +40,13 @@ class RingWatch:
         return f"RingWatch({self.path}, {keys})"
 
     def begin(self, put: Put) -> None:
-        """Watch from now on, and give ``put`` the keys of each change; called in the loop."""
+        """Start the thread, and call ``put`` in the loop with the keys after each change."""
         loop = asyncio.get_running_loop()
-        # A daemon: the server ends, however long the disk takes.
+        # A daemon thread: a stuck disk must not keep the server from ending.
         threading.Thread(target=self._watch, args=(loop, put), name="key ring", daemon=True).start()
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         self._is_over.set()
 
     # in the thread
@@ -78,7 +78,7 @@ class RingWatch:
 
 
 class _Looker:
-    """One look after the other at a file."""
+    """Polls a file, and remembers what it found."""
 
     def __init__(self, path: Path, mark: Mark | None) -> None:
         self._path = path
@@ -87,7 +87,7 @@ class _Looker:
         self._fault = ""
         self._keys: tuple[Key, ...] | None = None
         self._was_there = mark is not None
-        self._looks = 0  # since it was read
+        self._looks = 0  # polls since the file was read
 
     def look(self) -> tuple[Key, ...] | str | None:
         """Return the keys if the file has changed, a text if it cannot be read, else None."""
@@ -102,15 +102,15 @@ class _Looker:
         if mark == self._mark and self._is_settled and not is_due:
             return None
         self._looks = 0
-        # Once more when it is the same at the next look: within one tick of the file system's clock
-        # it may have been written to twice.
+        # Read a changed file again at the next poll, even if its mark is the same: it may have been
+        # written twice within one tick of the file system's clock.
         is_same, self._is_settled = mark == self._mark, mark == self._mark
         self._mark, self._was_there = mark, True
         try:
             keys = load(self._path).ring.keys
         except KeyRingError as error:
             return self._failed("; ".join(error.faults))
-        except Exception:  # our own mistake must not leave us blind for ever
+        except Exception:  # a bug of ours must not end the watch
             log.exception("key ring: internal error")
             return self._failed(f"key ring {self._path}: it could not be read")
         was_faulty, self._fault = bool(self._fault), ""
@@ -127,7 +127,7 @@ class _Looker:
 
 
 def changes(before: tuple[Key, ...], after: tuple[Key, ...]) -> Iterator[str]:
-    """Say what is otherwise, by the names of the keys."""
+    """Yield a text for each key that differs, by name."""
     old, new = ({key.name: key for key in keys} for keys in (before, after))
     for name in sorted(old.keys() | new.keys()):
         was, now = old.get(name), new.get(name)

@@ -1,1 +1,1 @@
-"""Links: bytes to and from peers, and nothing else."""
+"""Links: sockets and serial lines that carry bytes to and from peers."""

@@ -1,31 +1,31 @@
-"""When a link that dials tries again, and what is said of it: once for each change."""
+"""When a dialling link tries again, and the log texts for it: one for each change."""
 
 RETRY = 1.0  # s between two attempts
 
 
 class Attempts:
-    """The history of one link's attempts. ``now`` in seconds of a clock that does not go back."""
+    """The history of one link's attempts. ``now``: seconds of a monotonic clock."""
 
     def __init__(self) -> None:
         self._next_at = 0.0
         self._was_up = False
-        self._failed = False  # since it was up, or ever
+        self._failed = False  # since the link was last up
 
     def is_due(self, *, now: float) -> bool:
-        """Whether to try now; the next one is planned then."""
+        """Return whether to try now; if so, plan the next attempt."""
         if now < self._next_at:
             return False
         self._next_at = now + RETRY
         return True
 
     def succeeded(self) -> str:
-        """Note that the link is up; gives the words for it."""
+        """Note that the link is up; return the log text."""
         words = "is back" if self._was_up else "is up"
         self._was_up, self._failed = True, False
         return words
 
     def failed(self, reason: str) -> str | None:
-        """Note that it is not; gives the words for it, None if they have been said."""
+        """Note that the link is down; return the log text, None if it was logged before."""
         if self._failed:
             return None
         self._failed = True

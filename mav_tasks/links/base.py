@@ -1,4 +1,4 @@
-"""The seam between the server and its peers: what every link can do."""
+"""The interfaces of links, between the server and its peers."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -9,63 +9,62 @@ Peer = Hashable
 
 
 class Link(Protocol):
-    """One connection to peers, open from its making to ``close``.
+    """One connection to peers, open from its creation until ``close``.
 
-    ``OSError`` never leaves a link: what fails at opening raises LinkOpenError, what fails later is
-    counted.
+    A link never raises OSError: a failure to open raises LinkOpenError, a later failure is counted.
     """
 
     name: str
-    #: endpoints known beforehand, to be spoken to first
+    #: endpoints known beforehand: packets go to them before they have been heard
     peers: tuple[Peer, ...]
-    #: whether only this machine can be on it
+    #: whether only this machine can be on the link
     is_local: bool
-    #: whether what it gives may be cut anywhere; it is a StreamLink then
+    #: whether the link is a StreamLink: received data may be cut anywhere
     is_stream: bool
 
     def fileno(self) -> int:
-        """Return the descriptor to wait on for reading; the same one for as long as it is open."""
+        """Return the descriptor to wait on for reading; it never changes while the link is open."""
         ...
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` datagrams, or pieces, that are there now, each with its sender."""
+        """Return up to ``limit`` available datagrams, or pieces of a stream, with their senders."""
         ...
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send one packet, or lose it; never wait."""
+        """Send one packet, or drop it; never block."""
         ...
 
     def close(self) -> None:
-        """Give everything back."""
+        """Close all descriptors."""
         ...
 
 
 @runtime_checkable
 class StampedLink(Link, Protocol):
-    """A link of which the kernel says when each datagram arrived."""
+    """A link on which the kernel stamps each datagram with its arrival time."""
 
     def receive_stamped(
         self, limit: int, *, longest: float
     ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Return what ``receive`` gives, and how long each had waited to be read, s.
+        """Return the datagrams as ``receive`` does, and how long each waited to be read, s.
 
-        ``longest``: nothing has waited for longer; what has no stamp may have.
+        ``longest``, s, is the upper limit, and the value for a datagram without a stamp.
         """
         ...
 
 
 class PeerState(Enum):
-    """What can become of a peer of a stream link."""
+    """States of a peer of a stream link."""
 
     UP = auto()
     DOWN = auto()
-    CONGESTED = auto()  # what is sent to it piles up
-    CLEAR = auto()  # no more
+    CONGESTED = auto()  # packets to the peer pile up
+    CLEAR = auto()  # no longer congested
 
 
 @dataclass(frozen=True, slots=True)
 class PeerChange:
-    """Something became of a peer; ``words`` go to the log."""
+    """A peer's new state; ``words`` go to the log."""
 
     peer: Peer
     state: PeerState
@@ -74,30 +73,30 @@ class PeerChange:
 
 @runtime_checkable
 class StreamLink(Link, Protocol):
-    """A link on which peers come and go; ``send`` sends whole packets or nothing of them."""
+    """A link on which peers come and go; ``send`` sends a packet as a whole or not at all."""
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
-        """Send one packet, or let it wait, ``first`` before all that wait already; or lose it."""
+        """Send, queue or drop one packet; ``first`` queues it before all waiting packets."""
         ...
 
     def take_changes(self) -> list[PeerChange]:
-        """Return what became of peers since the last call, in order.
+        """Return the changes of peers since the last call, in order.
 
-        Who comes up in one call of ``receive`` does so before its first piece, who goes down after
-        its last.
+        A change to UP during ``receive`` belongs before the peer's first piece, a change to DOWN
+        after its last.
         """
         ...
 
     def poll(self) -> None:
-        """See to what waits for a time: called about every TEND_PERIOD."""
+        """Do what is due: dial, flush, check for congestion. Called about every TEND_PERIOD."""
         ...
 
 
 @runtime_checkable
 class PacedLink(Link, Protocol):
-    """A link that knows how much it carries."""
+    """A link of known capacity."""
 
-    #: bytes a second, each way
+    #: bytes per second in each direction
     capacity: float
 
 

@@ -1,6 +1,6 @@
-"""Whether the links that are asked for can be opened as far as their words say: all faults.
+"""Checks the links of a configuration before any is opened, and finds all faults.
 
-Whether there are keys is another matter: that is not said here.
+``link_keys.py`` checks whether the keys exist.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ SIDES: tuple[Side, ...] = ("clients", "vehicles")
 
 
 class LinkSettings(Protocol):
-    """The links of a server in words, as its settings have them."""
+    """The links of a server as text, as in the settings."""
 
     @property
     def clients(self) -> tuple[str, ...]:
@@ -30,24 +30,24 @@ class LinkSettings(Protocol):
 
     @property
     def insecure(self) -> bool:
-        """Whether other machines may reach a link unsigned."""
+        """Whether other machines may reach a link without signing."""
 
     @property
     def unsigned(self) -> str:
-        """Where unsigned packets are taken: "loopback" or "nowhere"."""
+        """Where unsigned packets are accepted: "loopback" or "nowhere"."""
 
 
 class ConfiguredLink(NamedTuple):
-    """One link that is asked for."""
+    """One link of the configuration."""
 
     side: Side
     url: LinkUrl | SerialUrl
     policy: LinkPolicy
-    pushes_far: bool = False  # speaks to other machines unasked
+    pushes_far: bool = False  # whether it pushes to other machines
 
 
 def links_of(asked: LinkSettings) -> list[ConfiguredLink]:
-    """Return the links that words without faults ask for, clients' first."""
+    """Return the links of a configuration without faults, clients' first."""
     pushing = pushing_url(asked)
     links: list[ConfiguredLink] = []
     for side in SIDES:
@@ -61,13 +61,13 @@ def links_of(asked: LinkSettings) -> list[ConfiguredLink]:
 
 
 def pushing_url(asked: LinkSettings) -> LinkUrl | SerialUrl | None:
-    """Return the link that speaks to clients unasked: the first of UDP, as its socket is called."""
+    """Return the URL of the link that pushes to clients: the first UDP one; None if none is."""
     urls = map(parse_url, asked.clients)
     return next((url for url in urls if isinstance(url, LinkUrl) and url.is_udp), None)
 
 
 def faults_of(asked: LinkSettings) -> list[tuple[str, UsageError]]:
-    """Return what is wrong, each with the name of the field that says it."""
+    """Return all faults, each with the name of its field."""
     faults = list(_faults_of_words(asked))
     return faults or list(_faults_of_signing(asked))
 

@@ -1,21 +1,21 @@
-"""What a stream link is set to: above all, how long a packet may wait before it is worthless."""
+"""Limits of stream links: above all, how long a packet may wait before it is dropped."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class LinkLimits:
-    """The way to the peers of one side."""
+    """Limits of the links to one side, clients or vehicles."""
 
-    max_age: float  # s that a packet waits for its turn at the most
-    unsent: int  # bytes that the system may keep of one TCP connection without sending them
-    send_buffer: int | None  # bytes of a TCP connection sent and not yet confirmed; None: as usual
-    give_up: float  # s that a TCP connection may take nothing
-    connections: int  # on one link that listens; one more is closed as soon as it is there
+    max_age: float  # s, maximum wait of a packet in the queue
+    unsent: int  # bytes per TCP connection that the system may hold unsent (TCP_NOTSENT_LOWAT)
+    send_buffer: int | None  # bytes of a TCP connection's SO_SNDBUF; None: the system's default
+    give_up: float  # s without acknowledgement, after which TCP closes (TCP_USER_TIMEOUT)
+    connections: int  # maximum on one listening link; further ones are closed at once
 
 
-#: Towards vehicles four setpoints may wait: a stalled connection must not deliver old ones later.
+#: Four setpoints to a vehicle may wait: a stalled connection must not deliver old ones later.
 TO_VEHICLES = LinkLimits(max_age=0.2, unsent=512, send_buffer=8_192, give_up=10.0, connections=256)
-#: A client has asked again after a second, and a late answer would be taken for the next one's.
-#: Half as many connections as there may be clients: those on datagram links have room as well.
+#: After a second a client has repeated its request, and would take a late answer for the answer to
+#: a later one. At most half of all clients may be TCP connections: the rest is for UDP clients.
 TO_CLIENTS = LinkLimits(max_age=1.0, unsent=4_096, send_buffer=None, give_up=60.0, connections=32)

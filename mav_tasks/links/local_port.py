@@ -1,15 +1,15 @@
-"""From which local port a rover is dialled on UDP: always the same one.
+"""The local UDP port from which a rover is dialled: always the same one.
 
-PX4's simulation answers the first sender that it heard, and nobody else until it restarts: who
-dials from another port the next time is not answered. So the port follows from where the rover is.
+PX4's simulation answers only the first sender that it heard, until it restarts. A server that dials
+from another port the next time gets no answer. So the port is computed from the rover's address.
 """
 
 from zlib import crc32
 
-#: below those that systems give out unasked (Linux: from 32768), beside those of autopilots (14xxx)
+#: below the ephemeral ports (Linux: from 32768), and above those of autopilots (14xxx)
 FIRST, COUNT = 16_000, 2_000
 
 
 def port_for(host: str, port: int) -> int:
-    """Return the local port for a rover; of neighbouring ports on one host no two share theirs."""
+    """Return the local port for a rover; neighbouring ports of one host get different ones."""
     return FIRST + (crc32(host.encode()) + port) % COUNT

@@ -1,4 +1,4 @@
-"""Links without sockets, in one process and in virtual time: a net that can be as bad as a radio.
+"""Links without sockets, in one process and in virtual time: a simulated, lossy network.
 
 Deterministic: the same seed and the same traffic give the same losses.
 """
@@ -13,30 +13,30 @@ from typing import Protocol
 
 from mav_tasks.links.base import Peer
 
-#: of the first link: no descriptor is as high, as the kernel counts them in an int
+#: ``fileno`` of the first link: no descriptor is as high, as the kernel's are signed 32-bit ints
 FIRST_NUMBER = 2**31
 
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """How bad the net is. Delays in seconds; probabilities 0–1 for each datagram."""
+    """Impairments of the network. Delays in seconds; probabilities 0–1 for each datagram."""
 
     delay: float = 0.001
-    jitter: float = 0.0  # up to this much more: datagrams overtake each other
+    jitter: float = 0.0  # a random extra delay of up to this: datagrams overtake each other
     loss: float = 0.0
     duplication: float = 0.0
 
 
 class Buffer(Protocol):
-    """What datagrams wait in, on the way from one link to another."""
+    """A queue in which datagrams wait on the way from one link to another."""
 
     def leaves_at(self, size: int, *, now: float) -> float | None:
-        """Return when a datagram of so many bytes leaves it; None: it is dropped."""
+        """Return when a datagram of ``size`` bytes leaves the buffer; None: it is dropped."""
         ...
 
 
 class Radio:
-    """A radio with a buffer: what does not fit through now waits in order, up to the buffer."""
+    """A radio of limited rate with a FIFO buffer of limited size."""
 
     def __init__(self, *, bytes_per_second: float, buffer: int) -> None:
         self._rate = bytes_per_second
@@ -47,7 +47,7 @@ class Radio:
         return f"Radio({self._rate} bytes/s, free at {self._free_at:.3f})"
 
     def leaves_at(self, size: int, *, now: float) -> float | None:
-        """Return when a datagram is through; None: the buffer is full."""
+        """Return when a datagram has been sent; None: the buffer is full."""
         begins_at = max(now, self._free_at)
         if (begins_at - now) * self._rate + size > self._buffer:
             return None
@@ -56,28 +56,28 @@ class Radio:
 
 
 class Queue:
-    """A delay that grows and shrinks, while nothing overtakes anything."""
+    """A varying delay that keeps the order of datagrams."""
 
     def __init__(self, delay: Callable[[float], float]) -> None:
-        self._delay = delay  # s, of what is sent at a time
+        self._delay = delay  # time of sending -> delay, s
         self._last_at = 0.0
 
     def __repr__(self) -> str:
         return f"Queue(last at {self._last_at:.3f})"
 
     def leaves_at(self, size: int, *, now: float) -> float:  # noqa: ARG002
-        """Return when a datagram is through; never before the one in front of it."""
+        """Return when a datagram arrives, never before the one in front of it."""
         self._last_at = max(self._last_at, now + self._delay(now))
         return self._last_at
 
 
 class MemoryNet:
-    """Carries datagrams between its links; ``now`` is the caller's to move forward."""
+    """Carries datagrams between its links; the caller moves ``now`` forward."""
 
     def __init__(self, *, seed: int = 0, conditions: Conditions | None = None) -> None:
         self.now = 0.0
         self.conditions = conditions or Conditions()
-        #: by source and target, where datagrams wait for each other
+        #: by source and target: a buffer, if datagrams queue on that path
         self.buffers: dict[tuple[str, str], Buffer] = {}
         self._random = Random(seed)
         self._links: dict[str, MemoryLink] = {}
@@ -93,15 +93,15 @@ class MemoryNet:
         return link
 
     def is_readable(self, number: int) -> bool:
-        """Whether something has arrived at the link whose ``fileno`` this is."""
+        """Whether the link with this ``fileno`` has received data."""
         return bool(self._numbered[number - FIRST_NUMBER].arrived)
 
     def conditions_between(self, source: str, target: str) -> Conditions:  # noqa: ARG002
-        """Return how bad this way is; a net whose ways differ says so here."""
+        """Return the conditions of a path; override it for paths that differ."""
         return self.conditions
 
     def send(self, source: str, target: str, data: bytes) -> None:
-        """Put a datagram under way, or lose it, or double it."""
+        """Put a datagram in transit, lose it, or duplicate it."""
         how, buffer = self.conditions_between(source, target), self.buffers.get((source, target))
         copies = 0 if self._random.random() < how.loss else 1
         if copies and self._random.random() < how.duplication:
@@ -118,7 +118,7 @@ class MemoryNet:
         return self._under_way[0][0] if self._under_way else None
 
     def deliver(self) -> None:
-        """Put what has arrived by ``now`` into the links."""
+        """Put the datagrams that have arrived by ``now`` into their links."""
         while self._under_way and self._under_way[0][0] <= self.now:
             _, _, source, target, data = heapq.heappop(self._under_way)
             link = self._links.get(target)
@@ -126,7 +126,7 @@ class MemoryNet:
                 self.arrive(link, source, data)
 
     def arrive(self, link: "MemoryLink", source: str, data: bytes) -> None:
-        """Put one datagram into its link; a net that observes does more."""
+        """Put one datagram into its link; override it to observe the traffic."""
         link.arrived.append((source, data))
 
 
@@ -147,7 +147,7 @@ class MemoryLink:
         return f"MemoryLink({self.name})"
 
     def fileno(self) -> int:
-        """Return a number of the link's own; no descriptor: ``MemoryNet.is_readable`` takes it."""
+        """Return a unique number for ``MemoryNet.is_readable``; it is no descriptor."""
         return self._number
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
@@ -155,9 +155,9 @@ class MemoryLink:
         return [self.arrived.popleft() for _ in range(min(limit, len(self.arrived)))]
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Put a datagram under way to the link of that name."""
+        """Send a datagram to the link of that name."""
         self._net.send(self.name, str(peer), data)
 
     def close(self) -> None:
-        """Lose what has arrived."""
+        """Drop the datagrams that have arrived."""
         self.arrived.clear()

@@ -1,4 +1,4 @@
-"""From a link URL to a link."""
+"""Opens the link for a link URL."""
 
 from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import TO_VEHICLES, LinkLimits
@@ -12,12 +12,12 @@ from mav_tasks.links.url import LinkUrl, SerialUrl
 def open_link(
     url: LinkUrl | SerialUrl, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()
 ) -> Link:
-    """Open a link; LinkOpenError says why not. ``push`` is for a UDP link, others ignore it.
+    """Open a link; raise LinkOpenError if that fails. Only a UDP link uses ``push``.
 
-    One that dials is open before the other end is there, and tries until it is.
+    A link that dials is open before its peer exists, and tries until it connects.
     """
     if isinstance(url, SerialUrl):
-        from mav_tasks.links.serial import SerialLink  # noqa: PLC0415  # who has none, loads none
+        from mav_tasks.links.serial import SerialLink  # noqa: PLC0415  # only for serial links
 
         return SerialLink(url, limits=limits)
     if url.kind == "tcpin":

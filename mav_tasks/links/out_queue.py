@@ -1,24 +1,24 @@
-"""What waits for its turn on a stream: whole packets, none for long, the oldest dropped first.
+"""The send queue of a stream: whole packets of limited age, the oldest dropped first.
 
-The newest word is the one that counts, towards a rover as towards a client: a connection that had
-stalled must not deliver old setpoints, nor answers that are taken for those to a later question.
-What is to go first waits for nothing but the rest of a packet that has begun.
+The newest packet matters, to a rover as to a client: a connection that stalled must not deliver old
+setpoints, nor old answers that a client takes for answers to a later request. A ``first`` packet
+waits only for the rest of a partly written packet.
 """
 
 from collections import deque
 
 MAX_BYTES = 1 << 16  # waiting for one peer
-CONGESTED_AFTER = 0.1  # s that the first in the queue waits
+CONGESTED_AFTER = 0.1  # s that the oldest packet has waited
 
 
 class OutQueue:
-    """The way out to one peer. ``now`` is any clock's that does not go back, in seconds."""
+    """The send queue to one peer. ``now``: seconds of any monotonic clock."""
 
     def __init__(self, *, max_age: float) -> None:
         self._max_age = max_age
         self._first: deque[tuple[float, bytes]] = deque()
         self._waiting: deque[tuple[float, bytes]] = deque()
-        self._begun = b""  # the rest of a packet of which a part was written: nothing before it
+        self._begun = b""  # the rest of a partly written packet: it must go next
         self._begun_at = 0.0
         self._size = 0
         self.is_congested = False
@@ -32,11 +32,11 @@ class OutQueue:
 
     @property
     def size(self) -> int:
-        """Bytes that wait."""
+        """Number of waiting bytes."""
         return self._size + len(self._begun)
 
     def put(self, packet: bytes, *, now: float, first: bool = False) -> None:
-        """Let a packet wait, ``first`` before all others; what is too old or too much goes."""
+        """Queue a packet, ``first`` before all others; drop packets by age, and above MAX_BYTES."""
         (self._first if first else self._waiting).append((now, packet))
         self._size += len(packet)
         while self._size > MAX_BYTES:
@@ -44,21 +44,21 @@ class OutQueue:
         self._drop_old(now=now)
 
     def next(self, *, now: float) -> bytes:
-        """Return what is to be written next; nothing if nothing waits."""
+        """Return the bytes to write next; b"" if nothing waits."""
         if self._begun:
             return self._begun
         self._drop_old(now=now)
         return self._next[0][1] if self._next else b""
 
     def wrote(self, count: int) -> None:
-        """So many bytes of what ``next`` gave were written."""
+        """Note that the first ``count`` of the bytes that ``next`` returned were written."""
         if not self._begun:
             self._begun_at, self._begun = self._next.popleft()
             self._size -= len(self._begun)
         self._begun = self._begun[count:]
 
     def changed(self, *, now: float) -> bool:
-        """Look whether it is congested; whether that changed."""
+        """Update ``is_congested``; return whether it changed."""
         heads = [queue[0][0] for queue in (self._first, self._waiting) if queue]
         since = self._begun_at if self._begun else min(heads, default=now)
         was = self.is_congested

@@ -1,4 +1,4 @@
-"""What is asked of signatures on a link, by its URL and what holds for all links."""
+"""The signing policy of a link, from its URL and the settings for all links."""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -8,35 +8,35 @@ from mav_tasks.links.url import LinkUrl, SerialUrl
 
 Side = Literal["clients", "vehicles"]
 
-NEARBY = "loopback"  # of ``unsigned``: where nobody else can be
+NEARBY = "loopback"  # value of ``unsigned``: on links that other machines cannot reach
 MEANT = "say --insecure, or links.insecure = true, if that is meant"
 
 
 @dataclass(frozen=True, slots=True)
 class LinkPolicy:
-    """What is asked of signatures on one link; ``key`` is the name of its own, "" for none."""
+    """The signing policy of one link; ``key`` is the name of the link's own key, "" for none."""
 
     takes_unsigned: bool = True
     key: str = ""
 
 
 class Rules(Protocol):
-    """What holds for all links."""
+    """The signing settings for all links."""
 
     @property
     def insecure(self) -> bool:
-        """Whether other machines may reach a link unsigned."""
+        """Whether other machines may reach a link without signing."""
 
     @property
     def unsigned(self) -> str:
-        """Where unsigned packets are taken: "loopback" or "nowhere"."""
+        """Where unsigned packets are accepted: "loopback" or "nowhere"."""
 
 
 def is_nearby(url: LinkUrl | SerialUrl) -> bool:
-    """Whether nobody beyond this machine can dial a link.
+    """Whether no other machine can dial a link.
 
-    A serial line is a wire that the operator has chosen. A radio at its end is not seen from here:
-    ``?unsigned=refuse``, and ``?key=`` for a rover's, are for that.
+    A serial line counts as nearby: the operator chose the wire. The server cannot see a radio at
+    its end; ``?unsigned=refuse``, and ``?key=`` on a link to vehicles, are for radios.
     """
     return isinstance(url, SerialUrl) or url.is_loopback
 
@@ -44,10 +44,10 @@ def is_nearby(url: LinkUrl | SerialUrl) -> bool:
 def policy_of(
     url: LinkUrl | SerialUrl, side: Side, rules: Rules, *, pushes_far: bool = False
 ) -> LinkPolicy:
-    """Return what is asked on a link; ``pushes_far``: it speaks to other machines unasked.
+    """Return the signing policy of a link; ``pushes_far``: it pushes to other machines.
 
-    Its own key is the only one that counts on a link to vehicles: nothing else is taken there,
-    unless its URL says so.
+    A link to vehicles that has a key accepts only packets signed with that key, unless its URL
+    allows unsigned packets.
     """
     if url.unsigned is not None:
         return LinkPolicy(url.unsigned, url.key)
@@ -58,7 +58,7 @@ def policy_of(
 
 
 def check(url: LinkUrl | SerialUrl, side: Side, policy: LinkPolicy, rules: Rules) -> None:
-    """Raise UsageError for a link on which nothing could be heard, or anybody."""
+    """Raise UsageError for a link that could accept no packet, or packets from anybody."""
     is_open = rules.insecure or is_nearby(url)
     if side == "vehicles" and not policy.key and not is_open:
         raise InsecureLinkError(
@@ -75,7 +75,7 @@ def check(url: LinkUrl | SerialUrl, side: Side, policy: LinkPolicy, rules: Rules
 
 
 def unsigned_beyond(what: str) -> InsecureLinkError:
-    """Return the error for what reaches others and takes what nobody has signed."""
+    """Return the error for a link that other machines reach and that accepts unsigned packets."""
     return InsecureLinkError(
         f"{what} reaches beyond this machine and needs no signing key: "
         f"anybody there could drive the vehicle; {MEANT}"

@@ -1,8 +1,8 @@
-"""A serial line: raw, without flow control, nobody else's; opened again whenever it is lost.
+"""A serial line: raw, without flow control, opened exclusively; reopened whenever it is lost.
 
-How much of what was written the line has still before it, not every system and adapter tells. So it
-is reckoned from the baud rate, and no more than LEAD is ever written ahead: a packet that has not
-begun can still give way to a newer one.
+Not every system and adapter tells how many written bytes the line has yet to send. So this link
+estimates them from the baud rate, and writes at most LEAD ahead: a packet that still waits in the
+queue can give way to a newer one.
 """
 
 import os
@@ -22,11 +22,11 @@ from mav_tasks.links.out_queue import OutQueue
 from mav_tasks.links.url import SerialUrl
 
 PIECE = 280  # bytes read at once, a MAVLink packet
-LEAD = 0.1  # s that the line is busy with what was written; two TEND_PERIODs
-BITS = 10  # of a byte on the line: start and stop are two of them
-USED = 0.9  # of the line; a little slower than it says it is, what was ahead would only ever grow
-FAILURES = (OSError, ValueError, termios.error)  # what pySerial raises or lets through
-#: the device may be plugged in later; everything else the operator can mend
+LEAD = 0.1  # s of line time that may be written ahead; two TEND_PERIODs
+BITS = 10  # per byte on the line, with a start and a stop bit
+USED = 0.9  # part of the nominal baud rate used: on a slightly slower line the backlog would grow
+FAILURES = (OSError, ValueError, termios.error)  # pySerial raises these or lets them through
+#: the device may be plugged in later; the operator must fix any other error
 NOT_THERE = frozenset({ENOENT, ENODEV, ENXIO, EIO})
 
 
@@ -35,7 +35,7 @@ class SerialLink:
 
     peers: tuple[Peer, ...] = ()
     is_stream = True
-    #: it may be a radio, with anybody at its other end
+    #: the device may be a radio, with anybody at its other end
     is_local = False
 
     def __init__(self, url: SerialUrl, *, limits: LinkLimits) -> None:
@@ -48,7 +48,7 @@ class SerialLink:
         self._changes: list[PeerChange] = []
         self._device: Serial | None = None
         self._queue = OutQueue(max_age=limits.max_age)
-        self._free_at = 0.0  # when the line has sent what was written
+        self._free_at = 0.0  # estimated time at which the line has sent the written bytes
         self._lost = 0
         self._attempts.is_due(now=boot_time())
         try:
@@ -65,15 +65,15 @@ class SerialLink:
 
     @property
     def lost(self) -> int:
-        """Packets that were dropped, or written to nobody."""
+        """Number of packets that were dropped, or had no device."""
         return self._lost + self._queue.dropped
 
     def fileno(self) -> int:
-        """Return the descriptor that tells of the device, whichever it is at the time."""
+        """Return the selector's descriptor, which stays the same when the device is reopened."""
         return self._selector.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` pieces; send what waits."""
+        """Return up to ``limit`` pieces; send waiting packets."""
         received: list[tuple[Peer, bytes]] = []
         while self._device is not None and len(received) < limit and self._selector.select(0):
             try:
@@ -83,7 +83,7 @@ class SerialLink:
             except OSError as error:
                 self._lose(error)
                 break
-            if not data:  # readable, and nothing there: nobody will ever be
+            if not data:  # readable without data: the device hung up
                 self._lose(OSError(EIO, "hung up"))
                 break
             received.append((self._url.device, data))
@@ -91,7 +91,7 @@ class SerialLink:
         return received
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
-        """Send a packet, or let it wait; while there is no device it is lost."""
+        """Send or queue a packet; drop it if there is no device."""
         if self._device is None or peer != self._url.device:
             self._lost += 1
             return
@@ -99,12 +99,12 @@ class SerialLink:
         self._flush()
 
     def take_changes(self) -> list[PeerChange]:
-        """Return what became of the device since the last call."""
+        """Return the changes of the device's state since the last call."""
         changes, self._changes = self._changes, []
         return changes
 
     def poll(self) -> None:
-        """Send what waits for the line; look for congestion; open the device if it is lost."""
+        """Send waiting packets and check for congestion, or reopen a lost device."""
         now = boot_time()
         if self._device is None:
             if self._attempts.is_due(now=now):
@@ -121,7 +121,7 @@ class SerialLink:
             self._changes.append(PeerChange(self._url.device, state))
 
     def close(self) -> None:
-        """Send what the system takes at once, and give the device back."""
+        """Write waiting packets without blocking, and close the device."""
         if self._device is not None:
             self._write(ahead_until=float("inf"))
         if self._device is not None:
@@ -150,7 +150,7 @@ class SerialLink:
         self._write(ahead_until=boot_time() + LEAD)
 
     def _write(self, *, ahead_until: float) -> None:
-        """Write packets as long as the line is free before that time."""
+        """Write packets while the line is estimated to be free before ``ahead_until``."""
         while self._device is not None and self._free_at < ahead_until:
             now = boot_time()
             packet = self._queue.next(now=now)
@@ -167,12 +167,12 @@ class SerialLink:
             self._free_at = max(self._free_at, now) + self._time_of(count)
 
     def _time_of(self, count: int) -> float:
-        """Seconds that the line takes for so many bytes."""
+        """Return how long the line takes for so many bytes, s."""
         return count * BITS / (USED * self._url.baud)
 
     def _lose(self, error: OSError) -> None:
         assert self._device is not None
-        with suppress(*FAILURES):  # what it did not take it would wait for at closing
+        with suppress(*FAILURES):  # or close would wait for the unsent bytes
             termios.tcflush(self._device.fd, termios.TCOFLUSH)
         self._give_back(self._device)
         self._note_lost(error)
@@ -194,14 +194,17 @@ def _is_not_there(error: Exception) -> bool:
 
 
 def _number_of(error: Exception) -> int | None:
-    """Return the system's number of an error: termios has it, too, but not under a name."""
+    """Return an error's errno; termios.error has it only in ``args``."""
     if isinstance(error, termios.error):
         return int(error.args[0])
     return error.errno if isinstance(error, OSError) else None
 
 
 def _reason_of(error: Exception) -> str:
-    """pySerial wraps the system's words in several of its own; and what is no line it calls odd."""
+    """Return the system's text for an error, without the texts that pySerial wraps around it.
+
+    pySerial reports a file that is no serial device by an exception without errno.
+    """
     if isinstance(error, SerialException):
         if error.errno is None:
             return "it is no serial device"

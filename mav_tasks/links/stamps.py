@@ -1,4 +1,4 @@
-"""When a datagram arrived, as the kernel says: SO_TIMESTAMPNS of Linux, socket(7)."""
+"""The kernel's arrival time of a datagram: SO_TIMESTAMPNS of Linux, socket(7)."""
 
 import socket
 import struct
@@ -6,20 +6,20 @@ import sys
 from collections.abc import Iterable
 from contextlib import suppress
 
-SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h; the type of its control message, too
+SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h; also the type of the control message
 _TIMESPEC = struct.Struct("@ll")  # s, ns
 ROOM = socket.CMSG_SPACE(_TIMESPEC.size)  # bytes, for the control message
 
 
 def ask_for_stamps(sock: socket.socket) -> None:
-    """Have the kernel note the wall clock's time of each datagram, where it can."""
+    """Let the kernel stamp each datagram with the wall clock's time, if it can."""
     if sys.platform == "linux":
         with suppress(OSError):
             sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
 def stamp_in(control: Iterable[tuple[int, int, bytes]]) -> float | None:
-    """Return when a datagram arrived, seconds since 1970; None: the kernel does not say."""
+    """Return the arrival time of a datagram, s since 1970; None if there is no stamp."""
     for level, kind, data in control:
         if (level, kind, len(data)) == (socket.SOL_SOCKET, SO_TIMESTAMPNS, _TIMESPEC.size):
             seconds, nanoseconds = _TIMESPEC.unpack(data)

@@ -1,6 +1,7 @@
-"""TCP connections: pieces in, whole packets out, nothing ever waited for. What both kinds share.
+"""TCP connections, as listening and dialling links share them: pieces in, whole packets out.
 
-Each link waits on one descriptor, its selector's, whatever becomes of its connections.
+No call blocks. Each link has one descriptor, its selector's, which stays the same while connections
+come and go.
 """
 
 import os
@@ -19,25 +20,25 @@ KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}  # s, s, t
 
 
 class Connection:
-    """One connection, and what waits to be sent on it."""
+    """One connection, with its send queue."""
 
     def __init__(self, sock: socket.socket, peer: Peer, limits: LinkLimits) -> None:
         self.socket = sock
         self.peer = peer
         self.queue = OutQueue(max_age=limits.max_age)
-        self.is_blocked = False  # the system takes no more: told when it does again
+        self.is_blocked = False  # the socket's buffer is full: waits until it is writable
 
     def __repr__(self) -> str:
         return f"Connection({self.peer}, {self.queue})"
 
     @property
     def name(self) -> str:
-        """The peer in words."""
+        """The peer as text."""
         return ":".join(map(str, self.peer)) if isinstance(self.peer, tuple) else str(self.peer)
 
 
 class Connections:
-    """The connections of one link, with the descriptor that tells of them."""
+    """The connections of one link, with the selector for them."""
 
     def __init__(
         self,
@@ -46,9 +47,9 @@ class Connections:
         other: Callable[[], None],
         ended: Callable[[Connection, str], None],
     ) -> None:
-        """``other`` sees to what is registered beside connections; ``ended`` is told why one is."""
+        """``other`` handles other registered sockets; ``ended`` gets a connection and a reason."""
         self.selector = selectors.DefaultSelector()
-        self._lost = 0  # packets that were for nobody, or dropped by who is gone
+        self._lost = 0  # packets without a peer, or dropped by connections that have ended
         self._other = other
         self._ended = ended
         self._limits = limits
@@ -60,7 +61,7 @@ class Connections:
 
     @property
     def lost(self) -> int:
-        """Packets that were dropped, or for nobody."""
+        """Number of packets that were dropped, or had no peer."""
         return self._lost + sum(each.queue.dropped for each in self._by_peer.values())
 
     def __len__(self) -> int:
@@ -70,11 +71,11 @@ class Connections:
         return peer in self._by_peer
 
     def fileno(self) -> int:
-        """Return the selector's descriptor, readable when anything is to be done."""
+        """Return the selector's descriptor, readable when any socket is ready."""
         return self.selector.fileno()
 
     def add(self, sock: socket.socket, peer: Peer, words: str) -> None:
-        """Take a connection that stands into use. OSError: it does no more."""
+        """Start to use an established connection; raise OSError if it has failed meanwhile."""
         prepare(sock, self._limits)
         connection = Connection(sock, peer, self._limits)
         self.selector.register(sock, selectors.EVENT_READ, connection)
@@ -82,18 +83,18 @@ class Connections:
         self._changes.append(PeerChange(peer, PeerState.UP, words))
 
     def take_changes(self) -> list[PeerChange]:
-        """Return what became of peers since the last call."""
+        """Return the changes of peers since the last call."""
         changes, self._changes = self._changes, []
         return changes
 
     def note(self, change: PeerChange) -> None:
-        """Have something told with the next changes."""
+        """Add a change to those that ``take_changes`` returns next."""
         self._changes.append(change)
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` pieces, the connections in turn; send what waits.
+        """Return up to ``limit`` pieces, the connections in turn; send waiting packets.
 
-        Whoever has ended is the last news: the next to come may come from the very same place.
+        Return as soon as a connection has ended: a new one may come from the same address.
         """
         received: list[tuple[Peer, bytes]] = []
         for _ in range(limit):
@@ -113,7 +114,7 @@ class Connections:
     def _serve(
         self, connection: Connection, events: int, received: list[tuple[Peer, bytes]]
     ) -> str | None:
-        """Read and write what can be; gives why the connection has ended, if it has."""
+        """Read and write without blocking; return the reason if the connection has ended."""
         if events & selectors.EVENT_WRITE:
             connection.is_blocked = False
             self.selector.modify(connection.socket, selectors.EVENT_READ, connection)
@@ -134,7 +135,7 @@ class Connections:
         return None
 
     def send(self, peer: Peer, data: bytes, *, first: bool) -> None:
-        """Send a packet, or let it wait; to who is not there it is lost."""
+        """Send or queue a packet; drop it if the peer has no connection."""
         connection = self._by_peer.get(peer)
         if connection is None:
             self._lost += 1
@@ -145,7 +146,7 @@ class Connections:
             self._ended(connection, reason)
 
     def look(self) -> None:
-        """Tell of congestions that have begun or ended."""
+        """Note each congestion that has begun or ended."""
         now = boot_time()
         for connection in self._by_peer.values():
             if connection.queue.changed(now=now):
@@ -154,7 +155,7 @@ class Connections:
                 self._changes.append(PeerChange(connection.peer, state))
 
     def end(self, connection: Connection, words: str | None) -> None:
-        """Return a connection back; ``words`` tell of it."""
+        """Close a connection; with ``words``, note the change to DOWN."""
         del self._by_peer[connection.peer]
         self._lost += connection.queue.dropped
         self.selector.unregister(connection.socket)
@@ -163,7 +164,7 @@ class Connections:
             self._changes.append(PeerChange(connection.peer, PeerState.DOWN, words))
 
     def close(self) -> None:
-        """Send what can be sent, and give everything back."""
+        """Send waiting packets without blocking, and close everything."""
         for connection in list(self._by_peer.values()):
             self._flush(connection)
             _say_farewell(connection.socket)
@@ -186,7 +187,7 @@ class Connections:
 
 
 class TcpLink:
-    """What the links have in common that are made of such connections."""
+    """The base class of TCP links."""
 
     peers: tuple[Peer, ...] = ()
     is_stream = True
@@ -198,28 +199,28 @@ class TcpLink:
 
     @property
     def lost(self) -> int:
-        """Packets that were dropped, or for nobody."""
+        """Number of packets that were dropped, or had no peer."""
         return self._connections.lost
 
     def fileno(self) -> int:
-        """Return the descriptor of all of it."""
+        """Return the selector's descriptor."""
         return self._connections.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` pieces, the connections in turn; send what waits."""
+        """Return up to ``limit`` pieces, the connections in turn; send waiting packets."""
         return self._connections.receive(limit)
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
-        """Send a packet, or let it wait; to who is not there it is lost."""
+        """Send or queue a packet; drop it if the peer has no connection."""
         self._connections.send(peer, data, first=first)
 
     def take_changes(self) -> list[PeerChange]:
-        """Return what became of peers since the last call."""
+        """Return the changes of peers since the last call."""
         return self._connections.take_changes()
 
 
 def prepare(sock: socket.socket, limits: LinkLimits) -> None:
-    """Have a connection send at once, keep little, and notice when nobody is there any more."""
+    """Set a socket's options: no delay, little buffering, keep-alive and a user time-out."""
     sock.setblocking(False)
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -227,28 +228,28 @@ def prepare(sock: socket.socket, limits: LinkLimits) -> None:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, limits.send_buffer)
     options = {"TCP_NOTSENT_LOWAT": limits.unsent, "TCP_USER_TIMEOUT": round(limits.give_up * 1e3)}
     for name, value in {**KEEPALIVE, **options}.items():
-        if hasattr(socket, name):  # not every system has each of them
+        if hasattr(socket, name):  # some systems lack some of them
             sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
 def resolve(host: str, port: int) -> list[tuple[socket.AddressFamily, tuple[str, int]]]:
-    """Return the addresses that a host has. OSError: it has none."""
+    """Return the addresses of a host; raise OSError if it has none."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     return [(family, (str(at[0]), int(at[1]))) for family, _, _, _, at in found]
 
 
 def reason_of(error: OSError) -> str:
-    """Return an error in words."""
+    """Return an error's text."""
     if error.errno is not None and error.errno > 0:
         return os.strerror(error.errno)
     return error.strerror or str(error)
 
 
 def _say_farewell(sock: socket.socket) -> None:
-    """End in order: with something unread a close would take back what was just sent."""
+    """Shut down in order: closing with unread data would reset the connection and lose packets."""
     try:
         sock.shutdown(socket.SHUT_WR)
-        for _ in range(64):  # and not for as long as somebody goes on
+        for _ in range(64):  # a limit, as the peer may keep sending
             sock.recv(1 << 16)
     except OSError:
         pass

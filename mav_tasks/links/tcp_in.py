@@ -8,7 +8,7 @@ from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
 from mav_tasks.links.url import LinkUrl
 
-BACKLOG = 64  # connections that the system keeps until they are accepted
+BACKLOG = 64  # connections that the system queues until they are accepted
 
 
 class TcpInLink(TcpLink):
@@ -31,11 +31,11 @@ class TcpInLink(TcpLink):
 
     @property
     def port(self) -> int:
-        """The port on which it listens."""
+        """The local port on which the link listens."""
         return int(self._socket.getsockname()[1])
 
     def poll(self) -> None:
-        """Look for congestions."""
+        """Check for congestion; accept again after a lack of descriptors."""
         self._connections.look()
         self._accept_again()
 
@@ -49,13 +49,13 @@ class TcpInLink(TcpLink):
             sock, address = self._socket.accept()
         except (BlockingIOError, InterruptedError, ConnectionError):
             return
-        except OSError:  # no descriptors left: it would be called again and again
+        except OSError:  # no descriptors left: the selector would report it again and again
             self._connections.selector.unregister(self._socket)
             self._is_accepting = False
             return
         peer = (str(address[0]), int(address[1]))
         try:
-            # One from the very place of another that has not ended yet comes again.
+            # A peer whose old connection from the same address has not ended yet will retry.
             if len(self._connections) >= self._most or peer in self._connections:
                 raise ConnectionRefusedError
             self._connections.add(sock, peer, f"{peer[0]}:{peer[1]} has come")

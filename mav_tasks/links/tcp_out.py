@@ -1,4 +1,4 @@
-"""A TCP link that dials: one peer, tried again once a second for as long as it is not there."""
+"""A TCP link that dials: one peer; while it is down, an attempt each second."""
 
 import selectors
 import socket
@@ -15,9 +15,9 @@ CONNECT_LIMIT = 3.0  # s for the other end to answer
 
 
 class TcpOutLink(TcpLink):
-    """A TCP connection that is made again whenever it is lost.
+    """A TCP connection that is dialled again whenever it is lost.
 
-    The host's addresses are looked up once, at the beginning: to look again could take seconds.
+    The host name is resolved once, at start: another look-up could block for seconds.
     """
 
     def __init__(self, url: LinkUrl, *, limits: LinkLimits) -> None:
@@ -35,7 +35,7 @@ class TcpOutLink(TcpLink):
         return f"TcpOutLink({self.name}, {'up' if len(self._connections) else 'down'})"
 
     def poll(self) -> None:
-        """Dial if it is time to; look for congestions."""
+        """Dial, or give up an attempt, if that is due; check for congestion."""
         self._connections.look()
         now = monotonic()
         if self._dialling is not None:
@@ -53,7 +53,7 @@ class TcpOutLink(TcpLink):
 
     def _dial(self, now: float) -> None:
         family, address = self._addresses[0]
-        self._addresses = self._addresses[1:] + self._addresses[:1]  # the next one next time
+        self._addresses = self._addresses[1:] + self._addresses[:1]  # for the next attempt
         self._give_up_at = now + CONNECT_LIMIT
         try:
             self._dialling = socket.socket(family, socket.SOCK_STREAM)
@@ -74,7 +74,7 @@ class TcpOutLink(TcpLink):
         try:
             if failed:
                 raise OSError(failed, "")
-            if sock.getsockname() == sock.getpeername():  # by chance from the port it dials
+            if sock.getsockname() == sock.getpeername():  # TCP simultaneous open with itself
                 raise ConnectionRefusedError("nobody but this end")
             self._connections.selector.unregister(sock)
             self._dialling = None

@@ -1,4 +1,4 @@
-"""UDP, listening or dialling: one socket, any number of peers."""
+"""A UDP link, listening or dialling: one socket, any number of peers."""
 
 import socket
 import time
@@ -15,21 +15,22 @@ LOOPBACK = {socket.AF_INET: "127.0.0.1", socket.AF_INET6: "::1"}
 
 
 class UdpLink:
-    """A UDP socket. ``peers`` are (host, port): of a dialling link its URL, and those pushed to."""
+    """A UDP socket. ``peers``: (host, port) of a dialling link's URL, and of the push addresses."""
 
     is_stream = False
 
     def __init__(
         self, url: LinkUrl, *, push: tuple[tuple[str, int], ...] = (), local_port: int = 0
     ) -> None:
-        """Open it; a link that dials does so from ``local_port`` if that is free, 0: from any.
+        """Open the socket; raise LinkOpenError if that fails.
 
-        LinkOpenError also where the URL itself names a local port, and that is taken.
+        A dialling link uses ``local_port`` if that port is free; 0: any. A port that the URL itself
+        names must be free.
         """
         self.name = str(url)
-        #: what is otherwise than wished, in words for who opened it; "": nothing
+        #: a warning for the operator, if ``local_port`` was taken; else ""
         self.note = ""
-        self.lost = 0  # datagrams that the system did not take
+        self.lost = 0  # datagrams that the system refused
         try:
             family, address = _resolve(url.host, url.port)
             pushed = tuple(_resolve(host, port)[1] for host, port in push)
@@ -48,7 +49,7 @@ class UdpLink:
         return f"UdpLink({self.name})"
 
     def _dial(self, family: socket.AddressFamily, url: LinkUrl, preferred: int) -> socket.socket:
-        """Open it on this machine only, where that is enough: else it hears other machines, too."""
+        """Open a dialling socket, bound to loopback if all its peers are local."""
         host = LOOPBACK[family] if self.is_local else ANY[family]
         if url.local is not None:
             return _open(family, (host, url.local))
@@ -66,7 +67,7 @@ class UdpLink:
         return self._socket.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` datagrams that are there now."""
+        """Return up to ``limit`` available datagrams."""
         received: list[tuple[Peer, bytes]] = []
         receive_from = self._socket.recvfrom
         try:
@@ -75,14 +76,14 @@ class UdpLink:
                 received.append((peer, data))
         except (BlockingIOError, InterruptedError):
             pass
-        except OSError:  # an earlier datagram found nobody there: says nothing of this one
+        except OSError:  # an ICMP error for a datagram sent earlier
             self.lost += 1
         return received
 
     def receive_stamped(
         self, limit: int, *, longest: float
     ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Return what ``receive`` gives, and how long each had waited to be read, s."""
+        """Return the datagrams as ``receive`` does, and how long each waited to be read, s."""
         received: list[tuple[Peer, bytes]] = []
         waited: list[float] = []
         try:
@@ -99,7 +100,7 @@ class UdpLink:
         return received, waited
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send one datagram; one that the system does not take is lost, as on any network."""
+        """Send one datagram; drop it if the system refuses it."""
         try:
             self._socket.sendto(data, peer)  # type: ignore[call-overload]
         except OSError:

@@ -1,8 +1,8 @@
 """Link URLs: ``udpin`` and ``tcpin`` listen, ``udpout`` and ``tcp`` dial, ``serial`` is a line.
 
-``kind:host:port``, and ``serial:/dev/ttyUSB0:57600`` with the baud rate. Behind a question mark
-stands what is asked of signatures there: ``unsigned=allow`` or ``refuse``, and ``key=NAME``; and
-for ``udpout`` from which local port it is dialled, ``local=PORT``.
+The form is ``kind:host:port``, or ``serial:/dev/ttyUSB0:57600`` with the baud rate. Options follow
+a question mark: ``unsigned=allow`` or ``refuse`` and ``key=NAME`` for signing, and ``local=PORT``
+for the local port of ``udpout``.
 """
 
 import ipaddress
@@ -21,15 +21,15 @@ UNSIGNED = {"allow": True, "refuse": False}
 
 @dataclass(frozen=True, slots=True)
 class LinkUrl:
-    """A parsed link URL of the network."""
+    """A parsed link URL of UDP or TCP."""
 
     kind: str
     host: str
     port: int
-    #: whether unsigned packets are taken, None: it does not say; it is the same link all the same
+    #: whether unsigned packets are accepted; None if not given. Options do not affect equality
     unsigned: bool | None = field(default=None, compare=False)
     key: str = field(default="", compare=False)
-    #: the port from which it dials, None: it does not say
+    #: the local port of a dialling link; None if not given
     local: int | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
@@ -37,12 +37,12 @@ class LinkUrl:
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only this machine can be on the other end."""
+        """Whether only this machine can be the other end."""
         return is_loopback(self.host)
 
     @property
     def is_udp(self) -> bool:
-        """Whether it is of UDP."""
+        """Whether the link uses UDP."""
         return self.kind.startswith("udp")
 
 
@@ -52,7 +52,7 @@ class SerialUrl:
 
     device: str
     baud: int  # bits per second; a byte takes ten
-    unsigned: bool | None = field(default=None, compare=False)  # as that of LinkUrl
+    unsigned: bool | None = field(default=None, compare=False)  # as in LinkUrl
     key: str = field(default="", compare=False)
 
     def __str__(self) -> str:
@@ -60,7 +60,7 @@ class SerialUrl:
 
 
 def parse_url(text: str) -> LinkUrl | SerialUrl:
-    """Return the parts of a link URL; LinkUrlError says what is wrong with it."""
+    """Return the parts of a link URL; raise LinkUrlError if it is malformed."""
     where, _, options = text.partition("?")
     unsigned, key, local = _parse_options(options, what=f"link {text!r}")
     kind, _, rest = where.partition(":")
@@ -76,7 +76,7 @@ def parse_url(text: str) -> LinkUrl | SerialUrl:
 
 
 def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
-    """Return (host, port) of ``host:port``; LinkUrlError names ``what`` they are for."""
+    """Return (host, port) of ``host:port``; raise LinkUrlError, which names ``what``."""
     host, _, port = text.removeprefix("//").rpartition(":")
     host = host.strip("[]")
     if not host or not _is_number(port) or not 0 < int(port) < 65536:
@@ -111,12 +111,12 @@ def _parse_serial(text: str, *, what: str) -> tuple[str, int]:
 
 
 def _is_number(text: str) -> bool:
-    """Whether it is a whole number, of so few digits that Python makes one of it."""
+    """Whether the text is a whole number of at most 8 digits, which ``int`` always accepts."""
     return text.isdecimal() and len(text) <= 8
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is this machine by its loopback interface."""
+    """Whether a host is a loopback address or "localhost"."""
     if host == "localhost":
         return True
     try:

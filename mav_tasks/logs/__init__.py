@@ -1,4 +1,4 @@
-"""What the server says to its operator: how an event is rendered, what is said, and where to.
+"""The server's log: rendering events, selecting records, and writing lines.
 
-It is a shell. That nobody reads what is said, or that it cannot be written, holds nothing up.
+It does I/O. A blocked log reader, or a failing one, never stalls the server.
 """

@@ -1,4 +1,4 @@
-"""The journal as lines for people, JSON for scripts, or a table: as the log has it, time in UTC."""
+"""Exports the journal as text, JSON lines or CSV, rendered as in the log; times in UTC."""
 
 import csv
 import io
@@ -12,7 +12,7 @@ from mav_tasks.errors import UsageError
 from mav_tasks.logs.rendering import clean, event_values, utc_text
 from mav_tasks.tasks.events import Event
 
-#: number of an event over the life of the store, the event with its time in UTC -> a line
+#: event number over the life of the store, event with times in UTC -> a line
 EntryOf = Callable[[int, Event], str]
 
 TIMING = ("period", "count", "p50", "p99", "longest", "late")
@@ -29,7 +29,7 @@ COLUMNS = (
     "reason",
     "actor",
     "words",
-    # of the setpoints of a task that has been driven, in seconds
+    # setpoint timing of a driven task, in seconds
     *TIMING,
 )
 
@@ -39,33 +39,33 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 
 
 def text_entry(_number: int, event: Event) -> str:
-    """Return the time and the words."""
+    """Return a line of text: time and message."""
     return f"{utc_text(event.at)} {clean(str(event))}\n"
 
 
 def json_entry(number: int, event: Event) -> str:
-    """Return one object."""
+    """Return a line with one JSON object."""
     return _encode({"number": number} | event_values(event, offset=0.0)) + "\n"
 
 
 def csv_entry(number: int, event: Event) -> str:
-    """Return a row of COLUMNS; what an event does not have is empty."""
+    """Return a row of COLUMNS; a field that the event lacks is empty."""
     values = event_values(event, offset=0.0)
-    # of a submission: what it has become by it
+    # a submission has no "new" field: use the task's state
     values = {"new": values.get("state")} | values | {"number": number, "words": values["message"]}
     values |= values.get("timing") or {}
     return csv_row([values.get(column) for column in COLUMNS])
 
 
 def csv_row(cells: Sequence[Any]) -> str:
-    """Return a row of a table."""
+    """Return a row of CSV."""
     row = io.StringIO()
     csv.writer(row, lineterminator="\n").writerow(cells)
     return row.getvalue()
 
 
 def parse_since(text: str, *, now: float) -> float:
-    """Return the UTC seconds that are meant: so long before ``now``, or a date. UsageError."""
+    """Return UTC seconds from a duration before ``now`` or an ISO 8601 time; raise UsageError."""
     ago = re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", text)
     if ago is not None:
         return now - float(ago[1]) * _SECONDS[ago[2]]

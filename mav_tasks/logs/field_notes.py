@@ -1,6 +1,6 @@
-"""What helps where a link does not work as it should: who is heard at all, and how much is useless.
+"""Debug log for faulty links: the peers heard, and the counts of received packets.
 
-An observer, for ``--verbose`` only: what it tells is no event, and nobody acts on it.
+An observer, for ``--verbose`` only: its messages are not events, and trigger nothing.
 """
 
 import logging
@@ -21,14 +21,14 @@ from mav_tasks.engine.inputs import (
 )
 from mav_tasks.tasks.events import Event
 
-PERIOD = 60.0  # s, between two counts
-MOST_PEERS = 256  # remembered; with one more all are forgotten, and told anew
+PERIOD = 60.0  # s between two logs of the counts
+MOST_PEERS = 256  # remembered; one more clears the set, and peers are logged again
 
 log = logging.getLogger("mav_tasks")
 
 
 class FieldNotes:
-    """Implements ``EngineObserver``. ``counts`` gives what came in so far, in words."""
+    """Implements ``EngineObserver``. ``counts`` returns the counts of received packets as text."""
 
     def __init__(self, counts: Callable[[], str]) -> None:
         self._counts = counts
@@ -40,7 +40,7 @@ class FieldNotes:
         return f"FieldNotes({len(self._heard)} heard)"
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """Take note of who is new."""
+        """Log new peers, new links and congestion; log the counts every PERIOD."""
         match item:
             case AtOnce(packets=several) | Backlog(packets=several):
                 for each in several:
@@ -65,10 +65,10 @@ class FieldNotes:
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
-        """Take no note: what the engine does is in its events."""
+        """Ignore output: the engine's events are logged anyway."""
 
     def close(self) -> None:
-        """Say in the end how much came in."""
+        """Log the final counts."""
         log.debug("came in: %s", self._counts())
 
     def _meet(self, link: str, peer: Peer) -> None:

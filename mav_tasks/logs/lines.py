@@ -1,4 +1,4 @@
-"""Log records as lines: words for people, or JSON for machines; what repeats itself is counted."""
+"""Formats log records as lines of text or JSON; repeated messages are counted, not written."""
 
 import json
 import logging
@@ -14,7 +14,7 @@ from mav_tasks.logs.rendering import clean, utc_text, values_of
 from mav_tasks.logs.repeats import Repeats, Said
 from mav_tasks.tasks.events import Event, SubmissionRefused
 
-#: record, its words, how often more it was said, in so many seconds -> the line
+#: record, message, None or (number of repetitions, within s) -> the line
 LineOf = Callable[[logging.LogRecord, str, tuple[int, float] | None], str]
 
 SECONDS = len("2026-11-24T14:05:09")
@@ -24,11 +24,11 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 
 
 class TextLines:
-    """Local time with its zone, level, words. A traceback follows on lines of its own."""
+    """Formats lines of text: local time with zone, level, message. A traceback adds lines."""
 
     def __init__(self) -> None:
         self._second = -1
-        # that second in words, and its zone: thousands of lines a second have the same
+        # cached text of the second and its zone: thousands of lines a second have the same
         self._clock = self._zone = ""
 
     def __call__(
@@ -50,7 +50,7 @@ class TextLines:
 
 
 def json_line(record: logging.LogRecord, words: str, repeated: tuple[int, float] | None) -> str:
-    """Return one object: time, level, message; of an event its kind and fields."""
+    """Return one JSON object: time, level, message; for an event also its kind and fields."""
     values: dict[str, Any] = {
         "time": utc_text(record.created),
         "level": record.levelname.lower(),
@@ -71,7 +71,7 @@ def json_line(record: logging.LogRecord, words: str, repeated: tuple[int, float]
 
 
 class Lines:
-    """Makes lines of records. ``now`` in monotonic seconds, ``wall`` gives UTC seconds."""
+    """Converts records to lines. ``now``: monotonic seconds; ``wall`` returns UTC seconds."""
 
     def __init__(self, line_of: LineOf, *, wall: Callable[[], float] = time.time) -> None:
         self._line_of = line_of
@@ -82,7 +82,7 @@ class Lines:
         return f"Lines({self._repeats})"
 
     def of(self, record: logging.LogRecord, *, now: float) -> str | None:
-        """Return the line of a record; None: it was said lately, and is counted."""
+        """Return the line of a record; None if it repeats a recent message, and is counted."""
         words = clean(record.getMessage())
         if not _is_change(record.msg) and not self._repeats.is_new(
             (record.levelno, words), (record, words), now=now
@@ -91,19 +91,19 @@ class Lines:
         return self._line_of(record, words, None)
 
     def line(self, record: logging.LogRecord) -> str:
-        """Return the line of a record, whatever was said before."""
+        """Return the line of a record, also if it repeats a message."""
         return self._line_of(record, clean(record.getMessage()), None)
 
     def due(self, *, now: float) -> Iterator[str]:
-        """Return a line for all that was repeated and counted for long enough."""
+        """Return a line for each repeated message whose window is over."""
         return map(self._counted, self._repeats.due(now=now))
 
     def rest(self, *, now: float) -> Iterator[str]:
-        """Return a line for all that was counted and not said yet."""
+        """Return a line for each message with unreported repetitions, at the end of the log."""
         return map(self._counted, self._repeats.rest(now=now))
 
     def _counted(self, of: tuple[Said[tuple[logging.LogRecord, str]], float]) -> str:
-        """Return a line of now: one with the time of the first would stand after later ones."""
+        """Return a line with the present time: the log's lines must be in order of time."""
         said, seconds = of
         record, words = copy(said.what[0]), said.what[1]
         record.created = self._wall()
@@ -112,7 +112,7 @@ class Lines:
 
 
 def _is_change(message: object) -> bool:
-    """Something is otherwise now, and it is in the journal: in the same words it is still news."""
+    """Whether a message is an event that changed something: it is news even if the text repeats."""
     return isinstance(message, Event) and not isinstance(message, SubmissionRefused)
 
 

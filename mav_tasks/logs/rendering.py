@@ -1,7 +1,7 @@
-"""An event as words and as plain values, alike in the log and in the export of the journal.
+"""Renders events as text and as plain values, for the log and for the export of the journal.
 
-Values come from the event's fields, never out of its words. An enum is its name, a time is UTC, a
-number that is none (NaN, infinity) is null. What was made for machines only is left out.
+Values come from the event's fields, not from its text. An enum is rendered as its name, a time as
+UTC, NaN and infinity as null. Fields for internal use are left out.
 """
 
 import logging
@@ -30,20 +30,20 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.task import Submitter, Task
 
-#: digests, the items of a plan as they came, how many intervals had which length, and times that
-#: the line itself has
+#: dedup keys, a plan's items as received, the histogram of intervals, and times that the line has
+#: itself
 _LEFT_OUT = frozenset({"at", "submitted_at", "marks", "source", "spread"})
 _NAMES = {"task_id": "task", "submitter": "actor"}
-#: of these there may be several in one place: they say which
+#: a field may hold one of several of these classes: their values tell which
 _CHOICES = frozenset((*Goal.__args__, *Place.__args__))
 
 _PLAIN = frozenset({int, str, bool, NoneType})
 
 
 def values_of(event: Any, *, offset: float) -> dict[str, Any]:
-    """Return the values of an event, or of another dataclass that was logged, its kind first.
+    """Return the values of an event, or of another logged dataclass, its class name first.
 
-    ``offset`` is UTC minus the seconds that the event's times are in.
+    ``offset`` is UTC minus the clock of the event's times, s.
     """
     values = {"event": type(event).__name__}
     if isinstance(event, TaskSubmitted):
@@ -52,7 +52,7 @@ def values_of(event: Any, *, offset: float) -> dict[str, Any]:
 
 
 def event_values(event: Event, *, offset: float) -> dict[str, Any]:
-    """Return what a JSON line says of an event: as in the log, but for what only a log has."""
+    """Return the values of an event's JSON line, as in the log."""
     line = {
         "time": utc_text(event.at + offset),
         "level": logging.getLevelName(level_of(event)).lower(),
@@ -62,21 +62,21 @@ def event_values(event: Event, *, offset: float) -> dict[str, Any]:
 
 
 def level_of(event: Event) -> int:
-    """Return the log level of an event: what its operator should look at is a warning."""
+    """Return the log level of an event: a warning if the operator should look at it."""
     if isinstance(event, SignaturesSeen | TaskProgressed | VehicleHalted):
-        return logging.DEBUG  # beside what else is told of it
+        return logging.DEBUG  # other events tell the operator enough
     match event:
         case TaskChanged(new=TaskState.FAILED | TaskState.HELD | TaskState.EXPIRED):
             return logging.WARNING
         case QueuePaused(reason=TaskReason.OPERATOR):
-            return logging.INFO  # somebody wished it
+            return logging.INFO  # an operator requested it
         case SubmissionRefused() | SignatureRefused() | VehicleNoted() | QueuePaused():
             return logging.WARNING
     return logging.INFO
 
 
 def utc_text(utc: float) -> str | None:
-    """Return UTC seconds as ISO 8601 with milliseconds; None: it is no time."""
+    """Return UTC seconds as ISO 8601 with milliseconds; None if they are not representable."""
     if not isfinite(utc):
         return None
     second, rest = divmod(round(utc * 1e6), 1_000_000)
@@ -85,26 +85,26 @@ def utc_text(utc: float) -> str | None:
 
 
 def clean(words: str) -> str:
-    """Return words without what a terminal would take for an order, on one line.
+    """Return a text on one line and without terminal control characters.
 
-    A client or a vehicle may have sent some of them.
+    Clients and vehicles may have sent parts of it.
     """
     if words.isprintable():
         return words
     return "".join(c if c.isprintable() else " " if c.isspace() else "" for c in words)
 
 
-@lru_cache(16)  # thousands of events a second have the same
+@lru_cache(16)  # thousands of events share a second
 def _utc_second(second: int) -> str | None:
     try:
         return datetime.fromtimestamp(second, UTC).isoformat()[:19]
-    except (ValueError, OverflowError, OSError):  # in another aeon
+    except (ValueError, OverflowError, OSError):  # out of datetime's range
         return None
 
 
 def _of_task(task: Task, offset: float) -> dict[str, Any]:
     values = {"task": task.id} | _values(task, offset)
-    del values["id"], values["progress"], values["timing"]  # there is none yet
+    del values["id"], values["progress"], values["timing"]  # a new task has none
     return values
 
 
@@ -136,6 +136,6 @@ def _value(value: Any, name: str, offset: float) -> Any:
         kind = {"kind": type(value).__name__} if type(value) in _CHOICES else {}
         return kind | _values(value, offset)
     if isinstance(value, tuple):
-        # the steps of a plan may be thousands: how many there are says enough
+        # a plan may have thousands of steps: their number is enough
         return len(value) if any(map(is_dataclass, value)) else list(value)
     return value

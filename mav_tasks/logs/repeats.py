@@ -1,8 +1,8 @@
-"""The same words again and again are said once, then counted. Pure; times in seconds as ``now``.
+"""Suppresses and counts repeated messages. Pure; times are seconds, on the clock of ``now``.
 
-The rule: words that were said less than WINDOW ago are not said but counted. When the window is
-over, they are said once more with their count, and the next window begins; without a count they
-are forgotten.
+The rule: a message that was written less than WINDOW ago is counted instead of written. When the
+window is over, a counted message is written once more with its count, and its next window begins;
+a message without repetitions is forgotten.
 """
 
 from collections import OrderedDict
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 WINDOW = 30.0  # s
-MOST = 1_000  # different words remembered; beyond, the oldest are done with early
+MOST = 1_000  # messages remembered; beyond, the windows of the oldest end early
 
 T = TypeVar("T")
 
 
 @dataclass(slots=True)
 class Said(Generic[T]):
-    """What was said at ``since``, and how often again since then."""
+    """A message written at ``since``, and the number of its repetitions since then."""
 
     what: T
     since: float
@@ -26,7 +26,7 @@ class Said(Generic[T]):
 
 
 class Repeats(Generic[T]):
-    """Remembers what was said. What ``due`` and ``rest`` give is to be said with its count."""
+    """The messages written recently. Callers write those of ``due`` and ``rest`` with counts."""
 
     def __init__(self) -> None:
         self._said: OrderedDict[Hashable, Said[T]] = OrderedDict()  # the oldest first
@@ -35,7 +35,7 @@ class Repeats(Generic[T]):
         return f"Repeats({len(self._said)} remembered)"
 
     def is_new(self, key: Hashable, what: T, *, now: float) -> bool:
-        """Whether ``what`` is to be said; otherwise it is counted."""
+        """Return whether to write ``what``; if not, count it."""
         said = self._said.get(key)
         if said is None:
             self._said[key] = Said(what, now)
@@ -45,7 +45,7 @@ class Repeats(Generic[T]):
         return False
 
     def due(self, *, now: float) -> Iterator[tuple[Said[T], float]]:
-        """Yield what was repeated in a window that is over, with the length of that window."""
+        """Yield each message with repetitions whose window is over, and the window's length."""
         while self._said:
             key, said = next(iter(self._said.items()))
             if now < said.since + WINDOW and len(self._said) <= MOST:
@@ -57,7 +57,7 @@ class Repeats(Generic[T]):
                     self._said[key] = Said(said.what, now)
 
     def rest(self, *, now: float) -> Iterator[tuple[Said[T], float]]:
-        """Yield all that was repeated and not said yet: nothing comes any more."""
+        """Remove all messages; yield those with repetitions. Called at the end of the log."""
         while self._said:
             _, said = self._said.popitem(last=False)
             if said.more:

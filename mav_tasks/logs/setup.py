@@ -1,4 +1,4 @@
-"""Starts the log: what is said, in which format, and by whom it is written."""
+"""Sets up the log: level, format and handler."""
 
 import logging
 import sys
@@ -12,21 +12,21 @@ from mav_tasks.settings import Log
 
 @contextmanager
 def log_to_stderr(settings: Log) -> Iterator[None]:
-    """Write the log where the operator sees it, while the block runs."""
-    # Each event is one line, and under load there are thousands a second: what no line shows is
-    # not looked up for it (logging's own manual, "Optimization").
+    """Write the log to standard error while the block runs."""
+    # Under load there are thousands of lines a second: skip the collection of fields that no line
+    # shows (logging's manual, "Optimization").
     logging._srcfile = None
     logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
     log = logging.getLogger("mav_tasks")
     log.setLevel(settings.level.upper())
     root = logging.getLogger()
-    root.setLevel(max(log.level, logging.INFO))  # what asyncio says to itself helps nobody
+    root.setLevel(max(log.level, logging.INFO))  # no debug messages of asyncio
     line_of: LineOf = json_line if settings.format == "json" else TextLines()
-    # Closed from the beginning: its number may by now be that of something else, the store's, say.
+    # If stderr was closed at start, its descriptor may now be another file's, such as the store's.
     handler = ThreadedHandler(sys.stderr.fileno(), Lines(line_of)) if sys.stderr else None
     if handler is not None:
         root.addHandler(handler)
-        logging.captureWarnings(True)  # they would wait for standard error
+        logging.captureWarnings(True)  # warnings would block on standard error
     else:
         root.addHandler(logging.NullHandler())
     try:

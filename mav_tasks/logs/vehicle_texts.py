@@ -1,4 +1,4 @@
-"""Log what vehicles say (STATUSTEXT). An observer: it only reads, and nobody waits for it."""
+"""Logs the vehicles' texts (STATUSTEXT), as an observer of the engine."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -26,19 +26,19 @@ from mav_tasks.services.text_receiver import Text, TextReceiver
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.tasks.events import Event
 
-RATE = 10.0  # texts a second of one vehicle; beyond they are only counted
-BURST = 50  # at once: an autopilot that starts has much to say
-TELL = 30.0  # s, between two lines about what was left out
+RATE = 10.0  # texts per second of one vehicle; more are only counted
+BURST = 50  # texts at once: an autopilot that starts sends many
+TELL = 30.0  # s from the first dropped text to the line with their number
 
 TEXT = Statustext.id
-_V2_ID = TEXT.to_bytes(3, "little")  # how it stands in a MAVLink 2 header
+_V2_ID = TEXT.to_bytes(3, "little")  # as in a MAVLink 2 header
 
 log = logging.getLogger("mav_tasks")
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleText:
-    """A text of a vehicle's component, for the log."""
+    """A text from a vehicle's component, for the log."""
 
     vehicle: int
     component: int
@@ -58,10 +58,10 @@ class _Talk:
 
 
 class VehicleTexts:
-    """Implements ``EngineObserver``."""
+    """Implements ``EngineObserver``: decodes texts, limits their rate, logs them."""
 
     def __init__(self) -> None:
-        self._links: dict[str, bool] = {}  # of vehicles; whether it is a stream
+        self._links: dict[str, bool] = {}  # links to vehicles -> whether it is a stream
         self._intake = PacketReader()
         self._counts = DecodeCounts()
         self._decoder = Decoder()
@@ -73,7 +73,7 @@ class VehicleTexts:
         return f"VehicleTexts({self._receiver}, {len(self._talks)} vehicles)"
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """Look for texts in what came."""
+        """Log the texts in received packets."""
         if now >= self._due:
             self._handle_deadline(now)
         match item:
@@ -95,10 +95,10 @@ class VehicleTexts:
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
-        """Take no note: nobody says anything here."""
+        """Ignore output."""
 
     def close(self) -> None:
-        """Say what was not whole yet."""
+        """Log incomplete texts and pending counts."""
         self._handle_deadline(inf)
 
     def _texts_in(self, item: Packets, now: float) -> Iterator[Packet]:
@@ -142,7 +142,7 @@ class VehicleTexts:
 
 
 def _may_hold_text(data: bytes) -> bool:
-    """Whether to look closer: most datagrams hold none, and splitting each one takes its time."""
+    """Whether a datagram may contain a STATUSTEXT: a cheap filter, as splitting is expensive."""
     return _V2_ID in data or (TEXT in data and MAGIC_V1 in data)
 
 

@@ -1,8 +1,8 @@
-"""The way out of log lines: a queue that never waits, and a thread that does.
+"""Writes log lines: a queue that never blocks the loop, and a thread that may block.
 
-Standard error may be a pipe that nobody reads, a terminal that was halted by Ctrl-S, or a file on
-a disk that is full. A server that waits for it does not stop a rover in time: so lines are lost and
-counted instead. It writes past ``sys.stderr``, whose lock the interpreter would want in the end.
+Standard error may be a pipe that nobody reads, a terminal paused by Ctrl-S, or a file on a full
+disk. A server that waits for it cannot stop a rover in time: lines are dropped and counted instead.
+The thread bypasses ``sys.stderr``: the interpreter needs that object's lock at exit.
 """
 
 import logging
@@ -15,30 +15,30 @@ from queue import Empty, SimpleQueue
 
 from mav_tasks.logs.lines import Lines
 
-MOST = 10_000  # lines that wait; what comes then is lost
-GATHER = 0.02  # s, in which more may come to be written with the first
+MOST = 10_000  # waiting lines; more are dropped
+GATHER = 0.02  # s, in which more lines are collected for a write
 BATCH = 1_000  # lines in one write
-LOOK = 1.0  # s, after which what was counted is looked at, though nothing was said
-RETRY = 0.5  # s, after what could not be written
-LAST_WORDS = 1.0  # s, for what is left when the server ends
+LOOK = 1.0  # s, maximum wait for a line before repeated messages are checked
+RETRY = 0.5  # s after a failed write
+LAST_WORDS = 1.0  # s for the remaining lines at shutdown
 
 
 class ThreadedHandler(logging.Handler):
-    """Makes a line of a record at once; a thread of its own writes it to a descriptor.
+    """Formats each record at once; its thread writes the lines to a descriptor.
 
-    The line is not made by the thread: that would take the interpreter from the loop at any moment.
+    The thread does not format: it would take the GIL from the loop at any moment.
     """
 
     def __init__(self, fd: int, lines: Lines) -> None:
         super().__init__()
         self._fd = fd
-        self._lines = lines  # used with this handler's lock only
+        self._lines = lines  # used only with this handler's lock
         self._waiting: SimpleQueue[str] = SimpleQueue()
         self._is_ending = threading.Event()
-        self._not_taken = 0  # counted by who logs,
-        self._not_written = 0  # by the thread,
-        self._told = 0  # both: what has been told of them
-        self._is_torn = False  # the last line written was not written to its end
+        self._not_taken = 0  # lines dropped in ``emit``
+        self._not_written = 0  # lines dropped by the thread
+        self._told = 0  # the part of both that the log has reported
+        self._is_torn = False  # the last line was written only in part
         self._thread = threading.Thread(target=self._run, name="log", daemon=True)
         self._thread.start()
 
@@ -46,22 +46,22 @@ class ThreadedHandler(logging.Handler):
         return f"ThreadedHandler({self._waiting.qsize()} waiting, {self._lost} lost)"
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Take a record; called with this handler's lock."""
+        """Format and queue a record; called with this handler's lock."""
         if self._waiting.qsize() >= MOST:
             self._not_taken += 1
             return
         try:
             line = self._lines.of(record, now=time.monotonic())
-        except Exception as mistake:  # noqa: BLE001 - ours, and no reason for a rover to stand
+        except Exception as mistake:  # noqa: BLE001 - a bug of ours must not stop a rover
             line = f"a line cannot be said: {mistake!r}"
         if line is not None:
             self._waiting.put(line)
 
     def close(self) -> None:
-        """Write what is left, for LAST_WORDS at most: who does not read by then does not get it."""
+        """Write the remaining lines; give up after LAST_WORDS if the reader is blocked."""
         if not self._is_ending.is_set():
             self._is_ending.set()
-            self._waiting.put("")  # it waits for something
+            self._waiting.put("")  # wakes the thread
             self._thread.join(LAST_WORDS)
         super().close()
 
@@ -81,7 +81,7 @@ class ThreadedHandler(logging.Handler):
         self._write(self._lines.rest(now=time.monotonic()))
 
     def _collect(self) -> list[str]:
-        """Wait for lines, but not longer than LOOK; gives some that wait."""
+        """Wait for lines, at most LOOK; return up to BATCH of them."""
         lines: list[str] = []
         try:
             lines.append(self._waiting.get(timeout=LOOK))
@@ -111,14 +111,14 @@ class ThreadedHandler(logging.Handler):
         return f"{self._lines.line(record)}\n"
 
     def _left_of(self, text: str) -> int:
-        """Write lines; gives how many of them could not be written."""
+        """Write lines; return the number of lines that could not be written."""
         data = text.encode("utf-8", "backslashreplace")
         rest = memoryview(b"\n" + data if self._is_torn else data)
         while rest:
             try:
                 rest = rest[os.write(self._fd, rest) :]
                 self._is_torn = False
-            except BlockingIOError:  # somebody who shares it made it so
+            except BlockingIOError:  # another process that shares it made it non-blocking
                 select.select([], [self._fd], [], RETRY)
             except OSError:
                 self._is_torn = self._is_torn or len(rest) < len(data)

@@ -1,6 +1,6 @@
-"""Records of a run: telemetry logs for ground stations, and decisions that can be replayed.
+"""Records of a run: telemetry logs for ground stations, and decision records for replay.
 
-Observers of the engine (``observer.py``) only take notes; threads of their own write.
+Recorders are observers of the engine (``observer.py``) that queue entries; their threads write.
 """
 
 from mav_tasks.observer import EngineObserver
@@ -16,9 +16,9 @@ __all__ = ["observers"]
 def observers(
     recording: Recording, settings: Settings, restored: Restored | None, *, now: float
 ) -> list[EngineObserver]:
-    """Return the recorders that the settings ask for; the engine gets the same three values.
+    """Return the recorders of the settings; raise RecordError if a folder cannot be used.
 
-    RecordError: they cannot be kept there.
+    ``settings``, ``restored`` and ``now`` must be those of the engine.
     """
     found: list[EngineObserver] = []
     if recording.tlog:

@@ -1,7 +1,7 @@
-"""What waits to be written: filled by the loop, emptied by one thread, bounded.
+"""A bounded queue of entries to write, filled by the loop and emptied by one thread.
 
-The loop never waits for the thread, and neither waits for a lock: each side has a counter of its
-own, and a deque takes and gives whole entries.
+It needs no lock, so the loop never waits for the thread: each side writes only its own counter, and
+``deque`` appends and pops atomically.
 """
 
 import time
@@ -13,41 +13,41 @@ from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import AtOnce, Input, Packets
 
 MOST = 32_000_000  # bytes, about
-SMALL = 200  # bytes, about, that any value takes
-ROOM_OF_PACKET = 400  # the same of a packet to send, or of an event
+SMALL = 200  # bytes, about, of any value
+ROOM_OF_PACKET = 400  # bytes, about, of a packet to send or an event
 
-AT_A_TIME = 25  # entries, about a fifth of a millisecond
-PAUSE = 50e-6  # s, in which the loop takes over if it has something to do
+AT_A_TIME = 25  # entries between two pauses, about a fifth of a millisecond
+PAUSE = 50e-6  # s, for which the thread sleeps, so that the loop can get the GIL
 
 E = TypeVar("E")
 
 
 def room_of(item: Input | None) -> int:
-    """Return how many bytes, about, an input takes in memory."""
+    """Return the approximate size of an input in memory, bytes."""
     if isinstance(item, AtOnce | inputs.Backlog):
         return sum(map(room_of, item.packets), SMALL)
     if not isinstance(item, Packets):
         return SMALL
     room = SMALL
-    for _, data in item.datagrams:  # a generator would cost more than what it counts
+    for _, data in item.datagrams:  # faster than a generator expression
         room += SMALL + len(data)
     return room
 
 
 class Backlog(Generic[E]):
-    """Entries in their order."""
+    """A FIFO queue of entries, bounded in bytes."""
 
     def __init__(self, most: int = MOST) -> None:
         self._most = most
         self._entries: deque[tuple[E, int]] = deque()
-        self._put = 0  # bytes so far; written by the loop only
-        self._taken = 0  # the same, by the thread only
+        self._put = 0  # bytes put in total; written only by the loop
+        self._taken = 0  # bytes taken in total; written only by the thread
 
     def __repr__(self) -> str:
         return f"Backlog({len(self._entries)} entries, {self._put - self._taken} bytes)"
 
     def put(self, entry: E, room: int) -> bool:
-        """Take an entry of so many bytes; False: there is no room for it."""
+        """Add an entry of ``room`` bytes; return False if there is no room for it."""
         if self._put - self._taken + room > self._most:
             return False
         self._put += room
@@ -55,7 +55,7 @@ class Backlog(Generic[E]):
         return True
 
     def taken(self) -> Iterator[E]:
-        """Yield and forget what is there, until nothing is; makes way for the loop in between."""
+        """Remove and yield entries until none is left; pause regularly to let the loop run."""
         count = 0
         while self._entries:
             entry, room = self._entries.popleft()

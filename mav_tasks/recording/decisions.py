@@ -1,4 +1,4 @@
-"""A record of all that the engine was told, with what it made of it: see ``record_lines``."""
+"""Writes the decision record: all inputs and outputs of the engine; see ``record_lines``."""
 
 import logging
 import platform
@@ -22,7 +22,7 @@ from mav_tasks.tasks.restored import Restored
 log = logging.getLogger("mav_tasks")
 
 SUFFIX = ".decisions.gz"
-BLOCK = 1 << 15  # bytes of text, written at once
+BLOCK = 1 << 15  # bytes of text per write
 
 CLOSED = "the run is over"
 TOO_LONG = "the record is as long as it may be"
@@ -32,7 +32,7 @@ Entry = tuple[float, Input | None] | tuple[float, Sequence[Outgoing], Sequence[E
 
 
 class Decisions:
-    """An observer that writes one record of the run; it ends early rather than have gaps."""
+    """An observer that writes one record of the run; it ends the record rather than leave gaps."""
 
     def __init__(
         self,
@@ -44,9 +44,9 @@ class Decisions:
         size: int,
         most_waiting: int = MOST,
     ) -> None:
-        """Of an engine that gets these settings, ``restored`` and ``now``; ``size`` in bytes.
+        """Create the file; raise RecordError if that fails. ``size``: its limit in bytes.
 
-        RecordError: there can be no file.
+        ``settings``, ``restored`` and ``now`` must be those of the engine.
         """
         try:
             fd, self.path, _ = new_file(folder, stamp(time.time()), 0, SUFFIX)
@@ -56,7 +56,7 @@ class Decisions:
         self._lines = LineWriter()
         self._beginning = self._beginning_of(settings, restored, now)
         self._backlog: Backlog[Entry] = Backlog(most_waiting)
-        self._why = ""  # nothing more is noted
+        self._why = ""  # why no more entries are queued; "": they are
         self._has_ended = False
         self._thread = WritingThread(str(self), write=self._write, end=self._finish)
         self._thread.start()
@@ -68,24 +68,24 @@ class Decisions:
         return f"record of decisions {self.path}"
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """Note what the engine is told."""
+        """Queue an input, or the end of the record if the queue is full."""
         if not self._why and not self._backlog.put((now, item), room_of(item)):
             self._why = TOO_MUCH
 
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
-        """Note what it made of it."""
+        """Queue the engine's output, or the end of the record if the queue is full."""
         room = ROOM_OF_PACKET * (1 + len(packets) + len(events))
         if not self._why and not self._backlog.put((now, packets, events), room):
             self._why = TOO_MUCH
 
     def close(self) -> None:
-        """Write what waits and the end mark, for a bounded time."""
+        """Write the waiting entries and the end mark; wait a bounded time for that."""
         self._thread.close()
 
     def _write(self) -> None:
-        why = self._why  # before: all that was noted until then is in the backlog
+        why = self._why  # read first: all entries up to then are in the backlog
         self._write_lines(self._beginning)
         self._beginning = iter(())
         self._write_lines(self._noted())
@@ -115,7 +115,7 @@ class Decisions:
                 if length > BLOCK:
                     self._write_block(block)
                     block, length = [], 0
-                    time.sleep(PAUSE)  # of an earlier run there may be very many tasks
+                    time.sleep(PAUSE)  # there may be very many restored tasks
         except Unwritable as mistake:
             why = str(mistake)
         if block:
@@ -163,7 +163,7 @@ class Decisions:
 
 
 def project_version() -> str:
-    """Return the version of this package as it is installed."""
+    """Return the installed version of this package."""
     try:
         return version("mav-tasks")
     except PackageNotFoundError:

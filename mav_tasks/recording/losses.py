@@ -1,4 +1,4 @@
-"""Says once that something is being lost, and once, with the count, that this is over."""
+"""Logs once that packets are being lost, and once, with their number, that this is over."""
 
 import logging
 
@@ -6,7 +6,7 @@ log = logging.getLogger("mav_tasks")
 
 
 class Losses:
-    """What one cause loses of one record. One thread counts; another may say that it is over."""
+    """The losses of one record by one cause. One thread counts; another may call ``over``."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -25,7 +25,7 @@ class Losses:
             log.warning("%s: %s: packets are lost", self._name, why)
 
     def over(self) -> None:
-        """Note that nothing is being lost any more."""
+        """Note that packets are written again."""
         if self.is_losing:
             self.is_losing = False
             count = self._count
@@ -33,6 +33,6 @@ class Losses:
             self._told = count
 
     def end(self) -> None:
-        """Say what is lost for good."""
+        """Log the losses that are not yet logged."""
         if self.is_losing:
             log.warning("%s: ends; %d packets are lost", self._name, self._count - self._told)

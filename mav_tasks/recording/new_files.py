@@ -1,4 +1,4 @@
-"""Folders and files of records: names by the time of the start, and nobody else reads them."""
+"""Private folders and files for records, named by the time of the start."""
 
 import os
 from datetime import UTC, datetime
@@ -12,10 +12,10 @@ MOST_OF_A_NAME = 100_000
 
 
 def prepared(folder: str) -> Path:
-    """Make a folder if it is not there. RecordError: it cannot be written to."""
+    """Create a folder if it is missing; raise RecordError if it cannot be written to."""
     try:
         path = Path(folder).expanduser().absolute()
-    except RuntimeError as error:  # of somebody who is not there
+    except RuntimeError as error:  # the home folder of an unknown user
         raise RecordError(f"no records can be kept in {folder}: {error}") from error
     try:
         make_private(path)
@@ -29,7 +29,7 @@ def prepared(folder: str) -> Path:
 
 
 def stamp(utc: float) -> str:
-    """Return a time, seconds since 1970, as file names have it."""
+    """Return a time, seconds since 1970, as text for file names."""
     return f"{datetime.fromtimestamp(max(utc, 0.0), UTC):%Y-%m-%dT%H-%M-%SZ}"
 
 
@@ -39,9 +39,9 @@ def name_of(start: str, number: int, suffix: str) -> str:
 
 
 def new_file(folder: Path, start: str, number: int, suffix: str) -> tuple[int, Path, int]:
-    """Make a file of the first free number from ``number`` on; gives descriptor, path and number.
+    """Create a file with the first free number from ``number`` on; raise OSError.
 
-    OSError says why not.
+    Return its descriptor, path and number.
     """
     while True:
         path = folder / name_of(start, number, suffix)
@@ -54,7 +54,7 @@ def new_file(folder: Path, start: str, number: int, suffix: str) -> tuple[int, P
 
 
 def write_all(fd: int, data: bytes) -> None:
-    """Write all or raise OSError; what is written of it stays."""
+    """Write all bytes; raise OSError, after which a part may have been written."""
     left = memoryview(data)
     while left:
         left = left[os.write(fd, left) :]

@@ -1,7 +1,7 @@
-"""Reads a record of decisions back, as far as it goes. Anything may stand in such a file.
+"""Reads a decision record, as far as it goes. The file is untrusted input.
 
-Whatever is not a record of this version raises RecordError with one clear line; that the end is
-missing is no error: whoever wrote it crashed, or writes on.
+A file that is no record of this version raises RecordError with one clear line. A missing end is no
+error: its server crashed, or still writes.
 """
 
 import stat
@@ -26,13 +26,13 @@ from mav_tasks.tasks.task import Task
 
 PIECE = 1 << 16  # bytes read at once
 TASKS_AT_ONCE = 5_000
-MOST_OF_A_LINE = 1 << 25  # bytes; a longer one is none of ours
+MOST_OF_A_LINE = 1 << 25  # bytes; our lines are shorter
 NOT_OURS = (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError)
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One line: ``number`` counts from 1, ``raw`` is its text without its end."""
+    """One line: ``number`` counts from 1, ``raw`` is its text without the newline."""
 
     number: int
     raw: bytes
@@ -40,7 +40,7 @@ class Entry:
 
     @property
     def kind(self) -> Any:
-        """What it says first: an input's kind, "deadline" or "out"."""
+        """The line's first item: an input's kind, "deadline" or "out"."""
         return self.values[0]
 
     @property
@@ -51,7 +51,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One run, as far as it was recorded. ``why_it_ends`` is None if it ends without saying."""
+    """One run, as far as it was recorded. ``why_it_ends`` is None if the end mark is missing."""
 
     path: Path
     version: str
@@ -64,14 +64,17 @@ class Record:
     why_it_ends: str | None
 
     def entries(self) -> Iterator[Entry]:
-        """Yield what the engine took and gave, in order."""
+        """Yield the engine's inputs and outputs, in order."""
         begin = 1 + (0 if self.restored is None else len(self.restored.tasks))
         for number, raw in islice(_numbered(self.path), begin, self.lines):
             yield Entry(number, raw, _entry_values(self.path, number, raw))
 
 
 def read(path: Path) -> Record:
-    """Look through a whole record. RecordError: it is none, or damaged, or another version's."""
+    """Read and check a whole record.
+
+    Raise RecordError if the file is no record, is damaged, or is another version's.
+    """
     first = _first_line(path)
     lines, why_it_ends = _measure(path)
     count = 0
@@ -102,9 +105,9 @@ def read(path: Path) -> Record:
 
 
 def _measure(path: Path) -> tuple[int, str | None]:
-    """Return the number of lines before the end mark, and what it says.
+    """Return the number of lines before the end mark, and the mark's reason, None without a mark.
 
-    RecordError: the mark does not fit to what stands before it.
+    Raise RecordError if the mark's count or digest does not match the lines before it.
     """
     digest = blake2b(digest_size=16)
     lines = 0
@@ -174,7 +177,7 @@ def _entry_values(path: Path, number: int, raw: bytes) -> Sequence[Any]:
 
 
 def _numbered(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yield the whole lines of a file; what follows the last of them is left out."""
+    """Yield the complete lines of a file with their numbers; skip an incomplete last line."""
     begun = bytearray()
     number = 0
     for data in _inflated(path):
@@ -191,7 +194,7 @@ def _numbered(path: Path) -> Iterator[tuple[int, bytes]]:
 def _inflated(path: Path) -> Iterator[bytes]:
     stream = zlib.decompressobj(GZIP)
     try:
-        if not stat.S_ISREG(path.stat().st_mode):  # it is read more than once
+        if not stat.S_ISREG(path.stat().st_mode):  # a record is read more than once
             raise RecordError(f"{path}: not a file")
         with path.open("rb") as file:
             while piece := file.read(PIECE):
@@ -207,7 +210,7 @@ def _inflated(path: Path) -> Iterator[bytes]:
 
 
 def _check_words(value: Any) -> None:
-    """Raise ValueError for what is no text, or would give orders to a terminal."""
+    """Raise ValueError for a value that is no text, or contains terminal control characters."""
     if not isinstance(value, str) or not value.isprintable():
         raise ValueError("no words")
 

@@ -1,7 +1,7 @@
-"""The file of a record: a gzip stream that can be read as far as it goes, with a mark at its end.
+"""The file of a record: a gzip stream with an end mark, readable up to where it was written.
 
-After each block the stream is flushed, so that a crash loses what had not been written yet and no
-more. The mark needs room: it is kept free, and what a disk took only in part is cut off before it.
+The stream is flushed after each block, so that a crash loses only unwritten blocks. The size limit
+reserves room for the end mark; a partly written block is cut off before the mark is written.
 """
 
 import os
@@ -22,19 +22,19 @@ ROOM_OF_END = 1_000  # bytes
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """A place from which the file can be gone on with."""
+    """A state of the file after a block, from which writing can continue."""
 
     written: int  # bytes
     lines: int
-    compressor: Any  # zlib's own kind has no public name
-    digest: Any  # likewise hashlib's
+    compressor: Any  # zlib's type has no public name
+    digest: Any  # nor has hashlib's
 
 
 class RecordFile:
-    """Owned by one thread, like its descriptor."""
+    """A record file that one thread writes; it owns the descriptor."""
 
     def __init__(self, fd: int, *, size: int) -> None:
-        """``size``: bytes that the file may have."""
+        """``size``: maximum size of the file, bytes."""
         self._fd = fd
         self._size = size
         self._written = 0
@@ -47,24 +47,24 @@ class RecordFile:
         return f"RecordFile({self._lines} lines, {self._written} bytes)"
 
     def has_room_for(self, text: bytes) -> bool:
-        """Whether so much can be written and the end mark after it."""
+        """Whether a text and the end mark after it fit into the size limit."""
         return self._written + len(text) + ROOM_OF_END <= self._size
 
     def write(self, text: bytes) -> None:
-        """Write whole lines. OSError: it cannot be gone on; ``end`` is still to be called."""
+        """Write whole lines. After OSError, call ``end`` and write no more."""
         self._put(text, zlib.Z_SYNC_FLUSH)
         self._lines += text.count(b"\n")
         self._marks.append(self._mark())
 
     def end(self, why: str) -> bool:
-        """Write the end mark and close; False: there is no room even for that."""
+        """Write the end mark and close the file; return whether the mark was written."""
         try:
             return any(self._end_at(mark, why) for mark in reversed(self._marks))
         finally:
             os.close(self._fd)
 
     def _end_at(self, mark: _Mark, why: str) -> bool:
-        """Let the file end after a mark: the last block may have to give way for it."""
+        """Cut the file back to a state and write the end mark there; return whether that worked."""
         with suppress(OSError):
             os.ftruncate(self._fd, mark.written)
             os.lseek(self._fd, mark.written, os.SEEK_SET)

@@ -1,24 +1,24 @@
-"""The lines of a record of decisions: all that goes into an engine, and what it made of it.
+"""The lines of a decision record: all inputs of an engine, and its outputs.
 
-A record is a gzip file of lines of JSON; ``zcat`` shows it. The first line is an object: the number
-of this format, who wrote it where, ``now`` at the start in monotonic seconds, the settings, what
-the store gave back, and what the places of rows mean (``store/codec``). Then come, each an array::
+A record is a gzip file of JSON lines; ``zcat`` shows it. The first line is an object: the number of
+this format, the writer's version and machine, ``now`` at the start in monotonic seconds, settings,
+restored state, and the row formats (``store/codec``). Each following line is an array::
 
-    ["task", row]                           of an earlier run, as many as the first line says
+    ["task", row]                           a restored task; the first line has their number
     ["packets", now, link, [[peer, data in base64], ...], [s waited, ...]]  the last if any waited
-    ["at once", now, [link, ...], ...]      the same of several links, each from its link on
-    ["backlog", now, [link, ...], ...]
-    ["deadline", now]                       the engine is told that a deadline has come
+    ["at once", now, [link, ...], ...]      packets of several links, each from ``link`` on
+    ["backlog", now, [link, ...], ...]      likewise
+    ["deadline", now]                       a call of Engine.handle_deadline
     ["link", now, ...], ["peer", ...]       the other inputs, with their fields in order
-    ["keys", now, [[name, role, ...], ...]] the key ring by its fingerprints: no secret is in a
-                                            record, a replay asks for the key ring
-    ["out", now, packets, digest, [row, ...]]   what the engine gave in one turn: how many packets
-                                            with BLAKE2b of all, and the events
-    ["end", why, lines, digest]             whoever wrote it came to its end; none after a crash
+    ["keys", now, [[name, role, ...], ...]] the keys with fingerprints, without secrets: a replay
+                                            needs the key ring
+    ["out", now, packets, digest, [row, ...]]   the engine's output of one turn: number of packets,
+                                            BLAKE2b of all of them, and the events
+    ["end", why, lines, digest]             the end mark; missing after a crash
 
-Floats stand there exactly (their shortest form that reads back as the same bits; NaN, Infinity and
--0.0 as Python's JSON writes them), and an integer is no float. Peers are text, numbers, or arrays
-of them, which are tuples. No clock but the run's own, no path and no hash of a process is in it.
+Floats are exact (the shortest text that reads back as the same bits; NaN, Infinity and -0.0 as
+Python's JSON writes them), and integers stay integers. A peer is text, a number, or an array of
+them, which stands for a tuple. A record has no other clock, no path and no process-dependent hash.
 """
 
 from binascii import a2b_base64, b2a_base64
@@ -52,39 +52,39 @@ from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.task import Task
 
 FORMAT = 2
-MAGIC = "mav-tasks record"  # the key of the first line that has the number of the format
-MISSING = b"?"  # in place of a secret
+MAGIC = "mav-tasks record"  # the key in the first line whose value is the format's number
+MISSING = b"?"  # stands for a secret
 DIGEST = 8  # bytes of the digest of one turn's packets
-MOST_WAYS = 10_000  # links and peers of which the text is kept
+MOST_WAYS = 10_000  # cached JSON texts of links and peers
 
 EVENTS: dict[str, type] = {kind.__name__: kind for kind in get_args(Event)}
 ROWS = format_of(*EVENTS.values(), Task)
 
-# Circles are looked for by an entry in a dict for each list: values have none.
+# The check for circular references costs a dict entry for each list; our values have none.
 dumps = JSONEncoder(separators=(",", ":"), check_circular=False).encode
 
 
 class Unwritable(ValueError):
-    """A value that has no place in a record; the text says which."""
+    """A value that a record cannot hold; the text names it."""
 
 
 class LineWriter:
-    """Makes lines, without their ends."""
+    """Makes the lines of a record, without newlines."""
 
     def __init__(self) -> None:
         self._encoder = Encoder(is_exact=True)
         self._ways: dict[tuple[str, Hashable], bytes] = {}
 
     def task(self, task: Task) -> str:
-        """Return the line of a task of an earlier run."""
+        """Return the line of a restored task."""
         return dumps(["task", self._encoder.row(task, offset=0.0)])
 
     def taken(self, item: Input | None, *, now: float) -> str:
-        """Return the line of an input, or (None) of a deadline. Unwritable: a peer of no link."""
+        """Return the line of an input, or (None) of a deadline; raise Unwritable for a peer."""
         return dumps(_input_to_json(item, now))
 
     def given(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> str:
-        """Return the line of what the engine gave in one turn."""
+        """Return the line of the engine's output of one turn."""
         rows = [[type(event).__name__, *self._encoder.row(event, offset=0.0)] for event in events]
         return dumps(["out", now, len(packets), self._digest(packets), rows])
 
@@ -106,7 +106,7 @@ class LineWriter:
 def input_of(line: Sequence[Any]) -> Input | None:
     """Return the input of a line, None for a deadline.
 
-    KeyError, TypeError, ValueError: it is none.
+    Raise KeyError, TypeError or ValueError if the line is no input.
     """
     kind, _, *values = line
     match kind:
@@ -140,7 +140,7 @@ def input_of(line: Sequence[Any]) -> Input | None:
 
 
 def described(row: Sequence[Any]) -> str:
-    """Return an event's row in words, with the names of its places."""
+    """Return an event's row as text, with the names of its fields."""
     name, *values = row
     return f"{name}({', '.join(f'{p}={v!r}' for p, v in zip(ROWS[name], values, strict=True))})"
 
@@ -204,7 +204,7 @@ def _packets_of(link: str, datagrams: Sequence[Any], waited: Sequence[float] = (
 
 
 def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool) -> Key:
-    """Return a key without its secret, which no record holds; MISSING stands for it."""
+    """Return a key with MISSING for its secret, or no secret if the key is revoked."""
     return Key(name, MISSING if is_in_use else b"", role, fingerprint)
 
 
@@ -216,11 +216,11 @@ def _peer_to_json(peer: Hashable) -> Hashable:
     parts = peer if isinstance(peer, tuple) else (peer,)
     if not all(type(part) in (str, int) for part in parts):
         raise Unwritable(f"a peer of another kind than links have: {peer!r}")
-    return peer  # JSON makes an array of a tuple
+    return peer  # JSON writes a tuple as an array
 
 
 def peer_of(value: Any) -> Hashable:
-    """Return the peer that a line names."""
+    """Return a peer from its JSON value."""
     if isinstance(value, list):
         return tuple(map(_plain, value))
     return _plain(value)

@@ -1,4 +1,4 @@
-"""Feeds a record through a fresh engine, and says whether it decides the same, bit for bit."""
+"""Feeds a record to a fresh engine, and compares the outputs bit for bit."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +16,12 @@ from mav_tasks.recording.reading import NOT_OURS, Entry, Record
 from mav_tasks.recording.record_lines import MISSING, LineWriter, described, dumps, input_of
 from mav_tasks.tasks.events import Event
 
-MOST_NAMES = 12  # of packets, in words
+MOST_NAMES = 12  # of packets, in a text
 
 
 @dataclass(frozen=True, slots=True)
 class Happened:
-    """An event at its time; ``utc`` is seconds since 1970, None while nobody had told the time."""
+    """An event with its time; ``utc`` is seconds since 1970, None before the first WallClock."""
 
     now: float
     utc: float | None
@@ -30,7 +30,7 @@ class Happened:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first thing that came otherwise, in words; ``line`` is that of the input it followed."""
+    """The first difference, as text; ``line`` is the line of the last input before it."""
 
     line: int
     kind: str
@@ -40,29 +40,29 @@ class Difference:
 
 
 class Replay:
-    """One run of an engine on a record. What it counts and finds is complete after ``events``."""
+    """One run of an engine on a record. Its results are complete after ``events`` is exhausted."""
 
     def __init__(self, record: Record, *, secrets: Mapping[str, bytes] | None = None) -> None:
-        """``secrets`` of keys by fingerprint: a record has none."""
+        """``secrets``: of the keys, by fingerprint; the record has none."""
         self._record = record
         self._secrets = secrets or {}
         self._lines = LineWriter()
         self._utc_offset: float | None = None
-        self._last: Entry | None = None  # the input before
+        self._last: Entry | None = None  # the last input
         self.inputs = 0
         self.packets = 0
         self.event_count = 0
         self.difference: Difference | None = None
-        #: the engine failed at the very last input, as it seems to have done in the run
+        #: the engine's error at the record's last input, as probably in the run; "": none
         self.failure = ""
 
     def __repr__(self) -> str:
         return f"Replay({self._record.path}, {self.inputs} inputs, {self.difference})"
 
     def events(self) -> Iterator[Happened]:
-        """Replay, and give each event that comes as it is recorded, up to the first difference.
+        """Replay the record; yield each event that is as recorded, until the first difference.
 
-        RecordError: a line cannot be understood.
+        Raise RecordError if a line cannot be parsed, or a key's secret is missing.
         """
         record = self._record
         engine = Engine(record.settings, now=record.now, restored=record.restored)
@@ -97,7 +97,7 @@ class Replay:
                 engine.handle_deadline(now=entry.now)
             else:
                 engine.handle(item, now=entry.now)
-        except Exception as mistake:  # noqa: BLE001 - the engine's own, which a record may be about
+        except Exception as mistake:  # noqa: BLE001 - a bug of the engine, which the record may show
             self.failure = f"{type(mistake).__name__}: {mistake}"
 
     def _whole(self, key: Key) -> Key:
@@ -123,7 +123,7 @@ class Replay:
             yield Happened(entry.now, utc, event)
 
     def _look_for_more(self, engine: Engine) -> None:
-        """At the end of a whole run nothing is left."""
+        """Report output of the engine after the end of a complete record."""
         packets, events = engine.take_packets(), engine.take_events()
         if packets or events:
             self._differs("nothing more", _in_words(packets, [str(event) for event in events]))

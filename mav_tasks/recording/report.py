@@ -1,4 +1,4 @@
-"""What ``mav-tasks replay`` prints: each event with its time, then the verdict."""
+"""The output of ``mav-tasks replay``: each event with its time, then the verdict."""
 
 import json
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from mav_tasks.recording.replay import Difference, Happened, Replay
 
 
 class Report:
-    """Lines of text, or of JSON."""
+    """Writes a replay's results as lines of text or JSON."""
 
     def __init__(self, out: TextIO, *, as_json: bool, quiet: bool) -> None:
         self._out = out
@@ -21,7 +21,7 @@ class Report:
         self._quiet = quiet
 
     def begin(self, record: Record) -> None:
-        """Say what the record has that may explain a difference."""
+        """Print the record's version if it differs from ours, which may explain a difference."""
         here = project_version()
         if record.version != here and not self._as_json:
             self._say(f"recorded by version {record.version}; this is {here}")
@@ -88,7 +88,7 @@ def _time(happened: Happened) -> str:
 
 
 def _as_logged(happened: Happened) -> dict[str, Any]:
-    """Return an event as the log and the journal have it; the time None where it is not known."""
+    """Return an event in the JSON form of log and journal; time None if UTC is unknown."""
     if happened.utc is None:
         return event_values(happened.event, offset=0.0) | {"time": None}
     return event_values(happened.event, offset=happened.utc - happened.now)

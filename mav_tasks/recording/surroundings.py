@@ -1,6 +1,6 @@
-"""Settings and what a store gave back, as values for JSON and back, exactly.
+"""Converts settings and restored state to JSON values and back, exactly.
 
-Tasks are rows of their own (``record_lines``): there may be a hundred thousand.
+Tasks have their own lines (``record_lines``): there may be a hundred thousand.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from mav_tasks.tasks.task import Frame, Task
 
 
 def settings_to_json(settings: Any) -> Any:
-    """Return settings, or a part of them, by name."""
+    """Return the JSON values of settings, or of a part of them, by name."""
     if is_dataclass(settings):
         return {
             field.name: settings_to_json(getattr(settings, field.name))
@@ -28,7 +28,7 @@ def settings_to_json(settings: Any) -> Any:
 
 
 def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
-    """Return settings back; one that is missing has its default. ValueError: one is unknown."""
+    """Return settings from JSON values, defaults if missing; raise ValueError if unknown."""
     hints = get_type_hints(kind)
     unknown = sorted(set(values) - set(hints))
     if unknown:
@@ -46,7 +46,7 @@ def _setting_of(value: Any, hint: Any) -> Any:
 
 
 def restored_to_json(restored: Restored) -> dict[str, Any]:
-    """Return all but the tasks, of which there is their number; mappings in their order."""
+    """Return the JSON values of a Restored, with only the number of tasks; keep mappings' order."""
     return {
         "tasks": len(restored.tasks),
         "next_id": restored.next_id,
@@ -71,7 +71,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
 
 
 def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
-    """Return it back. KeyError, TypeError or ValueError: there is something else."""
+    """Return a Restored from JSON values; raise KeyError, TypeError or ValueError for others."""
     return Restored(
         tasks=tasks,
         next_id=values["next_id"],

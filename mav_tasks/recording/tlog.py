@@ -1,6 +1,6 @@
-"""A telemetry log that any ground station opens: before each packet its time, 8 bytes big-endian.
+"""Writes telemetry logs (tlog) for ground stations: each packet after its time, 8 bytes big-endian.
 
-What cannot be written is counted and lost: nobody waits for it.
+Packets that cannot be written are dropped and counted; the server never waits for a log.
 """
 
 import time
@@ -25,8 +25,8 @@ from mav_tasks.recording.tlog_files import TlogFiles
 from mav_tasks.recording.writing import WritingThread
 from mav_tasks.tasks.events import Event
 
-RETRY = 1.0  # s, until a disk that failed is tried again
-AT_ONCE = 1_000  # packets, written before more are looked at
+RETRY = 1.0  # s after a disk failure, until the next attempt
+AT_ONCE = 1_000  # packets collected for one write
 
 Entry = tuple[float, Input | Sequence[Outgoing]]
 
@@ -44,7 +44,7 @@ class Tlog:
         most_waiting: int = MOST,
         write: Callable[[int, bytes], None] = write_all,
     ) -> None:
-        """``size`` in bytes of one file, ``count`` of files; ``component_id`` is the server's."""
+        """``size``: of one file, bytes. ``count``: of files. ``component_id``: the server's."""
         self._name = f"telemetry log in {folder}"
         self._backlog: Backlog[Entry] = Backlog(most_waiting)
         self._content = TlogContent(component_id=component_id)
@@ -62,7 +62,7 @@ class Tlog:
         return self._name
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """Note what came, and who is there."""
+        """Queue received packets, and changes of links, peers and the wall clock."""
         if isinstance(item, Packets):
             if not self._backlog.put((now, item), room_of(item)):
                 self._too_many.lose(len(item.datagrams), "too much waits to be written")
@@ -79,12 +79,12 @@ class Tlog:
         *,
         now: float,
     ) -> None:
-        """Note what is sent; events have no place in a telemetry log."""
+        """Queue sent packets; a telemetry log has no events."""
         if packets and not self._backlog.put((now, packets), ROOM_OF_PACKET * len(packets)):
             self._too_many.lose(len(packets), "too much waits to be written")
 
     def close(self) -> None:
-        """Write what waits, for a bounded time."""
+        """Write the waiting packets; wait a bounded time for that."""
         self._thread.close()
 
     def _write(self) -> None:
@@ -105,7 +105,7 @@ class Tlog:
             self._too_many.over()
 
     def _keep(self, packets: Sequence[bytes], *, utc: float) -> bool:
-        """Write packets, or lose them."""
+        """Write packets, or drop and count them; return whether all were written."""
         why = "the disk takes nothing"
         kept = self._files.kept
         if time.monotonic() >= self._retry_at:

@@ -1,8 +1,7 @@
-"""Which packets stand in a telemetry log: every packet once, as far as that can be told.
+"""Selects the packets of a telemetry log: every packet once, as far as possible.
 
-What is received is there, of vehicles and of clients, and what is sent to vehicles. Of what is sent
-to clients there is only what the server says itself: the telemetry that it passes on is there
-already as it came.
+The log has all packets received from vehicles and clients, and all packets sent to vehicles. Of the
+packets sent to clients it has only the server's own: forwarded telemetry was logged when received.
 """
 
 import struct
@@ -27,24 +26,24 @@ _stamped = struct.Struct(">Q").pack  # microseconds since 1970
 
 
 class TlogContent:
-    """Makes of what the engine takes and gives the packets of the log, each with its time."""
+    """Converts the engine's inputs and outputs to log entries: packets with their times."""
 
     def __init__(self, *, component_id: int) -> None:
-        """``component_id`` is the server's."""
+        """``component_id``: the server's."""
         self._component_id = component_id
         self._intake = PacketReader()
-        self._counts = DecodeCounts()  # kept for nobody: the engine has its own
+        self._counts = DecodeCounts()  # unused: the engine counts for itself
         self._vehicle_links: set[str] = set()
         self._wall_offset = 0.0
         self._now = 0.0
-        self._heard: set[bytes] = set()  # what vehicles said at ``_now``, without its number
+        self._heard: set[bytes] = set()  # vehicles' packets at ``_now``, as of ``_words``
 
     def utc(self, now: float) -> float:
         """Return the wall clock's time, seconds since 1970."""
         return now + self._wall_offset
 
     def of_input(self, item: Input, *, now: float) -> Iterator[bytes]:
-        """Yield what an input adds to the log."""
+        """Yield the log entries of an input."""
         match item:
             case Packets():
                 yield from self._received(item, now=now)
@@ -58,7 +57,7 @@ class TlogContent:
                 self._intake.change_peer(item)
 
     def of_output(self, packets: Sequence[Outgoing], *, now: float) -> Iterator[bytes]:
-        """Yield what stands in the log of the packets of one turn."""
+        """Yield the log entries of the packets sent in one turn."""
         when = self._when(now)
         told: dict[bytes, tuple[str, Peer]] = {}
         for link, peer, data, *_ in packets:
@@ -80,10 +79,10 @@ class TlogContent:
     def _is_news(
         self, data: bytes, to: tuple[str, Peer], told: dict[bytes, tuple[str, Peer]]
     ) -> bool:
-        """Whether a packet to a client is the server's own, and no copy of what another got.
+        """Whether a packet to a client is the server's own, and no copy of one to another client.
 
-        Some is said in the name of the autopilot, as answers are; but heartbeats in its name are
-        always passed on, now and then changed, or shown again to who has just come.
+        The server sends some packets, such as answers, as the autopilot. A heartbeat as the
+        autopilot is always forwarded: sometimes changed, or repeated for a new client.
         """
         component_id, message_id = _head(data)
         words = _words(data)
@@ -98,14 +97,14 @@ class TlogContent:
 
 
 def _head(raw: bytes) -> tuple[int, int]:
-    """Return who of its system sent a packet, and the message's id."""
+    """Return a packet's component id and message id."""
     if raw[0] == MAGIC_V2:
         return raw[6], raw[7] | raw[8] << 8 | raw[9] << 16
     return raw[4], raw[5]
 
 
 def _words(raw: bytes) -> bytes:
-    """Return a packet's source, message id and payload: all that passing it on leaves as it is."""
+    """Return a packet's source, message id and payload: the parts that forwarding never changes."""
     if raw[0] == MAGIC_V2:
         return raw[5 : HEADER_V2 + raw[1]]
     return raw[3 : HEADER_V1 + raw[1]]

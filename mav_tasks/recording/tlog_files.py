@@ -1,4 +1,4 @@
-"""The files of a telemetry log: one after the other, each of a bounded size, the last few kept."""
+"""The rotating files of a telemetry log: bounded in size and number."""
 
 import os
 import re
@@ -15,7 +15,7 @@ CHUNK = 1 << 16  # bytes written at once
 
 
 class TlogFiles:
-    """Written by one thread. OSError leaves ``write``; what was kept before that is whole."""
+    """A log's files, written by one thread. After an OSError of ``write`` they stay readable."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class TlogFiles:
         self._size = size
         self._count = count
         self._write_all = write
-        self._start = ""  # of the run, as names have it
+        self._start = ""  # start time of the run, in file names
         self._number = -1
         self._fd: int | None = None
         self._path = folder
@@ -40,7 +40,7 @@ class TlogFiles:
         return f"TlogFiles({self._path}, {self._written} bytes, {self.kept} packets)"
 
     def write(self, packets: Sequence[bytes], *, utc: float) -> None:
-        """Write packets, each with its time before it; ``utc`` names the first file."""
+        """Write packets that begin with their times; the first file is named by ``utc``."""
         chunk: list[bytes] = []
         length = 0
         for packet in packets:
@@ -54,7 +54,7 @@ class TlogFiles:
             self._keep(chunk, utc=utc)
 
     def close(self) -> None:
-        """Close the file; nothing is kept after that."""
+        """Close the file; call it last."""
         if self._fd is not None:
             os.close(self._fd)
             self._fd = None
@@ -76,7 +76,7 @@ class TlogFiles:
     def _begin(self, utc: float) -> None:
         self.close()
         self._start = self._start or stamp(utc)
-        make_private(self._folder)  # may be gone meanwhile
+        make_private(self._folder)  # it may have been removed
         self._fd, self._path, self._number = new_file(
             self._folder, self._start, self._number + 1, SUFFIX
         )
@@ -84,19 +84,19 @@ class TlogFiles:
         self._forget_oldest()
 
     def _is_removed(self, fd: int) -> bool:
-        """Whether nobody can find the file any more: somebody made room, or another server did."""
+        """Whether the file was removed, by a user or by another server."""
         return os.fstat(fd).st_nlink == 0
 
     def _cut_back(self, fd: int) -> None:
-        """Leave no torn packet behind: readers lose their way in it."""
+        """Remove a partly written packet: readers would lose synchronization."""
         try:
             os.ftruncate(fd, self._written)
             os.lseek(fd, self._written, os.SEEK_SET)
-        except OSError:  # then what comes next stands in another file
+        except OSError:  # then the next packets go to a new file
             self.close()
 
     def _forget_oldest(self) -> None:
-        """Remove what is too much of what bears names such as ours, and nothing else."""
+        """Delete the oldest files above the limit, only those with names of our form."""
         found = [
             ((match[1], int(match[2] or 0)), path)
             for path in self._folder.iterdir()
@@ -106,5 +106,5 @@ class TlogFiles:
             and not path.is_symlink()
         ]
         for _, path in sorted(found)[: max(0, len(found) + 1 - self._count)]:
-            with suppress(OSError):  # it is tried again with the next file
+            with suppress(OSError):  # the next file tries again
                 path.unlink()

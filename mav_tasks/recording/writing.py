@@ -1,4 +1,4 @@
-"""The thread that writes a record, so that the disk can be as slow as it likes."""
+"""The thread that writes a record, so that a slow disk never blocks the loop."""
 
 import logging
 from collections.abc import Callable
@@ -6,12 +6,12 @@ from threading import Event, Thread
 
 log = logging.getLogger("mav_tasks")
 
-PERIOD = 0.1  # s, between two looks at what there is to write
-END_LIMIT = 2.0  # s, that the end of the server waits for what is still to be written
+PERIOD = 0.1  # s between two calls of ``write``
+END_LIMIT = 2.0  # s, maximum wait for the last writes at shutdown
 
 
 class WritingThread:
-    """Calls ``write`` again and again, and ``end`` at the end; both own what they write to."""
+    """Calls ``write`` every PERIOD, and ``end`` at the end, in its own thread."""
 
     def __init__(self, name: str, *, write: Callable[[], None], end: Callable[[], None]) -> None:
         self._name = name
@@ -24,11 +24,11 @@ class WritingThread:
         return f"WritingThread({self._name}, alive={self._thread.is_alive()})"
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Write what is left, for a bounded time."""
+        """Write the rest and end; wait at most END_LIMIT."""
         self._is_closing.set()
         self._thread.join(END_LIMIT)
         if self._thread.is_alive():
@@ -40,5 +40,5 @@ class WritingThread:
                 self._write()
             self._write()
             self._end()
-        except Exception:  # whatever our own mistake is, no rover stands still for a record
+        except Exception:  # a bug in a recorder must not stop a rover
             log.exception("%s: internal error: nothing more is written", self._name)

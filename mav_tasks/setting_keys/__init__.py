@@ -1,4 +1,4 @@
-"""The keys of all settings: names, meanings, ranges. Configuration and parameters read them here.
+"""The keys of all settings: names, meanings, ranges; for configuration and MAVLink parameters.
 
-Pure data and what follows from it; ``shapes`` has what values there are, ``table`` the keys.
+Pure. ``shapes`` has the kinds of values, ``table`` the keys.
 """

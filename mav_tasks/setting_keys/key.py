@@ -11,10 +11,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A setting by its name in the file, such as ``driving.speed``.
+    """A setting with its name in the file, such as ``driving.speed``.
 
-    ``path`` is where ServerSettings has it, such as ``engine.driving.speed``. ``at_most`` names
-    another key whose value bounds this one's. What is not ``is_live`` needs a restart to change.
+    ``path`` is its place in ServerSettings, such as ``engine.driving.speed``. ``at_most`` names
+    another key whose value is this one's upper bound. A key that is not ``is_live`` needs a restart
+    to change.
     """
 
     name: str
@@ -25,27 +26,27 @@ class Key:
     at_most: str = ""
 
     def of(self, settings: ServerSettings) -> Any:
-        """Return what settings keep."""
+        """Return the value in the settings' form."""
         return value_at(settings, self.path)
 
     def plain_of(self, settings: ServerSettings) -> object:
-        """Return the same as people write it."""
+        """Return the value in the form that people write."""
         return self.shape.plain(self.of(settings))
 
     def put(self, settings: ServerSettings, kept: object) -> ServerSettings:
-        """Return settings that keep another value."""
+        """Return a copy of the settings with another value."""
         return with_value_at(settings, self.path, kept)
 
 
 def value_at(settings: object, path: str) -> Any:
-    """Return a value by the names of its fields, with dots between them."""
+    """Return the value at a dotted path of field names."""
     for name in path.split("."):
         settings = getattr(settings, name)
     return settings
 
 
 def with_value_at(settings: T, path: str, kept: object) -> T:
-    """Return settings with another value there."""
+    """Return a copy of the settings with another value at a dotted path."""
     name, _, rest = path.partition(".")
     if rest:
         kept = with_value_at(getattr(settings, name), rest, kept)

@@ -1,4 +1,4 @@
-"""Plain values written as TOML has them. Pure."""
+"""Formats plain values as TOML. Pure."""
 
 from math import isfinite
 
@@ -9,7 +9,7 @@ def in_digits(value: float) -> str:
 
 
 def literal(plain: object) -> str:
-    """Return a plain value as TOML has it."""
+    """Return a plain value as TOML."""
     match plain:
         case bool():
             return "true" if plain else "false"

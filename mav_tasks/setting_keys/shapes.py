@@ -1,8 +1,8 @@
-"""What values a setting can have. Pure.
+"""The kinds of values of settings, with validation and conversion. Pure.
 
-A value is *plain* as people and TOML write it (degrees, days, lists), and *kept* as the settings
-have it (radians, seconds, tuples). SettingError says what is wrong with a plain one, not of which
-setting: its caller knows.
+A *plain* value is as people and TOML write it (degrees, days, lists); a *kept* value is as the
+settings have it (radians, seconds, tuples). A SettingError does not name the setting: the caller
+knows it.
 """
 
 import re
@@ -13,14 +13,14 @@ from typing import Any, Protocol
 from mav_tasks.errors import SettingError
 from mav_tasks.setting_keys.literals import in_digits, literal
 
-#: MAVLink address, perhaps with an endpoint: as ``Submitter`` writes itself
+#: MAVLink address with an optional endpoint, as in ``str(Submitter)``
 CLIENT = re.compile(r"(\d{1,3})/(\d{1,3})(@[^\s@=,]+)?")
 HIGHEST_PRIORITY = 10
 HIGHEST_ID = 255
 
 
 class Shape(Protocol):
-    """One kind of values."""
+    """A kind of values."""
 
     @property
     def unit(self) -> str:
@@ -28,23 +28,23 @@ class Shape(Protocol):
 
     @property
     def valid(self) -> str:
-        """Which plain values there are, in words."""
+        """The valid plain values, as text."""
 
     def kept(self, plain: object) -> Any:
-        """Return what the settings keep of a plain value; SettingError."""
+        """Return the kept value of a plain value; raise SettingError if it is invalid."""
 
     def plain(self, kept: Any) -> object:
-        """Return the plain value of what the settings keep."""
+        """Return the plain value of a kept value."""
 
     def read(self, text: str) -> object:
-        """Return the plain value that a text means; SettingError."""
+        """Return the plain value of a text; raise SettingError if it cannot be parsed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number from ``low`` to ``high``; ``scale`` times that is kept.
+    """A number from ``low`` to ``high``; the kept value is multiplied by ``scale``.
 
-    ``none`` is a word that means that there is no limit, kept as None.
+    ``none`` is a word for "no limit", kept as None.
     """
 
     low: float
@@ -56,19 +56,19 @@ class Number:
 
     @property
     def valid(self) -> str:
-        """Its range."""
+        """The range."""
         words = f"{in_digits(self.low)}..{in_digits(self.high)}"
         words += f" {self.unit}" if self.unit else ""
         words += ", whole" if self.is_whole else ""
         return words + (f', or "{self.none}"' if self.none else "")
 
     def kept(self, plain: object) -> float | None:
-        """Return it in the unit of the settings."""
+        """Return the number in the unit of the settings."""
         if self.none and plain == self.none:
             return None
         if isinstance(plain, bool) or not isinstance(plain, int | float):
             raise SettingError(f"not a number: {self.valid}")
-        if not self.low <= plain <= self.high:  # NaN is neither
+        if not self.low <= plain <= self.high:  # also refuses NaN
             raise SettingError(f"not in {self.valid}")
         if not self.is_whole:
             return float(plain) * self.scale
@@ -77,13 +77,13 @@ class Number:
         return int(plain)
 
     def plain(self, kept: float | None) -> object:
-        """Return the number that was written: 40 degrees, not 39.99999999."""
+        """Return the number as it was written: 40 degrees, not 39.99999999."""
         if kept is None:
             return self.none
         return kept if self.is_whole else float(f"{kept / self.scale:.12g}")
 
     def read(self, text: str) -> object:
-        """Read a number, or the word for none."""
+        """Parse a number, or the word for "no limit"."""
         if self.none and text == self.none:
             return text
         try:
@@ -98,7 +98,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of some words."""
+    """One of several words."""
 
     words: tuple[str, ...]
     unit: str = ""
@@ -109,7 +109,7 @@ class Choice:
         return " | ".join(f'"{word}"' for word in self.words)
 
     def kept(self, plain: object) -> str:
-        """Return the word."""
+        """Return the word; raise SettingError for another one."""
         if plain not in self.words:
             raise SettingError(f"expected one of {', '.join(self.words)}")
         return str(plain)
@@ -125,29 +125,29 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """Yes or no."""
+    """A boolean."""
 
     unit: str = ""
     valid: str = "true | false"
 
     def kept(self, plain: object) -> bool:
-        """Return it, if it is one."""
+        """Return the boolean; raise SettingError for another type."""
         if not isinstance(plain, bool):
             raise SettingError("expected true or false")
         return plain
 
     def plain(self, kept: bool) -> object:
-        """Return it as it is."""
+        """Return the boolean."""
         return kept
 
     def read(self, text: str) -> object:
-        """Read "true" or "false", in any case."""
+        """Parse "true" or "false", in any case; return other texts for ``kept`` to refuse."""
         return {"true": True, "false": False}.get(text.lower(), text)
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text, of which ``valid`` says what it is to be; an empty one has a meaning, too."""
+    """A text; ``valid`` describes it. An empty text is valid."""
 
     valid: str
     unit: str = ""
@@ -169,15 +169,15 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Texts:
-    """Texts in an order; as one text they stand with commas between them."""
+    """A list of texts; ``read`` takes them separated by commas."""
 
     valid: str
-    least: int = 0  # how many there are
-    words: tuple[str, ...] = ()  # the only ones there are, if not all
+    least: int = 0  # minimum number of texts
+    words: tuple[str, ...] = ()  # the allowed texts; (): any
     unit: str = ""
 
     def kept(self, plain: object) -> tuple[str, ...]:
-        """Return them as a tuple."""
+        """Return the texts as a tuple."""
         if not isinstance(plain, list) or not all(isinstance(each, str) for each in plain):
             raise SettingError(f"not a list of texts: {self.valid}")
         if len(plain) < self.least:
@@ -188,17 +188,17 @@ class Texts:
         return tuple(plain)
 
     def plain(self, kept: tuple[str, ...]) -> object:
-        """Return them as a list."""
+        """Return the texts as a list."""
         return list(kept)
 
     def read(self, text: str) -> object:
-        """Split at commas; nothing at all is an empty list."""
+        """Split a text at commas; an empty text is an empty list."""
         return [each.strip() for each in text.split(",")] if text.strip() else []
 
 
 @dataclass(frozen=True, slots=True)
 class ByClient:
-    """A value for each of some clients; as one text ``255/190=7,245/190=3``."""
+    """A value for each named client; ``read`` takes ``255/190=7,245/190=3``."""
 
     each: Shape
     example: object
@@ -206,13 +206,13 @@ class ByClient:
 
     @property
     def valid(self) -> str:
-        """An example, and what each may be."""
+        """An example, and the valid values of each client."""
         value = literal(self.example)
         clients = f'{{ "255/190" = {value}, "255/190@127.0.0.1:14550" = {value} }}'
         return f"{clients}, each {self.each.valid}"
 
     def kept(self, plain: object) -> Mapping[str, Any]:
-        """Return them by client."""
+        """Return the kept values by client."""
         if not isinstance(plain, dict):
             raise SettingError(f"not a table: {self.valid}")
         kept = {}
@@ -227,11 +227,11 @@ class ByClient:
         return kept
 
     def plain(self, kept: Mapping[str, Any]) -> object:
-        """Return them as a table."""
+        """Return the plain values as a table."""
         return {client: self.each.plain(value) for client, value in kept.items()}
 
     def read(self, text: str) -> object:
-        """Split at commas, and each at its last equals sign."""
+        """Split a text at commas, and each part at its last equals sign."""
         values: dict[str, object] = {}
         for each in text.split(",") if text.strip() else ():
             client, _, value = each.strip().rpartition("=")

@@ -1,4 +1,4 @@
-"""All keys of the configuration, in the order of its sample. Ranges stand here and nowhere else."""
+"""All keys of the configuration, in the order of the sample file. Only this file has ranges."""
 
 from collections.abc import Mapping
 from math import pi
@@ -24,7 +24,7 @@ DAY = 86_400.0  # s
 FOREVER = "forever"
 URL = "link URLs: udpin:host:port, udpout:, tcpin: and tcp: alike, serial:device:baud"
 
-#: where ServerSettings keeps the keys of each table
+#: table of the file -> path prefix in ServerSettings
 PLACES: Mapping[str, str] = {
     "links": "links.",
     "store": "",
@@ -324,7 +324,7 @@ _CLIENTS = (
         "priority of a client's standard commands, by its address; of others 5",
     ),
 )
-# Each range ends where a rover would not be safe any more, whatever the other settings say.
+# Within these ranges a rover is safe, whatever the other settings are.
 _WATCH = (
     _key(
         "watch.setpoint_period",
@@ -335,14 +335,14 @@ _WATCH = (
     ),
     _key(
         "watch.motion_fresh",
-        _seconds(0.1, 1),  # it drives blind for so long
+        _seconds(0.1, 1),  # the rover drives blind for this long
         "no motion on data older than this",
         at_most="watch.position_lost",
     ),
     _key("watch.position_lost", _seconds(0.2, 10), "position data older than this pauses a task"),
-    # only heartbeats show that it is armed, and in our mode
+    # only heartbeats show that the rover is armed and in our mode
     _key("watch.heartbeat_lost", _seconds(1.5, 10), "a rover silent for longer is lost"),
-    # PX4 leaves its mode after 1 s, and drives on by itself when setpoints come again
+    # PX4 leaves OFFBOARD after 1 s without setpoints, and drives on by itself when they come again
     _key("watch.late_tick", _seconds(0.1, 0.9), "a setpoint later than this holds the task"),
     _key(
         "watch.start_timeout",
@@ -397,7 +397,7 @@ _WATCH = (
         _seconds(1, 60),
         "a cancelled task whose rover is not seen to stand by then is held",
     ),
-    # one that is driven slower than this looks as if it stood, and its stop is believed too soon
+    # a rover driven slower than this seems to stand, and its stop would be confirmed too soon
     _key("watch.still_speed", Number(0.001, 0.1, "m/s"), "a rover slower than this stands"),
     _key(
         "watch.still_turn_rate_deg",
@@ -405,7 +405,7 @@ _WATCH = (
         "the same for turning",
         field="still_turn_rate",
     ),
-    # of 10 Hz telemetry two messages at the least: one that reverses is slow for a moment
+    # at least two messages of 10 Hz telemetry: a rover that reverses is slow for a moment
     _key("watch.still_time", _seconds(0.2, 5), "below both for so long: it stands still"),
 )
 _IDENTITY = (
@@ -417,7 +417,7 @@ _IDENTITY = (
     ),
     _key(
         "identity.component_id",
-        Number(2, 252, is_whole=True),  # 1 is the autopilot; the three after it may be taken, too
+        Number(2, 252, is_whole=True),  # 1 is the autopilot; the server may use 3 more ids
         "MAVLink component of the server, also inside each rover's system",
         live=False,
     ),
@@ -471,12 +471,12 @@ KEYS: Mapping[str, Key] = {
     )
     for key in group
 }
-#: each key that another one bounds, with that other
+#: pairs of a key and the key that bounds it
 BOUNDED = tuple((key, KEYS[key.at_most]) for key in KEYS.values() if key.at_most)
 
 
 def check_bounds(settings: ServerSettings, key: Key, bound: Key) -> None:
-    """Raise SettingError if a value is more than the one that bounds it."""
+    """Raise SettingError if a key's value exceeds the value of its bound."""
     if key.of(settings) > bound.of(settings):
         value, most = (in_digits(float(str(k.plain_of(settings)))) for k in (key, bound))
         raise SettingError(f"{value} is more than {bound.name}, {most} {bound.shape.unit}")

@@ -1,4 +1,4 @@
-"""The durable journal. ``mav_tasks.store.sqlite`` is imported by whoever needs a disk."""
+"""The durable journal of events. Import ``mav_tasks.store.sqlite`` for the store on disk."""
 
 from mav_tasks.store.base import HaltNotKept, Kept, NotKept, Outcome, Store
 from mav_tasks.store.memory import MemoryStore

@@ -1,6 +1,6 @@
-"""What the runner needs of a journal: it keeps events in their order and says how far it is.
+"""The store interface: makes events durable in order, and reports up to which number.
 
-Events are numbered from 1 in the order in which they were appended, anew in each life of a process.
+Events are numbered in the order of ``append``; the count begins at 1 in each process.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class NotKept:
-    """Events could not be made durable; the store goes on trying. ``text`` says what is wrong."""
+    """Events could not be made durable; the store keeps trying. ``text`` tells the reason."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class HaltNotKept:
-    """A halt of a vehicle is kept nowhere so far, and a restart would lose it."""
+    """A halt of a vehicle is not stored anywhere yet; a restart would lose it."""
 
     vehicle: int
     text: str
@@ -36,20 +36,20 @@ Outcome = Kept | NotKept | HaltNotKept
 
 
 class Store(Protocol):
-    """The seam between the runner and the disk. What the disk does never raises here."""
+    """The interface between runner and disk. Disk failures are outcomes, never exceptions."""
 
     def append(self, events: Sequence[Event]) -> None:
-        """Take events to be made durable, in order; returns at once."""
+        """Queue events to be made durable, in order; return at once."""
         ...
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return what became of them since the last call; returns at once."""
+        """Return the outcomes since the last call, at once."""
         ...
 
     def fileno(self) -> int | None:
-        """Return a descriptor that is readable while there are outcomes; None: there is none."""
+        """Return a descriptor that is readable while there are outcomes, or None."""
         ...
 
     def close(self) -> None:
-        """Finish what is under way and let go."""
+        """Finish pending writes and close the store."""
         ...

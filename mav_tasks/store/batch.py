@@ -1,4 +1,4 @@
-"""Events as the rows that one transaction writes. Pure: rows are made once, however often tried."""
+"""Events as the rows of one transaction. Pure: rows are made once, and reused for each retry."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -29,8 +29,8 @@ from mav_tasks.tasks.task import following
 class Batch:
     """Rows of events, numbered from ``first`` over the life of the file.
 
-    A submission makes a row of a task and none of the journal; a task that changes twice is
-    written once.
+    A submission becomes a row of ``tasks``, and none of ``journal``. Of several changes of one task
+    only the last updates its row in ``tasks``.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Batch:
     ) -> None:
         self.first = first
         self.last = first + len(events) - 1
-        self.next_id: int | None = None  # the one after the last task's, None if there is none
+        self.next_id: int | None = None  # after the last submitted task; None: no submission
         self.tasks: list[tuple[Any, ...]] = []  # id, number, vehicle, state, changed_at, submitted
         self.journal: list[tuple[Any, ...]] = []  # number, utc, kind, task_id, vehicle, body
         self.changed: dict[int, tuple[Any, ...]] = {}  # state, changed_at, changed, id
@@ -61,7 +61,7 @@ class Batch:
             if isinstance(event, SignaturesSeen):
                 self._note_signatures(event)
                 continue
-            if isinstance(event, TaskProgressed):  # read back as any other progress
+            if isinstance(event, TaskProgressed):  # stored as a TaskAdvanced in the task's row only
                 kept = TaskAdvanced(
                     event.task_id, event.vehicle, event.version, event.progress, event.at
                 )
@@ -108,7 +108,7 @@ class Batch:
                 self.vehicles["paused", event.vehicle] = None
             case VehicleHalted():
                 self.vehicles["halt_epoch", event.vehicle] = event.epoch
-                if event.reason is not TaskReason.RESTARTED:  # which is nobody's word
+                if event.reason is not TaskReason.RESTARTED:  # a restart is no request
                     self.vehicles["halt_reason", event.vehicle] = event.reason
                     self.vehicles["halted_utc", event.vehicle] = utc
             case VehicleIdentified():

@@ -1,13 +1,13 @@
-"""Frozen dataclasses ↔ rows of JSON values, led by their annotations: a new field needs nothing.
+"""Converts frozen dataclasses to rows of JSON values and back, driven by their annotations.
 
-A row is a flat list. What its places mean says a format, which is stored beside the rows: for each
-class the paths of its fields, those of a dataclass within it with a dot. Where there may be another
-class, or None, stands a row of its own; where there may be several classes, their name comes first.
-Reading a row of an older format, a missing field takes its default and an unknown one is passed
-over. (Names in every row would cost three times the size, and twice the time to write and read.)
+A row is a flat list. A format, stored beside the rows, tells the meaning of its columns: for each
+class the paths of its fields, dotted for a nested dataclass. An optional dataclass is a nested row;
+if several classes are possible, the class name is its first item. When a row of an older format is
+read, a missing field takes its default and an unknown one is skipped: a new field needs no
+migration. (Names in every row would cost three times the size, and twice the time.)
 
-Stored times are UTC seconds: a field named in MONOTONIC is moved by ``offset``, UTC minus monotonic
-seconds, on its way out, and back on its way in. NaN and infinity are refused.
+Stored times are UTC seconds: encoding adds ``offset``, UTC minus monotonic seconds, to the fields
+named in MONOTONIC, and decoding subtracts it. NaN and infinity are refused.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from typing import Any, NewType, Union, get_args, get_origin, get_type_hints
 
 __all__ = ["MONOTONIC", "Decoder", "Encoder", "Unreadable", "dumps", "format_of", "loads"]
 
-#: fields in monotonic seconds, wherever they are
+#: fields in monotonic seconds, in any class
 MONOTONIC = frozenset(
     {"at", "submitted_at", "changed_at", "start_at", "deadline", "booted_at", "heard_at"}
 )
@@ -30,26 +30,26 @@ Format = Mapping[str, tuple[str, ...]]
 #: value, offset -> value for JSON, or back
 Converter = Callable[[Any, float], Any]
 
-SAMPLE = 50  # values of a kind, by which to see whether many are equal
-MOST_SHARED = 10_000  # equal values of a kind, of which one is made for all
+SAMPLE = 50  # values of a class, to estimate whether many are equal
+MOST_SHARED = 10_000  # cached values of a class that equal rows share
 
 _PLAIN = frozenset({int, float, str, bool, NoneType})
 
-# Circles are looked for by an entry in a dict for each list: values have none.
+# The check for circular references costs a dict entry for each list; frozen values have none.
 _encoder = JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False)
 
 
 class Unreadable(ValueError):
-    """Stored text that this version cannot make a value of."""
+    """Stored text that this version cannot decode."""
 
 
 def dumps(value: object) -> str:
-    """Return compact JSON; ValueError for NaN and infinity."""
+    """Return compact JSON; raise ValueError for NaN and infinity."""
     return _encoder.encode(value)
 
 
 def format_of(*kinds: type) -> dict[str, tuple[str, ...]]:
-    """Return the format of dataclasses and their fields; TypeError if one cannot be stored."""
+    """Return the format of dataclasses and their fields; raise TypeError for other fields."""
     found: dict[str, tuple[str, ...]] = {}
     waiting = list(kinds)
     while waiting:
@@ -62,9 +62,9 @@ def format_of(*kinds: type) -> dict[str, tuple[str, ...]]:
 
 
 class Encoder:
-    """Makes rows of values of some kinds, in the order of ``format_of``.
+    """Converts dataclasses to rows, in the order of ``format_of``.
 
-    ``is_exact``: times are left as they are, bit for bit, and ``offset`` means nothing.
+    ``is_exact``: times are left unchanged, bit for bit, and ``offset`` is ignored.
     """
 
     def __init__(self, *, is_exact: bool = False) -> None:
@@ -115,10 +115,10 @@ class Encoder:
 
 
 class Decoder:
-    """Makes values of rows that were written in a format: many at once, column by column.
+    """Converts rows of one format to dataclasses: many at once, column by column.
 
-    ``is_exact`` as the Encoder was; then no value is shared by those that have an equal one, which
-    -0.0 and 0.0 are.
+    ``is_exact`` must be as in the Encoder. If set, equal rows do not share a value: -0.0 and 0.0
+    are equal, too.
     """
 
     def __init__(self, written: Format, *, is_exact: bool = False) -> None:
@@ -128,7 +128,7 @@ class Decoder:
         self._decoders: dict[type, _Decode] = {}
 
     def values(self, kind: type, rows: Sequence[list[Any]], *, offset: float) -> list[Any]:
-        """Return the values of rows. Unreadable if one cannot be understood."""
+        """Return the values of rows; raise Unreadable if one cannot be decoded."""
         if not rows:
             return []
         if not fields(kind):
@@ -164,7 +164,7 @@ class Decoder:
         return decode
 
     def _converter(self, path: str, hint: Any) -> "_Decode | None":
-        """Return what converts a column; None: it is as it is in JSON."""
+        """Return the converter of a column, or None if JSON values need no conversion."""
         if path.rpartition(".")[2] in self._moved:
             return lambda column, offset: [None if v is None else v - offset for v in column]
         inner = {kind.__name__: kind for kind in _records(hint)}
@@ -208,7 +208,7 @@ _Decode = Callable[[Any, float], list[Any]]
 def _builder(
     kind: type, places: Mapping[str, int], prefix: str = "", *, shares: bool
 ) -> Callable[[list[Sequence[Any]]], list[Any]]:
-    """Return what makes dataclasses of columns; a field not in ``places`` has its default."""
+    """Return a function from columns to dataclasses; fields not in ``places`` get defaults."""
     hints = get_type_hints(kind)
     sources: dict[str, Callable[[list[Sequence[Any]]], Sequence[Any]]] = {}
     for field in fields(kind):
@@ -226,13 +226,13 @@ def _builder(
         if not prefix or not shares:
             return list(map(make, *parts))
         rows = list(zip(*parts, strict=True))
-        if 2 * len(set(rows[:SAMPLE])) > len(rows[:SAMPLE]):  # as marks are: all different
+        if 2 * len(set(rows[:SAMPLE])) > len(rows[:SAMPLE]):  # mostly different, as dedup keys are
             return list(map(make, *parts))
         different = dict.fromkeys(rows)
         if len(shared) > MOST_SHARED:
             shared.clear()
         shared.update((row, make(*row)) for row in different if row not in shared)
-        return [shared[row] for row in rows]  # as most terms and submitters are
+        return [shared[row] for row in rows]  # mostly equal, as task options and submitters are
 
     return build
 
@@ -244,7 +244,7 @@ def _maker(kind: type, names: tuple[str, ...]) -> Callable[..., Any]:
 
 
 def _leaves(kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield path and annotation of each place of a kind's row."""
+    """Yield path and annotation of each column of a class's row."""
     hints = get_type_hints(kind)
     for field in fields(kind):
         hint = _real(hints[field.name])
@@ -256,7 +256,7 @@ def _leaves(kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _records(hint: Any) -> list[type]:
-    """Return the dataclasses that may stand in a place. TypeError: there may be what has no way."""
+    """Return the dataclasses in an annotation; raise TypeError if it allows an unsupported type."""
     hint = _real(hint)
     if get_origin(hint) in (Union, UnionType):
         return [kind for part in get_args(hint) for kind in _records(part)]

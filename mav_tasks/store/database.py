@@ -1,6 +1,7 @@
-"""The file: opening, writing batches, closing. One thread at a time; errors are sqlite3's.
+"""The SQLite file: opening, writing batches, closing. Used by one thread at a time.
 
-WAL with synchronous=FULL: a transaction is on the disk when its COMMIT returns.
+It uses WAL with synchronous=FULL: a transaction is durable when its COMMIT returns. Methods raise
+sqlite3's errors.
 """
 
 import os
@@ -20,22 +21,22 @@ from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.schema import transaction
 from mav_tasks.tasks.events import Event
 
-BUSY_TIMEOUT = 0.25  # s, that SQLite waits for another program's lock
+BUSY_TIMEOUT = 0.25  # s, SQLite's wait for another program's lock
 GONE = "the file was removed or replaced while it was in use"
 ANOTHER = "it is not the file that was opened: put that back, or end the server and look"
-MOST_ROWS = 128  # in one INSERT: seven columns of them are below SQLite's oldest limit, 999 values
+MOST_ROWS = 128  # in one INSERT: with seven columns below SQLite's oldest limit, 999 values
 
 _PRAGMAS = (
     "PRAGMA journal_mode = WAL",
     "PRAGMA synchronous = FULL",
-    "PRAGMA fullfsync = ON",  # macOS, where fsync alone does not reach the disk
+    "PRAGMA fullfsync = ON",  # macOS: fsync alone does not reach the disk
     "PRAGMA temp_store = MEMORY",
     f"PRAGMA journal_size_limit = {16 << 20}",  # bytes that the WAL keeps after a checkpoint
 )
 
 
 class Database:
-    """An open store file. StoreError, on making one, says in a line why it cannot be used."""
+    """An open store file. The constructor raises StoreError if the file cannot be used."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -49,7 +50,7 @@ class Database:
                 schema.migrate(self._connection)
                 self.format_id = self._find_format()
                 row = self._meta("next_id, last_number, last_write, ended_well")
-                with transaction(self._connection):  # durable before anything is moved
+                with transaction(self._connection):  # durable before any rover is moved
                     self._connection.execute("UPDATE meta SET ended_well = 0")
                 self._files = _identities(path)
             except BaseException:
@@ -61,16 +62,16 @@ class Database:
             raise StoreError(f"store {path}: {words_for(error)}") from error
         self.next_id: int = row[0]
         self.last_number: int = row[1]
-        self.last_write: float | None = row[2]  # UTC seconds, of an earlier life
+        self.last_write: float | None = row[2]  # UTC seconds, of an earlier process
         self.ended_well = bool(row[3])
 
     def __repr__(self) -> str:
         return f"Database({self._path.name}, event {self.last_number})"
 
     def reopen(self) -> None:
-        """Open the file anew after a failure, and look which events are in it.
+        """Open the file again after a failure, and read the number of its last event.
 
-        Only the file that it was: another one in its place lacks what was promised to be in it.
+        Raise OSError if the file was replaced: another file lacks events reported as durable.
         """
         with suppress(sqlite3.Error):
             self._connection.close()
@@ -82,10 +83,10 @@ class Database:
         self._files = _identities(self._path)
 
     def write(self, batch: Batch, *, utc: float) -> None:
-        """Make a batch durable, all of it or nothing."""
+        """Make a batch durable, as a whole or not at all."""
         connection = self._connection
         with transaction(connection):
-            # ids go round: where what is over is kept for ever, one may still be there
+            # task ids wrap around: without retention an old task may still have the id
             _insert(
                 connection,
                 "OR REPLACE INTO tasks (id, number, vehicle, state, changed_at, submitted)",
@@ -96,7 +97,7 @@ class Database:
                 "INTO journal (number, utc, kind, task_id, vehicle, body)",
                 batch.journal,
             )
-            if batch.changed:  # a statement for nothing takes its time, too
+            if batch.changed:  # an executemany without rows still takes time
                 connection.executemany(
                     "UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?",
                     batch.changed.values(),
@@ -133,15 +134,15 @@ class Database:
                 (batch.next_id, batch.last, utc, batch.signed_until),
             )
         if _identities(self._path) != self._files:
-            raise OSError(ENOENT, GONE)  # what was just written is nowhere that it can be found
+            raise OSError(ENOENT, GONE)  # the batch went to a file that is no longer there
         self.last_number = batch.last
 
     def catch_up(
         self, events: Sequence[Event], *, last_number: int, next_id: int | None, offset: float
     ) -> None:
-        """Write events that an earlier life could not, before any other. StoreError.
+        """Write events that an earlier process could not, before any other; raise StoreError.
 
-        ``last_number`` is the last that the earlier life gave to any event.
+        ``last_number`` is the last event number that the earlier process is known to have used.
         """
         first, encoder = last_number + 1, Encoder()
         batch = Batch(events, first=first, encoder=encoder, format_id=self.format_id, offset=offset)
@@ -153,21 +154,21 @@ class Database:
             raise StoreError(f"store {self._path}: {words_for(error)}") from error
 
     def is_certain(self) -> bool:
-        """Bring what is in the WAL into the file itself; False: it is not all there yet.
+        """Checkpoint the WAL; return whether all of its pages are in the database file.
 
-        A COMMIT that failed may yet be found in the WAL, though a failed fsync has promised
-        nothing: it counts only once it has been written again, somewhere else.
+        A COMMIT that failed may still be found in the WAL. After a failed fsync its pages may not
+        be on the disk: the commit counts only once a checkpoint has written them to the file.
         """
         _, pages, done = self._connection.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
         return bool(pages == done)
 
     def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
-        """Forget a little of what may be forgotten; True: there may be more."""
+        """Delete some expired rows; return whether there may be more."""
         with transaction(self._connection):
             return trimmer.step(self._connection, utc=utc)
 
     def close(self, *, utc: float | None) -> None:
-        """Close the file; ``utc`` notes the clean end, None: it is none."""
+        """Close the file; record a clean end at ``utc``, or none if None."""
         try:
             if utc is not None:
                 with transaction(self._connection):
@@ -178,7 +179,7 @@ class Database:
             self._connection.close()
 
     def _withdraw(self, ids: Sequence[tuple[int]]) -> None:
-        """The task goes; that it was submitted stays in the journal."""
+        """Delete tasks, but keep their submissions in the journal."""
         self._connection.executemany(
             "INSERT INTO journal SELECT number, changed_at, 'TaskSubmitted', id, vehicle, submitted"
             " FROM tasks WHERE id = ?",
@@ -203,18 +204,18 @@ class Database:
 
 
 def _create(path: Path) -> None:
-    """Make the file and its folder, unless they are there, for nobody else to read."""
+    """Create the file with mode 0600 unless it exists; make its folder entry durable."""
     fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     os.close(fd)
     folder = os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
     try:
-        os.fsync(folder)  # that the file is there is durable, too
+        os.fsync(folder)
     finally:
         os.close(folder)
 
 
 def _identities(path: Path) -> tuple[tuple[int, int], ...]:
-    """Return which files the store and its log are; OSError where one is not there."""
+    """Return device and inode of the store and its WAL; raise OSError if one is missing."""
     return _identity(path), _identity(path.with_name(f"{path.name}-wal"))
 
 
@@ -228,11 +229,11 @@ def _identity(path: Path) -> tuple[int, int]:
 
 def _connect(path: Path) -> sqlite3.Connection:
     return sqlite3.connect(
-        f"{path.as_uri()}?mode=rw",  # never a new, empty one in place of what was removed
+        f"{path.as_uri()}?mode=rw",  # never create an empty file if it was removed
         uri=True,
         timeout=BUSY_TIMEOUT,
         isolation_level=None,
-        check_same_thread=False,  # made by the main thread, used by the writer's
+        check_same_thread=False,  # created by the main thread, used by the writer's
     )
 
 
@@ -243,7 +244,7 @@ def _set_up(connection: sqlite3.Connection) -> None:
 
 
 def _check_whole(connection: sqlite3.Connection) -> None:
-    """Raise StoreError for a file that is damaged in its structure."""
+    """Raise StoreError if SQLite's quick_check finds damage."""
     (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if found != "ok":
         raise StoreError(f"it is damaged ({found.splitlines()[-1]})")
@@ -264,10 +265,10 @@ def _keep_signatures(
 
 
 def _insert(connection: sqlite3.Connection, into: str, rows: list[tuple[Any, ...]]) -> None:
-    """Insert many rows by few statements.
+    """Insert many rows with few statements.
 
-    At each statement the interpreter's lock is let go and asked for again, and beside a busy
-    engine that is a long way for each row. Powers of two, so that few statements are compiled.
+    sqlite3 releases and acquires the GIL for each statement, which is slow per row beside a busy
+    engine. Chunk sizes are powers of two, so that few statements are compiled.
     """
     done, size = 0, MOST_ROWS
     while done < len(rows):

@@ -1,4 +1,4 @@
-"""What the disk does to us, in words. What is our own mistake is not in here: it raises."""
+"""Disk failures, and texts for them. Other sqlite3 errors are bugs of ours, and are raised."""
 
 import sqlite3
 
@@ -17,15 +17,15 @@ _WORDS = {
 
 
 def is_failure(error: Exception) -> bool:
-    """Whether it is the disk's, and may pass."""
+    """Whether an error is a disk failure, which may be temporary, and not a bug."""
     return isinstance(error, OSError) or type(error) in (
         sqlite3.OperationalError,
-        sqlite3.DatabaseError,  # itself: damage; its other heirs are misuse
+        sqlite3.DatabaseError,  # itself: damage; its other subclasses: misuse
     )
 
 
 def words_for(error: Exception) -> str:
-    """Return what is wrong with the file."""
+    """Return the text for a disk failure."""
     if isinstance(error, OSError):
         return error.strerror or str(error)
     words = _WORDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF)

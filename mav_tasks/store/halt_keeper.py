@@ -1,7 +1,7 @@
-"""The thread that writes halts into their record, whatever the database is doing meanwhile.
+"""The thread that writes halts to the halt record, independently of the database.
 
-A halt that the record does not take may yet be kept by the database. Only when neither has it for
-GRACE seconds is it reported, and again each REPORT seconds; it is tried until it is kept.
+If the record fails, the database may still store the halt. A halt that neither has stored within
+GRACE seconds is reported, again every REPORT seconds, and retried until it is stored.
 """
 
 import time
@@ -15,13 +15,13 @@ from mav_tasks.store.halt_record import HaltRecord, Word
 from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.tasks.events import QueuePaused
 
-RETRY = 0.25  # s, until what failed is tried again
-GRACE = 1.0  # s, in which the database may keep what the record does not take
-REPORT = 10.0  # s, between two reports of a halt that is not kept
+RETRY = 0.25  # s between two attempts
+GRACE = 1.0  # s, in which the database may store a halt that the record could not
+REPORT = 10.0  # s between two reports of a halt that is not stored
 
 
 class HaltKeeper:
-    """Owns the cells of vehicles in a record. Times are monotonic seconds."""
+    """The only writer of the vehicles' cells in a record. Times are monotonic seconds."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class HaltKeeper:
         name: str,
         kept_through: Callable[[], int],
     ) -> None:
-        """``kept_through`` returns the number of the database's last event."""
+        """``kept_through`` returns the number of the last event in the database."""
         self._record = record
         self._mail = mail
         self._name = name
@@ -46,20 +46,20 @@ class HaltKeeper:
         return f"HaltKeeper({self._record!r}, {len(self._unkept)} not kept)"
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def append(self, words: Sequence[Word]) -> None:
-        """Take words; called by the loop's thread, which waits for nothing."""
+        """Queue words; never blocks the loop's thread, which calls it."""
         self._waiting.put(words)
 
     def close(self, *, within: float) -> None:
-        """Try once more what is left, and end."""
+        """Try the remaining words once more and end the thread; wait at most ``within`` s."""
         self._waiting.put(None)
         self._thread.join(within)
 
     def report_lost(self) -> None:
-        """Report each halt that nothing has kept, when both this and the database have ended."""
+        """Report each halt that was not stored; called after this thread and the writer ended."""
         for word in self._unkept.values():
             if word.is_halt and word.number > self._kept_through():
                 self._mail.put(
@@ -72,11 +72,11 @@ class HaltKeeper:
                 self._collect()
                 for word in tuple(self._unkept.values()):
                     self._keep(word)
-        except Exception as mistake:  # noqa: BLE001 - ours: raised where the engine's are
+        except Exception as mistake:  # noqa: BLE001 - a bug of ours: raised in the loop
             self._mail.put_mistake(mistake)
 
     def _collect(self) -> None:
-        """Wait for words, or until it is time to try again."""
+        """Wait for words, or until the next attempt is due."""
         try:
             words = self._waiting.get(timeout=RETRY if self._unkept else None)
             while words is not None:

@@ -1,14 +1,14 @@
-"""The record of halts: a small file beside the store that still takes a STOP when the disk is full.
+"""The halt record: a small file beside the store that can store a STOP even on a full disk.
 
-Every byte of it is written when it is opened, so that no later write needs free space. (A file
-system that copies on write may refuse even then; that is reported, see ``halt_keeper``.) For each
-vehicle it has the last word in each register, with the number of the event in the journal. A word
-whose number the database does not know is newer than the database.
+Opening the file writes every byte of it, so that no later write needs free space. (A copy-on-write
+file system may still refuse; ``halt_keeper`` reports that.) The file has the last word (entry) of
+each register of each vehicle, with the number of its event in the journal. A word with a higher
+number than the database's last event is newer than the database.
 
-Each register has two cells, in different pages. A word goes into the cell that holds the older one,
-so that a write which is cut short leaves the word before it. The cells of a register that a later
-version has added stand behind all others; a file without them is made longer. Under the vehicle 0,
-which no vehicle is, stands the next task id: whoever puts back an older database gives no id twice.
+Each register has two cells, in different pages. A word overwrites the older cell, so that a torn
+write leaves the previous word. Cells of registers that a later version adds go to the end of the
+file; opening extends a shorter file. Vehicle 0, which does not exist, has the next task id, so that
+no id is used twice after an older database was restored.
 """
 
 import os
@@ -34,24 +34,24 @@ from mav_tasks.tasks.lifecycle import TaskReason
 HEADER = b"mav-tasks record of halts, version 1\n".ljust(64, b"\0")
 VEHICLES = 256  # system ids, MAVLink
 SLOTS = 2
-CELL = 64  # bytes; a sector of a disk holds whole ones
-IDS = 0  # the vehicle under which the next task id stands
+CELL = 64  # bytes; divides a disk sector
+IDS = 0  # the vehicle number of the next task id
 
-#: number, UTC seconds, value, reason, actor; before them stands the CRC-32 of the rest
+#: number, UTC seconds, value, reason, actor; the CRC-32 of them stands in front
 _BODY = struct.Struct("<QdIB39s")
 _CRC = struct.Struct("<I")
 _EMPTY = bytes(CELL)
 
 
 class Register(IntEnum):
-    """What the words of a vehicle are about; each has one that counts, the last."""
+    """A vehicle's registers; each keeps its last word."""
 
-    QUEUE = 0  # why it is paused; NONE: it was continued
-    HALTS = 1  # how often it was halted, as the value
-    ARMING = 2  # whether it may be armed, as the value
+    QUEUE = 0  # reason of the pause; NONE: the queue was continued
+    HALTS = 1  # value: the halt epoch
+    ARMING = 2  # value: whether the server may arm the vehicle
 
 
-FIRST_ONES = 2 * VEHICLES  # registers that the first version had
+FIRST_ONES = 2 * VEHICLES  # number of registers in the first version
 REGISTERS = len(Register) * VEHICLES
 SIZE = len(HEADER) + SLOTS * REGISTERS * CELL
 FIRST_SIZE = len(HEADER) + SLOTS * FIRST_ONES * CELL
@@ -59,9 +59,9 @@ FIRST_SIZE = len(HEADER) + SLOTS * FIRST_ONES * CELL
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """The last word in a register, made of an event.
+    """An entry of a register, made from an event.
 
-    ``number`` is that of the event in the journal, ``utc`` in seconds since 1970.
+    ``number`` is the event's number in the journal, ``utc`` its time in seconds since 1970.
     """
 
     vehicle: int
@@ -74,17 +74,17 @@ class Word:
 
     @property
     def key(self) -> int:
-        """Where it stands."""
+        """Index of the word's register in the file."""
         return self.register * VEHICLES + self.vehicle
 
     @property
     def is_halt(self) -> bool:
-        """Whether the vehicle's queue stands by it."""
+        """Whether the word pauses the vehicle's queue."""
         return self.register is Register.QUEUE and self.reason is not TaskReason.NONE
 
 
 def word_of(event: Event, number: int, *, offset: float) -> Word | None:
-    """Return the word that an event is, or None; ``offset`` is UTC less monotonic seconds."""
+    """Return the word for an event, or None; ``offset`` is UTC minus monotonic seconds."""
     match event:
         case QueuePaused(vehicle=vehicle, reason=reason, actor=actor, at=at):
             return Word(vehicle, number, reason, actor, at + offset)
@@ -101,7 +101,7 @@ def word_of(event: Event, number: int, *, offset: float) -> Word | None:
 
 
 def event_of(word: Word, *, offset: float) -> Event:
-    """Return the event that a word was made of."""
+    """Return the event from which a word was made."""
     at = word.utc - offset
     if word.register is Register.HALTS:
         return VehicleHalted(word.vehicle, word.value, word.reason, word.actor, at)
@@ -113,10 +113,10 @@ def event_of(word: Word, *, offset: float) -> Event:
 
 
 class HaltRecord:
-    """The open file. OSError where it cannot be written; each cell is written by one thread."""
+    """The open file. Methods raise OSError if a write fails; one thread writes each cell."""
 
     def __init__(self, store: Path) -> None:
-        """Open the record of a store, or make it. StoreError says in a line what is wrong."""
+        """Open or create the record of a store; raise StoreError if that fails."""
         self._path = store.with_name(f"{store.name}.halts")
         try:
             if not os.path.lexists(self._path):
@@ -129,7 +129,7 @@ class HaltRecord:
             if len(content) == FIRST_SIZE:
                 content = content.ljust(SIZE, b"\0")
             self._newest = dict(_words_in(content))
-            if os.pwrite(self._fd, content, 0) < SIZE:  # a copy of it may have had holes
+            if os.pwrite(self._fd, content, 0) < SIZE:  # a copied file may be sparse
                 raise OSError(0, "there is no room for it")
             os.fsync(self._fd)
         except (OSError, ValueError) as error:
@@ -141,22 +141,22 @@ class HaltRecord:
         return f"HaltRecord({self._path.name}, {len(self._newest)} words)"
 
     def next_id_after(self, number: int) -> int | None:
-        """Return the next task id, or None if it is no news to such a database."""
+        """Return the next task id; None if a database whose last event is ``number`` knows it."""
         word = self._newest[IDS][1] if IDS in self._newest else None
         return None if word is None or word.number <= number else word.value
 
     @property
     def last_number(self) -> int:
-        """The number of the last event that the record knows of."""
+        """The highest event number in the record."""
         return max((word.number for _, word in self._newest.values()), default=0)
 
     def words_after(self, number: int) -> list[Word]:
-        """Return the words that a database lacks whose last event has this number, in order."""
+        """Return, in order, the words that a database whose last event is ``number`` lacks."""
         words = [word for _, word in self._newest.values() if word.vehicle != IDS]
         return sorted((w for w in words if w.number > number), key=lambda word: word.number)
 
     def write(self, word: Word) -> None:
-        """Make a word durable."""
+        """Make a word durable; raise OSError if that fails, or if the file was replaced."""
         self._put(word)
         _sync(self._fd)
         found, ours = self._path.stat(), os.fstat(self._fd)
@@ -164,9 +164,9 @@ class HaltRecord:
             raise OSError(ENOENT, "it was removed or replaced while it was in use")
 
     def note_next_id(self, next_id: int, *, number: int) -> None:
-        """Keep the task id that is next after the event of this number.
+        """Write the next task id as of event ``number``, without a sync.
 
-        The disk gets it in the kernel's time, half a minute: an older database is older than that.
+        The kernel writes it to the disk within half a minute; a restored database is older.
         """
         self._put(Word(IDS, number, value=next_id))
 
@@ -190,7 +190,7 @@ def _place(slot: int, key: int) -> int:
 
 
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
-    """Yield the newest word of each register with its slot. ValueError: it is no record of ours."""
+    """Yield each register's newest word with its slot; raise ValueError if the file is damaged."""
     if len(content) != SIZE or not content.startswith(HEADER):
         raise ValueError("it is damaged: look whether the rovers stand, then remove it")
     for key in range(REGISTERS):
@@ -226,7 +226,7 @@ def _word_in(cell: bytes, key: int) -> Word | None:
 
 
 def _make(path: Path) -> None:
-    """Make an empty record, as a whole or not at all."""
+    """Create an empty record atomically."""
     fresh = path.with_name(f"{path.name}.new")
     with suppress(FileNotFoundError):
         fresh.unlink()
@@ -238,7 +238,7 @@ def _make(path: Path) -> None:
     fresh.rename(path)
     folder = os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
     try:
-        os.fsync(folder)  # that the file is there is durable, too
+        os.fsync(folder)
     finally:
         os.close(folder)
 

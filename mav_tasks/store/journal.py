@@ -1,8 +1,8 @@
-"""The journal of a store file, read back as events, also beside the server that writes it.
+"""Reads the journal of a store file as events, also while a server writes it.
 
-Read-only, without the server's lock, and page by page, each in a transaction of its own. A reader
-that stays in one, whose output waits in a pager, say, would hold on to the state of then: the
-write-ahead log could not be emptied, and a store that recovers from a full disk would not be sure.
+The reader is read-only, takes no lock of the server's, and reads each page in its own transaction.
+A long transaction, of a reader whose output waits in a pager, say, would keep the server from
+checkpointing the WAL, and a store that recovers from a full disk needs a full checkpoint.
 """
 
 import sqlite3
@@ -18,14 +18,14 @@ from mav_tasks.store.codec import Unreadable
 from mav_tasks.store.reading import Rows, in_one_line
 from mav_tasks.tasks.events import Event
 
-PAGE = 500  # events in memory at a time, about
+PAGE = 500  # rows of each table per page
 
 _KINDS = {kind.__name__: kind for kind in Event.__args__}
 
 
 @dataclass(frozen=True, slots=True)
 class Which:
-    """Which events are read; None: whatever it is. ``since`` is in UTC seconds."""
+    """A filter of events; None matches all. ``since`` is in UTC seconds."""
 
     task: int | None = None
     vehicle: int | None = None
@@ -33,7 +33,7 @@ class Which:
 
 
 class Journal:
-    """What a file keeps, in its order. StoreError, here and in reading: one line says why not."""
+    """The events of a file, in order. All methods raise StoreError if the file is unreadable."""
 
     def __init__(self, path: Path, which: Which | None = None) -> None:
         self._path = path.expanduser().absolute()
@@ -42,16 +42,16 @@ class Journal:
             raise StoreError(f"store {path}: there is no such file; --store names another")
         with in_one_line(self._path):
             self._connection = _connect(self._path)
-        self._number = 0  # of the last event given
-        self._task = 0  # id of the last task whose submission was given
+        self._number = 0  # of the last event returned
+        self._task = 0  # id of the last task whose submission was returned
 
     def __repr__(self) -> str:
         return f"Journal({self._path.name}, event {self._number})"
 
     def take(self, *, offset: float) -> Iterator[tuple[int, Event]]:
-        """Yield the events after those given before, numbered over the life of the file.
+        """Yield the events after those yielded before, numbered over the life of the file.
 
-        Their times are moved by ``offset``, UTC minus monotonic seconds; 0 leaves them in UTC.
+        ``offset``, UTC minus monotonic seconds, is subtracted from times; 0 leaves them in UTC.
         """
         while True:
             with in_one_line(self._path):
@@ -61,12 +61,12 @@ class Journal:
                 return
 
     def version(self) -> int:
-        """Return a number that is another one when somebody has written to the file."""
+        """Return a number that changes when another connection has written to the file."""
         with in_one_line(self._path):
             return int(self._connection.execute("PRAGMA data_version").fetchone()[0])
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._connection.close()
 
     def _page(self, offset: float) -> tuple[list[tuple[int, Event]], bool]:
@@ -76,7 +76,7 @@ class Journal:
             noted = self._rows("number, kind, body, 0", "journal", "number", self._number)
             begun = self._rows("number, 'TaskSubmitted', submitted, id", "tasks", "id", self._task)
         full = [found[-1][0] for found in (noted, begun) if len(found) == PAGE]
-        through = min(full, default=None)  # beyond it the other table may have more
+        through = min(full, default=None)  # above it the other table's page may be incomplete
         found = [row for row in (*noted, *begun) if through is None or row[0] <= through]
         self._number = max([self._number, *(row[0] for row in found)])
         self._task = max([self._task, *(row[3] for row in found)])
@@ -87,7 +87,10 @@ class Journal:
         return page, through is not None
 
     def _rows(self, columns: str, table: str, key: str, after: int) -> list[tuple[Any, ...]]:
-        """Return the next rows. A submission is in its task's own row; ids grow as numbers do."""
+        """Return the next rows of a table.
+
+        A submission is stored in its task's row; task ids increase with event numbers.
+        """
         is_tasks = table == "tasks"
         wanted = {
             f"{key} > ?": after,
@@ -106,7 +109,7 @@ class Journal:
 def _events(
     rows: Rows, found: Iterable[tuple[Any, ...]], offset: float
 ) -> Iterator[tuple[int, Event]]:
-    """Read rows, those of a kind together: one by one would take several times as long."""
+    """Yield numbered events; decode rows of one kind together, which is several times faster."""
     of_kind: dict[str, list[tuple[int, str]]] = {}
     for number, kind, body, _ in found:
         of_kind.setdefault(kind, []).append((number, body))
@@ -118,7 +121,7 @@ def _events(
 
 
 def _connect(path: Path) -> sqlite3.Connection:
-    """Open a file read-only; where not even SQLite's index may be written, just as it is."""
+    """Open a file read-only; as immutable if SQLite cannot write its index and no WAL exists."""
     try:
         return _checked(path, "mode=ro")
     except sqlite3.OperationalError:

@@ -1,6 +1,7 @@
-"""One server owns a store: a lock on a file beside it, which ends with the process however it ends.
+"""The lock that gives a store to one server: flock on a file beside the store.
 
-The file stays when the lock goes: who removed it could remove one that another has just locked.
+The kernel releases the lock when the process ends, however it ends. The lock file is never removed:
+that could remove a file that another process has just locked.
 """
 
 import errno
@@ -13,13 +14,17 @@ from mav_tasks.errors import StoreError
 
 
 class Lock:
-    """Held from its making until ``release``. StoreError: another process has it, or no file."""
+    """A lock, held from creation until ``release``.
+
+    The constructor raises StoreError if another process holds the lock, or the file cannot be
+    opened.
+    """
 
     def __init__(self, store: Path) -> None:
         self._fd: int | None = None
         path = store.with_name(f"{store.name}.lock")
         try:
-            # never through a link: whoever planted it would have another file cut off
+            # O_NOFOLLOW: a planted symbolic link would let us truncate another file
             fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
         except OSError as error:
             if error.errno == errno.ELOOP:
@@ -39,7 +44,7 @@ class Lock:
             os.close(fd)
             raise StoreError(f"store {store}: cannot be locked: {error.strerror}") from error
         self._fd = fd
-        with suppress(OSError):  # a full disk: the number is for the message only
+        with suppress(OSError):  # on a full disk; the pid is only for the message
             os.ftruncate(fd, 0)
             os.pwrite(fd, f"{os.getpid()}\n".encode("ascii"), 0)
 
@@ -47,7 +52,7 @@ class Lock:
         return "Lock(held)" if self._fd is not None else "Lock(released)"
 
     def release(self) -> None:
-        """Let others have it."""
+        """Release the lock."""
         if self._fd is not None:
             os.close(self._fd)
             self._fd = None

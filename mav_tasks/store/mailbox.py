@@ -1,4 +1,4 @@
-"""Outcomes on their way from the writer's thread to the loop, which is woken by a descriptor."""
+"""Passes outcomes from the store's threads to the loop, and wakes the loop by a descriptor."""
 
 import os
 from threading import Lock
@@ -7,7 +7,7 @@ from mav_tasks.store.base import Kept, Outcome
 
 
 class Mailbox:
-    """The descriptor is readable exactly while something is in; no lock is held for long."""
+    """A thread-safe list of outcomes; its descriptor is readable exactly while it is not empty."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -24,7 +24,7 @@ class Mailbox:
         return self._read_fd if self._is_open else None
 
     def put(self, outcome: Outcome) -> None:
-        """Put an outcome in; of several Kept in a row the last says it all."""
+        """Add an outcome; a Kept replaces a Kept directly before it."""
         with self._lock:
             self._signal()
             if isinstance(outcome, Kept) and isinstance(self._last(), Kept):
@@ -32,14 +32,14 @@ class Mailbox:
             self._outcomes.append(outcome)
 
     def put_mistake(self, mistake: BaseException) -> None:
-        """Let ``take`` raise what must not happen at all."""
+        """Let ``take`` raise an exception, which is a bug of ours."""
         with self._lock:
             self._signal()
             self._mistake = mistake
 
     def take(self) -> list[Outcome]:
-        """Take all out."""
-        if not self._outcomes and self._mistake is None:  # so it is nearly always
+        """Remove and return all outcomes; raise an exception of ``put_mistake``."""
+        if not self._outcomes and self._mistake is None:  # the usual case, without the lock
             return []
         with self._lock:
             outcomes, self._outcomes = self._outcomes, []
@@ -51,7 +51,7 @@ class Mailbox:
         return outcomes
 
     def close(self) -> None:
-        """Close the descriptor; what is in can still be taken."""
+        """Close the descriptor; ``take`` still returns the remaining outcomes."""
         with self._lock:
             if self._is_open:
                 self._is_open = False

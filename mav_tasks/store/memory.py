@@ -1,4 +1,4 @@
-"""A store that is durable as long as the process lives, and no longer."""
+"""A store in memory, lost with the process."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from mav_tasks.tasks.events import Event
 
 
 class MemoryStore:
-    """A journal that is lost with the process. Bounded: the oldest events go first."""
+    """A journal that is lost with the process. Bounded: the oldest events are dropped first."""
 
     name = "in memory, lost with the process"
 
@@ -21,21 +21,21 @@ class MemoryStore:
         return f"MemoryStore({self._count} events)"
 
     def append(self, events: Sequence[Event]) -> None:
-        """Keep events."""
+        """Add events."""
         self.events += events
         self._count += len(events)
         if len(self.events) > 2 * self._capacity:
             del self.events[: -self._capacity]
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return the number of the last event, if there is a new one."""
+        """Return a Kept of the last event, if it is new since the last call."""
         if self._reported == self._count:
             return []
         self._reported = self._count
         return [Kept(self._count)]
 
     def fileno(self) -> None:
-        """Outcomes are there as soon as events have been appended: nobody waits for them."""
+        """Return None: outcomes are available right after ``append``."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: there is nothing to close."""

@@ -1,4 +1,4 @@
-"""Where a store is, if nobody says where; and which one the latest server has."""
+"""The path of a store: the default one, and the one that the latest server uses."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -12,17 +12,17 @@ DEFAULT_STORE = "mav-tasks.sqlite3"
 
 
 def path_of_store(text: str | None) -> Path | None:
-    """Return where a store is: "" or None is in the user's data folder, IN_MEMORY nowhere, None."""
+    """Return a store's path: for "" or None in the user's data folder; None for IN_MEMORY."""
     if text == IN_MEMORY:
         return None
     return Path(text) if text else user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE
 
 
 def note_latest(store: Path | None) -> None:
-    """Note the store of the server that starts now, None: it keeps nothing.
+    """Write a note of the starting server's store; None: in memory.
 
-    So that ``mav-tasks log`` reads the journal of the server that runs, wherever that is. A server
-    that cannot write the note serves all the same.
+    ``mav-tasks log`` reads the note to find the running server's journal. A failure to write the
+    note is ignored.
     """
     note = _note()
     with suppress(OSError):
@@ -31,7 +31,7 @@ def note_latest(store: Path | None) -> None:
 
 
 def latest_store() -> str | None:
-    """Return the store of the server that was started last: a path, or IN_MEMORY; None: no note."""
+    """Return the store of the latest server: a path, or IN_MEMORY; None if there is no note."""
     try:
         return _note().read_text(encoding="utf-8").rstrip("\n") or None
     except (OSError, ValueError):

@@ -1,6 +1,7 @@
-"""What a store file holds, read back: the state to go on from.
+"""Reads the state of a store file, from which a server resumes.
 
-The reading has a connection of its own, and so sees one state of the file whatever is written.
+Reading uses its own connection and one transaction: it sees one state of the file, whatever is
+written meanwhile.
 """
 
 import sqlite3
@@ -28,10 +29,10 @@ from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
-CHUNK = 1_000  # rows whose JSON is read in one go
+CHUNK = 1_000  # rows whose JSON is parsed in one call
 
-#: what an event says of its task besides its new state: the fields that both have. In the order
-#: of the columns that keep the last one of each kind
+#: the fields that an event has in common with Task, besides the new state; in the order of the
+#: columns (changed, modified, advanced) that keep the last event of each kind
 _OF_TASK = {
     kind: tuple({f.name for f in fields(kind)} & {f.name for f in fields(Task)})
     for kind in (TaskChanged, TaskModified, TaskAdvanced)
@@ -39,7 +40,7 @@ _OF_TASK = {
 
 
 def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
-    """Return the state that a store file holds, its times moved by ``offset``. StoreError."""
+    """Return the state in a store file, times reduced by ``offset``; raise StoreError."""
     with _opened(path) as (connection, rows):
         next_id, signed_until = connection.execute(
             "SELECT next_id, signed_until FROM meta"
@@ -89,9 +90,10 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
 
 
 def read_parameters(path: Path) -> dict[str, float]:
-    """Return what clients have set, by the parameter's name; of a store in use, too. StoreError.
+    """Return the parameters that clients have set, by name; raise StoreError.
 
-    Nothing is written, and an older file, which may have none, is left as it is.
+    The store may be in use: nothing is written. A file of an older version, which may lack the
+    table, is not migrated.
     """
     with _connected(path, mode="ro") as connection:
         check(connection)
@@ -103,7 +105,7 @@ def read_parameters(path: Path) -> dict[str, float]:
 
 
 class Rows:
-    """Makes values of stored texts, each of the format that it was written in."""
+    """Decodes stored texts, each by the format in which it was written."""
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self._decoders = {
@@ -151,7 +153,7 @@ def _connected(path: Path, *, mode: str) -> Iterator[sqlite3.Connection]:
 
 @contextmanager
 def in_one_line(path: Path) -> Iterator[None]:
-    """Make a StoreError of all that can be wrong with a file that is read."""
+    """Convert every error of reading a file to a StoreError with a text of one line."""
     try:
         yield
     except Unreadable as error:

@@ -1,8 +1,7 @@
-"""What is forgotten: finished tasks with their events, and other events, in bounded steps.
+"""Deletes finished tasks with their events, and other old events, in bounded steps.
 
-Events of no task are bounded in number as well as in age: anybody who may send can cause them.
-
-A task that waits or is under way is never deleted, nor any event of it.
+Events without a task are limited in number as well as in age: any sender can cause them. A task
+that has not ended is never deleted, and neither are its events.
 """
 
 import sqlite3
@@ -11,21 +10,21 @@ from math import inf
 from mav_tasks.settings import Retention
 
 STEP = 250  # tasks deleted in one transaction
-SWEEP = 2_000  # journal rows looked at in one transaction
-MOST_OTHERS = 200_000  # events of no task: refusals, parameters, what happened to rovers
+SWEEP = 2_000  # journal rows examined in one transaction
+MOST_OTHERS = 200_000  # events without a task: refusals, parameters, events of rovers
 
-_OVER = "state >= 9"  # the terminal states; as the index has it
+_OVER = "state >= 9"  # the terminal states; the same condition as the index's
 
 
 class Trimmer:
-    """Applies a retention step by step, each step within a transaction of the caller's."""
+    """Applies a Retention step by step, each step within the caller's transaction."""
 
     def __init__(self, retention: Retention) -> None:
         self._retention = retention
-        self._swept = 0  # number of the last journal row looked at
+        self._swept = 0  # number of the last journal row examined
 
     def step(self, connection: sqlite3.Connection, *, utc: float) -> bool:
-        """Delete some of what is too old or too many; True: there may be more."""
+        """Delete some rows that are too old or too many; return whether there may be more."""
         deleted = self._delete_tasks(connection, utc)
         others = self._delete_others(connection)
         return self._sweep(connection, utc) or deleted >= STEP or others >= SWEEP
@@ -44,7 +43,7 @@ class Trimmer:
         return len(ids)
 
     def _delete_others(self, connection: sqlite3.Connection) -> int:
-        """Whoever has things noted, again and again, does not fill the disk by it."""
+        """Delete the oldest events without a task above MOST_OTHERS: a client could fill a disk."""
         query = "SELECT count(*) FROM journal WHERE task_id IS NULL"
         (count,) = connection.execute(query).fetchone()
         excess = min(count - MOST_OTHERS, SWEEP)
@@ -57,7 +56,7 @@ class Trimmer:
         return int(max(excess, 0))
 
     def _sweep(self, connection: sqlite3.Connection, utc: float) -> bool:
-        """Delete old events that are of no task (any more); True: more rows are to be looked at."""
+        """Delete old events without a stored task; return whether more rows must be examined."""
         if self._retention.max_age is None:
             return False
         too_old = utc - self._retention.max_age
@@ -73,7 +72,7 @@ class Trimmer:
             " (SELECT 1 FROM tasks WHERE tasks.id = journal.task_id)",
             (self._swept, rows[-1][0], too_old),
         )
-        if rows[-1][1] >= too_old:  # from here on everything is younger
+        if rows[-1][1] >= too_old:  # all later rows are younger
             self._swept = 0
             return False
         self._swept = rows[-1][0]

@@ -1,8 +1,8 @@
-"""The tables of a store, and how an older file becomes a present one.
+"""The tables of a store, and the migrations of older files.
 
-``user_version`` counts the migrations that a file has seen. A change of a table, or of what a
-stored name means (a goal, a state, a field), is a migration at the end of the list; what has been
-released is never edited. A new field, goal or event needs none: see ``codec``.
+``user_version`` counts the migrations applied to a file. A changed table, or a changed meaning of a
+stored name (goal, state, field), needs a new migration at the end of the list; released migrations
+are never edited. A new field, goal or event needs no migration: see ``codec``.
 """
 
 import sqlite3
@@ -11,9 +11,9 @@ from contextlib import contextmanager, suppress
 
 from mav_tasks.errors import StoreError
 
-APPLICATION_ID = 0x4D565453  # "MVTS", so that we never write into another program's database
+APPLICATION_ID = 0x4D565453  # "MVTS"; keeps us from writing to another program's database
 
-#: each the statements of one transaction. Times are UTC seconds, texts rows as of ``codec``.
+#: each is the statements of one transaction. Times are UTC seconds, texts are rows of ``codec``.
 MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (
         f"PRAGMA application_id = {APPLICATION_ID}",
@@ -23,7 +23,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         ),
         "INSERT INTO meta VALUES (1, 1, 0, NULL, 1)",
         "CREATE TABLE formats (id INTEGER PRIMARY KEY, names TEXT NOT NULL UNIQUE)",
-        # The event of a submission is the task's own row: number and submitted.
+        # A submission's event is stored in the task's row: columns number and submitted.
         (
             "CREATE TABLE tasks (id INTEGER PRIMARY KEY, number INTEGER NOT NULL,"
             " vehicle INTEGER NOT NULL, state INTEGER NOT NULL, changed_at REAL NOT NULL,"
@@ -37,7 +37,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "CREATE INDEX of_task ON journal (task_id) WHERE task_id IS NOT NULL",
         "CREATE TABLE vehicles (vehicle INTEGER PRIMARY KEY, paused INTEGER, uid TEXT, speed REAL)",
     ),
-    ("ALTER TABLE tasks ADD COLUMN advanced TEXT",),  # the last leg that was begun
+    ("ALTER TABLE tasks ADD COLUMN advanced TEXT",),  # the last leg that was started
     (
         (
             "CREATE TABLE plans (vehicle INTEGER NOT NULL, kind INTEGER NOT NULL,"
@@ -54,9 +54,9 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         ),
         "ALTER TABLE meta ADD COLUMN signed_until INTEGER NOT NULL DEFAULT 0",
     ),
-    ("ALTER TABLE vehicles ADD COLUMN home TEXT",),  # the event that said where it is
+    ("ALTER TABLE vehicles ADD COLUMN home TEXT",),  # the VehicleHomeSet event
     ("ALTER TABLE vehicles ADD COLUMN halt_epoch INTEGER",),
-    ("ALTER TABLE vehicles ADD COLUMN may_arm INTEGER",),  # 0: somebody has disarmed it
+    ("ALTER TABLE vehicles ADD COLUMN may_arm INTEGER",),  # 0: a client disarmed the vehicle
     (  # the last halt
         "ALTER TABLE vehicles ADD COLUMN halt_reason INTEGER",
         "ALTER TABLE vehicles ADD COLUMN halted_utc REAL",
@@ -65,7 +65,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
 
 
 def check(connection: sqlite3.Connection, *, known: int = len(MIGRATIONS)) -> None:
-    """Raise StoreError if a database is of another program or of a newer version of this one."""
+    """Raise StoreError if a database is another program's, or a newer version's."""
     version = _number(connection, "user_version")
     if _number(connection, "application_id") != APPLICATION_ID and (
         version or connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
@@ -83,7 +83,7 @@ def is_empty(connection: sqlite3.Connection) -> bool:
 def migrate(
     connection: sqlite3.Connection, *, migrations: Sequence[Sequence[str]] = MIGRATIONS
 ) -> None:
-    """Bring a checked database up to the last migration."""
+    """Apply the missing migrations to a checked database."""
     for number in range(_number(connection, "user_version"), len(migrations)):
         with transaction(connection):
             for statement in migrations[number]:
@@ -93,14 +93,14 @@ def migrate(
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """Commit what the block does, all of it or, if anything raises, nothing."""
+    """Commit the block's changes, or roll them back if the block raises."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield
         connection.execute("COMMIT")
     except BaseException:
         if connection.in_transaction:
-            with suppress(sqlite3.Error):  # the first error is the one to tell
+            with suppress(sqlite3.Error):  # the first error is the one to raise
                 connection.execute("ROLLBACK")
         raise
 

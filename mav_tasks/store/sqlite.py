@@ -1,4 +1,4 @@
-"""The store on a disk: a SQLite file that one server owns, written by a thread of its own."""
+"""The store on disk: a SQLite file that one server owns, with its own writer thread."""
 
 import os
 import stat
@@ -23,16 +23,17 @@ from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
 
-HALTS_LIMIT = 1.0  # s, for the last halts to be written when the server ends
-CLOSE_LIMIT = 3.0  # s, for what is left to be written when the server ends
-TRIM_AT_OPEN = 0.5  # s, for forgetting before the server serves; the rest is done beside it
+HALTS_LIMIT = 1.0  # s at shutdown for writing the last halts
+CLOSE_LIMIT = 3.0  # s at shutdown for writing the remaining events
+TRIM_AT_OPEN = 0.5  # s of deleting expired rows at start; the rest is done while serving
 
 
 class SqliteStore:
-    """Implements ``Store``. Files and folders that it makes are its user's alone.
+    """Implements ``Store`` in a SQLite file. Files and folders that it creates are private.
 
-    ``wall_offset`` gives UTC minus ``boot_time``, now. StoreError, on making one, says in one
-    line why the file cannot be used: by whom it is in use, damaged, newer, read-only, disk full.
+    ``wall_offset`` returns the current UTC minus ``boot_time``. The constructor raises StoreError,
+    with a text of one line, if the file cannot be used: in use by another process, damaged, newer,
+    read-only, disk full.
     """
 
     def __init__(
@@ -79,18 +80,18 @@ class SqliteStore:
         return f"SqliteStore({str(self._path)!r})"
 
     def load(self) -> Restored:
-        """Return what the file holds, all times in this process's monotonic seconds. StoreError."""
+        """Return the stored state, times in this process's monotonic seconds; raise StoreError."""
         return read_restored(
             self._path, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
         )
 
     def journal(self) -> Iterator[tuple[int, Event]]:
-        """Yield every event that is kept, numbered over the life of the file. StoreError."""
+        """Yield every stored event, numbered over the life of the file; raise StoreError."""
         with closing(Journal(self._path)) as journal:
             yield from journal.take(offset=self._wall_offset())
 
     def append(self, events: Sequence[Event]) -> None:
-        """Take events to be made durable; waits for nothing. ValueError once it is closed."""
+        """Queue events to be made durable, without blocking; raise ValueError after ``close``."""
         if not self._is_open:
             raise ValueError("the store is closed")
         first, offset = self._number + 1, self._wall_offset()
@@ -104,7 +105,7 @@ class SqliteStore:
         self._writer.append(tuple(events))
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return what became of them since the last call. It raises what was our own mistake."""
+        """Return the outcomes since the last call; raise an exception of the store's threads."""
         return self._mail.take()
 
     def fileno(self) -> int | None:
@@ -112,10 +113,10 @@ class SqliteStore:
         return self._mail.fileno()
 
     def close(self) -> None:
-        """Write what is left, note the clean end and let others have the file.
+        """Write the remaining events, record the clean end and release the lock.
 
-        A disk that fails until then, or is stuck, is given up after CLOSE_LIMIT; while it is stuck
-        the file stays locked.
+        Give up after CLOSE_LIMIT if the disk fails or is stuck; the file stays locked while the
+        disk is stuck.
         """
         if self._is_open:
             self._is_open = False
@@ -125,7 +126,7 @@ class SqliteStore:
             self._mail.close()
 
     def _catch_up(self, database: Database, record: HaltRecord) -> bool:
-        """Bring into the database what its record of halts has beyond it; False: it lacked some."""
+        """Write newer words of the halt record to the database; return False if it lacked any."""
         newer = record.words_after(database.last_number)
         next_id = record.next_id_after(database.last_number)
         if not newer and next_id is None:
@@ -141,7 +142,7 @@ class SqliteStore:
 
 
 def _real_path(path: Path) -> Path:
-    """Return the one name of a file, in a folder that is there."""
+    """Return the resolved path of a file; create its folder."""
     try:
         path = path.expanduser()
         _refuse_planted(path)
@@ -154,13 +155,14 @@ def _real_path(path: Path) -> Path:
 
 
 def _refuse_planted(path: Path) -> None:
-    """Follow no link of another user, as the kernel does not where all may write.
+    """Raise StoreError for another user's symbolic link.
 
-    We look where it leads before the kernel is asked, so it could not.
+    The kernel would refuse to follow it in a world-writable sticky folder, but we resolve the path
+    before the kernel sees the link.
     """
     try:
         found = path.lstat()
-    except OSError:  # there is nothing, or what comes next says why not
+    except OSError:  # missing, or the next call reports the error
         return
     if stat.S_ISLNK(found.st_mode) and found.st_uid not in (0, os.geteuid()):
         raise StoreError(f"store {path}: it is a symbolic link of another user")

@@ -1,6 +1,6 @@
-"""The thread that makes events durable: all that wait in one transaction, again and again.
+"""The thread that makes events durable: it writes all waiting events in one transaction.
 
-What fails is kept and tried again, in the same order, until it is written. Its rows are made once.
+A batch that fails is retried, in the same order, until it is written. Its rows are made only once.
 """
 
 import time
@@ -20,16 +20,16 @@ from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event
 
-RETRY = 0.25  # s, until what failed is tried again
-LAST_TRY = 1.0  # s, that the try under way takes at most, unless the disk is stuck
-REPORT = 5.0  # s, between two reports of a failure that lasts
-MOST_EVENTS = 1_024  # in one transaction, about; more would let the first wait for the last
-TRIM_PERIOD = 60.0  # s, between two looks for what may be forgotten
-TRIM_PAUSE = 0.05  # s, between two steps of forgetting
+RETRY = 0.25  # s between two attempts
+LAST_TRY = 1.0  # s, maximum duration of the current attempt, unless the disk is stuck
+REPORT = 5.0  # s between two reports of a lasting failure
+MOST_EVENTS = 1_024  # in one transaction, about; with more the first would wait for the last
+TRIM_PERIOD = 60.0  # s between two searches for expired rows
+TRIM_PAUSE = 0.05  # s between two steps of deleting
 
 
 class Writer:
-    """Owns the database from ``start`` until it ends. Times of its own are monotonic seconds."""
+    """The database's owner from ``start`` until its end. Internal times: monotonic seconds."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class Writer:
         self._wall_offset = wall_offset
         self._record = record
         self._release = release
-        self._base = database.last_number  # events are reported as counted from here
+        self._base = database.last_number  # reported event numbers are relative to this
         self._encoder = Encoder()
         self._waiting: SimpleQueue[Sequence[Event] | None] = SimpleQueue()
         self._give_up_at: float | None = None
@@ -63,28 +63,28 @@ class Writer:
         return f"Writer({self._database!r}, {'failing' if self._must_reopen else 'well'})"
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def trim_for(self, seconds: float) -> None:
-        """Forget what may be forgotten, before ``start``, for so long at most."""
+        """Delete expired rows for at most so many seconds; call it before ``start``."""
         end = time.monotonic() + seconds
         while self._trim_at <= time.monotonic() < end:
             self._trim(pause=0.0)
 
     def append(self, events: Sequence[Event]) -> None:
-        """Take events; called by the loop's thread, which waits for nothing."""
+        """Queue events; never blocks the loop's thread, which calls it."""
         self._waiting.put(events)
 
     def close(self, *, within: float) -> bool:
-        """Write what is left and end; False: it did not end in time."""
+        """Write the remaining events and end; return whether the thread ended in time."""
         self._give_up_at = time.monotonic() + within
         self._waiting.put(None)
         self._thread.join(within + LAST_TRY)
         return not self._thread.is_alive()
 
     def utc(self) -> float:
-        """Return the time of the wall, seconds since 1970."""
+        """Return the wall clock's time, s since 1970."""
         return boot_time() + self._wall_offset()
 
     def _run(self) -> None:
@@ -95,13 +95,13 @@ class Writer:
                 is_all_written = not events or self._write(events)
                 self._trim()
             self._end(is_all_written)
-        except Exception as mistake:  # noqa: BLE001 - ours: raised where the engine's are
+        except Exception as mistake:  # noqa: BLE001 - a bug of ours: raised in the loop
             self._mail.put_mistake(mistake)
         finally:
             self._release()
 
     def _collect(self) -> list[Event]:
-        """Wait for events, or until there is something to forget; gives all that wait."""
+        """Wait for events, or until trimming is due; return up to about MOST_EVENTS events."""
         events: list[Event] = []
         try:
             item = self._waiting.get(timeout=max(0.001, self._trim_at - time.monotonic()))
@@ -118,7 +118,7 @@ class Writer:
         return events
 
     def _write(self, events: Sequence[Event]) -> bool:
-        """Write until it is written; False: closed, and out of time."""
+        """Retry until the events are written; return False if closing ran out of time."""
         batch = Batch(
             events,
             first=self._database.last_number + 1,
@@ -134,7 +134,7 @@ class Writer:
             time.sleep(RETRY)
         self._reported_at = None
         if batch.next_id:
-            with suppress(OSError):  # it is of use only to who puts an older file back
+            with suppress(OSError):  # only needed after an older file was restored
                 self._record.note_next_id(batch.next_id, number=batch.last)
         self._mail.put(Kept(batch.last - self._base))
         return True
@@ -145,7 +145,7 @@ class Writer:
                 self._database.reopen()
             if self._database.last_number < batch.first:
                 self._database.write(batch, utc=self.utc())
-            elif not self._database.is_certain():  # a commit that failed and yet is there
+            elif not self._database.is_certain():  # the failed commit is in the WAL
                 return False
         except Exception as error:
             if not is_failure(error):
@@ -163,7 +163,7 @@ class Writer:
             self._mail.put(NotKept(f"store {self._name}: {words_for(error)}"))
 
     def _trim(self, *, pause: float = TRIM_PAUSE) -> None:
-        """One step of forgetting, if it is time for it. Its failures wait for the next time."""
+        """Delete some expired rows if that is due; a disk failure waits for the next time."""
         if time.monotonic() < self._trim_at or self._is_closing:
             return
         try:
