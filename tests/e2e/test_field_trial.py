@@ -48,5 +48,5 @@ def test_ctrl_c_stops_the_rover_and_ends_the_server(tmp_path: Path) -> None:
             wait_until(lambda: "executing" in log.read_text(), within=60, what="the move to begin")
             run.popen.send_signal(signal.SIGINT)
             assert run.popen.wait(30) == 130, run.text
-            assert "STOP of vehicle 1" in log.read_text()
+            assert "rover 1: STOP by" in log.read_text()
             assert "server stopped" in log.read_text()

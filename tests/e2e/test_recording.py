@@ -170,7 +170,7 @@ def test_a_killed_run_and_the_one_after_it_are_replayed(tmp_path: Path) -> None:
     code, words = replayed(second)
     assert code == 0, words
     assert "task 2 completed" in words
-    assert "server stopped: no vehicle is being driven" in words
+    assert "server stopped: no rover is being driven" in words
     assert "end is missing" not in words
     restored = read(second).restored
     assert restored is not None

@@ -108,7 +108,7 @@ class RealTime:
             "rules.loss_failsafe=accept",
         )
         for number in range(1, self._options.count + 1):
-            server.wait_for(rf"vehicle {number}: found")
+            server.wait_for(rf"rover {number}: found")
         return f"udpout:127.0.0.1:{port}"
 
     def describe(self) -> str:
