@@ -27,8 +27,8 @@ SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
 #: person without an answer tries again within minutes
 NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
-PACKETS = 1_000  # per client, for rule 1; until a restart, its CommandReceiver has a list, too
-SPARE = 1_000  # nonces of forgotten tasks, before they are removed
+PACKETS = 1_000  # per client, for rule 1; CommandReceiver has a list, too, but not after a restart
+SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
 MANY_CLIENTS = 256  # remembered; beyond this, those with old submissions are forgotten first
 
 
@@ -67,7 +67,7 @@ class _Client:
 
 
 class SubmissionDeduplicator:
-    """Recent submissions of each client, and the nonces of tasks that ended recently or not yet."""
+    """Recent submissions of each client, and the nonces of unfinished and recent tasks."""
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
@@ -113,7 +113,7 @@ class SubmissionDeduplicator:
             and now - goal.at <= SAME_GOAL
             and _same_place(goal.draft, draft, origin)
         ):
-            copy = _Last(goal.task_id, draft, now)  # copies of this form may follow
+            copy = _Last(goal.task_id, draft, now)  # copies of this command may follow
             client.of_command[draft.vehicle, draft.command] = copy
             return Known(goal.task_id, Rule.SAME_GOAL)
         return None

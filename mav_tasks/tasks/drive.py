@@ -58,14 +58,14 @@ class Drive:
         #: m/s, speed of tasks that are ``is_cruising``; None: the settings' speed
         self.cruise: float | None = None
         self._course: PathFollower | None = None
-        self._way_back: PathFollower | None = None  # driven before the course
+        self._way_back: PathFollower | None = None  # recovery path, driven before the course
         self._last_velocity = ZERO
-        self._moved_at = 0.0  # when a non-zero velocity was last demanded
+        self._moved_at = 0.0  # when a non-zero velocity was last commanded
         self._stuck = StuckWatch()
         self._follows = Follows()
         self._astray = AstrayWatch()
         self._arrival = Arrival()
-        self._is_coming_back = False  # into the fence
+        self._is_coming_back = False  # from outside into the fence
         self._kept_at = 0.0  # when progress was last recorded for the store
         self._kept_as = 0  # the number of that event
 
@@ -90,7 +90,7 @@ class Drive:
             self._course.progress = replace(self._course.progress, speed=speed)
 
     def limit(self, demand: Demand, *, elapsed: float, now: float) -> Demand:
-        """Return a demand with its velocity limited and ramped, as the last demand requires."""
+        """Return a demand with its velocity limited and ramped from the last one."""
         if demand.kind is not DemandKind.DRIVE:
             self._last_velocity = ZERO
             return demand
@@ -233,7 +233,7 @@ class Drive:
     def _within_fence(
         self, course: PathFollower, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
     ) -> Velocity | None:
-        """Return the velocity slowed before the fence; None: stop. The way back in stays free."""
+        """Return the velocity slowed before the fence; None: stop. Outside, let it drive in."""
         if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
             self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
             if self._is_coming_back:
@@ -297,7 +297,7 @@ class Drive:
         if not is_over(plan, progress):
             self._registry.reached(task.id, progress.step, performs=False, now=now)
         left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
-        after = following(plan, replace(progress, pending=left))  # conditions on the distance lapse
+        after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
         return Becomes(S.COMPLETED) if after is None else after
 
     def _go_on(
@@ -312,7 +312,7 @@ class Drive:
         return None
 
     def _has_asked_to_stand(self, now: float) -> bool:
-        """Return whether zeros were demanded for long enough to call slowness a standstill."""
+        """Return whether zeros were commanded for long enough to call slowness a standstill."""
         return now - self._moved_at >= self._settings.watch.still_time
 
     def _note_progress(self, task: Task, executed: float, *, now: float) -> None:

@@ -48,8 +48,8 @@ class Executor:
         self._lost_until = 0.0  # while PAUSED by a loss: when data was last bad
         self._resumes_by_itself = False
         self._lost_at: Pose | None = None  # the last pose before the loss
-        self._was_silent = False  # no heartbeats during the loss
-        self._untaken_in: ModeKind | None = None  # mode at the loss, if untouched by us
+        self._was_silent = False  # heartbeats were lost, too
+        self._untaken_in: ModeKind | None = None  # mode at the loss, if we had sent nothing
         self._meter: TimingMeter | None = None  # while EXECUTING
         self._taking_since = 0.0  # while STARTING, or EXECUTING without control
         self._ask_again_at: float | None = None  # next attempt to arm, if not ready
@@ -101,8 +101,7 @@ class Executor:
     def resume(self, seen: VehicleView, *, actor: str, now: float) -> None:
         """Resume a PAUSED task exactly where it was.
 
-        If the vehicle was moved off the task's line meanwhile, hold the task rather than drive back
-        blindly.
+        If the vehicle was moved off the task's line, hold the task rather than drive back blindly.
         """
         task = self._active(S.PAUSED)
         if seen.motion is not None and is_off_line(task, seen.motion.pose):
@@ -133,7 +132,7 @@ class Executor:
         self.drive.set_speed(speed)
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Pause a STARTING or EXECUTING task; one paused by a loss no longer resumes by itself."""
+        """Pause a STARTING or EXECUTING task; stop a lost one from resuming by itself."""
         task = self.task
         if task is not None and task.state in (S.STARTING, S.EXECUTING):
             self._lost_until = now
@@ -143,7 +142,7 @@ class Executor:
             self._resumes_by_itself = False
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Hold the active task until somebody decides.
+        """Hold the active task until a client decides.
 
         A STARTING task that has not moved has no line to lose, so FRAME_RESET does not hold it: a
         booting rover may find its position while it is being taken.
@@ -158,7 +157,7 @@ class Executor:
     def cancel(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Cancel the active task: send zeros at once, and end it when the vehicle stands.
 
-        A HELD task, or one whose vehicle somebody else has, ends at once.
+        A HELD task, or one that a takeover has paused, ends at once.
         """
         task = self.task
         if task is None or task.state is S.CANCELLING:

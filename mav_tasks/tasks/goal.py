@@ -204,7 +204,7 @@ class Plan:
 
 
 def number_of(step: int, *, has_home: bool) -> int:
-    """Return the number of a step's item as its file and readers count, from 1.
+    """Return the number of a step's item as the mission file counts, from 1.
 
     Home is 0 in the file. An upload has an item for home only if the autopilot keeps it there.
     """

@@ -51,7 +51,7 @@ class Halts:
         self.epoch = epoch
         self.at = -inf  #: s, when the last one came
         self.by: Hashable = None  #: sender of the command; None: no command
-        self.number = -1  #: of that command, among its sender's
+        self.number = -1  #: of that command, in its sender's sequence
         self.command = 0  #: MAV_CMD of that command, if it is one
         self._numbers: dict[Hashable, int] = {}  # of the last halt of each sender
         self.is_undone = False  #: the queue was resumed since

@@ -118,7 +118,7 @@ class Lineup:
 
     @property
     def capacity(self) -> int:
-        """Most tasks that may wait."""
+        """Maximum number of waiting tasks."""
         return self.settings.queueing.capacity
 
     @property
@@ -159,7 +159,7 @@ class Lineup:
 
     @property
     def held(self) -> Task | None:
-        """The task that somebody must decide about; None without one, or once it is released."""
+        """The held task that needs a decision; None without one, or once it is released."""
         active = self.active
         if active is not None and active.state is S.HELD:
             return active if self.released is None else None
@@ -181,7 +181,7 @@ class Lineup:
 
     @property
     def lost_since(self) -> float | None:
-        """When such a task was paused, in s; None without one."""
+        """When the task that resumes by itself was paused, in s; None without one."""
         return self.executor.lost_since
 
     def waits(self, task: Task) -> bool:

@@ -134,7 +134,7 @@ class PendingTasks:
         for task in others:
             if task.id not in self._waiters or task.id in self.queue(task.vehicle):
                 continue
-            if self._dependencies.have_failed(task):  # stored without its consequence
+            if self._dependencies.have_failed(task):  # failure was stored, its consequence was not
                 self._fail(task.id, now=now)
                 self.ended(task.id, now=now)
             else:

@@ -50,8 +50,7 @@ _ByPriority = tuple[int, Rank, TaskId]
 class TaskQueue:
     """The ready tasks of one vehicle, in the order in which they will run.
 
-    It uses plain sorted lists: nearly all tasks are appended, and shifting 100,000 takes some 20
-    µs.
+    Plain sorted lists: nearly all tasks are appended, and shifting 100,000 takes some 20 µs.
     """
 
     def __init__(self) -> None:

@@ -52,7 +52,7 @@ class Frame:
     """The identity of a vehicle's local frame: its origin, if known, and the vehicle's boot time.
 
     ``booted_at`` is in monotonic seconds, estimated at ``heard_at``, and good to a second or two.
-    It seems to grow later and later if the vehicle's clock is slow. A reboot begins a new frame.
+    It drifts later if the vehicle's clock is slow. A reboot begins a new frame.
     """
 
     latitude_degE7: int | None
@@ -76,7 +76,7 @@ def _is_near(one_degE7: int | None, other_degE7: int | None) -> bool:
 
 
 def _drift(one: Frame, other: Frame) -> float:
-    """Return the seconds by which a vehicle's clock may have drifted between the two."""
+    """Return the seconds by which a vehicle's clock may have drifted between two estimates."""
     if one.heard_at is None or other.heard_at is None:
         return 0.0
     return CLOCK_ERROR * abs(one.heard_at - other.heard_at)

@@ -8,7 +8,7 @@ from mav_tasks.tasks.task import Task, TaskId, Terms
 
 
 class Times:
-    """Heaps of start times and deadlines. Outdated entries stay until they are due."""
+    """Heaps of start times and deadlines. Outdated entries stay until due; callers skip them."""
 
     def __init__(self) -> None:
         self._starts: list[tuple[float, TaskId]] = []

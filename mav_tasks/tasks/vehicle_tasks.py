@@ -256,7 +256,7 @@ class VehicleTasks(Lineup):
             self.begun_at = now
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Hold the active task until somebody decides.
+        """Hold the active task until a client decides.
 
         FRAME_RESET also holds the paused tasks that had started a leg: their lines are lost, too.
         """
@@ -329,7 +329,7 @@ class VehicleTasks(Lineup):
         if self.active is not None and not self.turns.is_interrupted(seen, now=now):
             return demand
         self.turns.begin_next(seen, now=now)
-        if self.active is not None:  # the refusal was the task's before
+        if self.active is not None:  # the refusal was for the task before
             return self.executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 

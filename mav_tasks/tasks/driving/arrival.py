@@ -38,7 +38,7 @@ MOST_COAST = 0.12  # m or rad; zero is commanded at most this far before the end
 #: the same for a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot)
 MOST_COAST_OF_CAR = 1.0  # m
 #: m/s, the least setpoint for a car that is steered by course. Below it PX4's speed loop sticks and
-#: slips: it drove 0.1 when asked for 0.3, and leapt 0.3 m at once when asked for 0.15.
+#: slips: at 0.3 it drove 0.1, and at 0.15 it went 0.3 m in one leap.
 LEAST_OF_ONE_TRY = 0.5
 TELLING = 0.3  # m/s; above it a car's stops are alike, from 0.05 it rolls on for half as long
 LAG_OF_CAR = 0.6  # s, until it is learnt: 0.5 and 0.7 were measured (ArduPilot)

@@ -1,7 +1,7 @@
-"""Finds suspended tasks whose vehicle somebody else has driven far away meanwhile.
+"""Finds suspended tasks whose vehicle was driven far away during a takeover.
 
-Another task may leave the vehicle anywhere, but its client knows the way between both. Nobody knows
-what lies between a task's line and a place reached under manual control.
+Another task may leave the vehicle anywhere, but their client knows the way between the two tasks.
+Nobody knows what lies between a task's line and a place reached under manual control.
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ class LedAway:
         self._tasks: set[TaskId] = set()
 
     def taken_over(self, at: Pose | None) -> None:
-        """Note that somebody takes the vehicle over here."""
+        """Note where the vehicle was taken over."""
         if self._taken_over_at is None:
             self._taken_over_at = at
 

@@ -23,7 +23,7 @@ from mav_tasks.tasks.task import Pose
 #: its simulated car (4.6.3) is far outside a bend before its wheels have turned
 ACROSS = 0.5
 #: m/s, limit for a bend that ends just before the path does. With 0.15 s of delay, 30 % overspeed
-#: and half the curvature commanded, a place is then reached within 6 cm (p95), otherwise within 13
+#: and half the commanded curvature, a place is then reached within 6 cm (p95), otherwise 13 cm
 SLOW_BEND = 0.35
 SETTLING = 2.5  # s until a vehicle is back on its path after a bend: five times REACH_TIME
 PREVIEW = 0.2  # s until the wheels point as commanded

@@ -21,7 +21,7 @@ from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
 from mav_tasks.tasks.task import Progress
 
-BESIDE = 0.15  # m from a place, at the end of the way there; farther off is not arrived
+BESIDE = 0.15  # m from a place, at the end of the way there; farther off has missed it
 #: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
 BESIDE_OF_LOOP = 0.4
 TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: close enough
@@ -120,7 +120,7 @@ class PathFollower:
             if self.goal.radius:
                 return abs(remaining) <= self.goal.radius
         if self.by_course and isinstance(self.leg, Move | Follow):
-            remaining = max(remaining, 0.0)  # it cannot drive back
+            remaining = max(remaining, 0.0)  # it cannot drive back from beyond the end
         if not stands and 0.0 <= remaining <= coast:
             return True
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)

@@ -39,7 +39,7 @@ BACKWARDS = 1.0  # extra cost of a way driven backwards, as a factor
 #: lengths of the piece before the turn, as factors on the radius
 PIECES = (0.3, 0.6, 1.0, 1.5, 2.2, 3.0)
 THREE_POINT = (0.5, 0.9, 1.4)  # the same for both pieces of a three-point turn
-THERE = 0.1  # m from a place: ArduPilot's simulated car (4.6.3) is no more exact
+THERE = 0.1  # m; nearer is at the place: ArduPilot's simulated car (4.6.3) is no more exact
 HERE = 1e-3  # m and rad from a place or heading; nearer needs no way
 
 
@@ -88,7 +88,7 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
 def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Steering) -> Progress:
     """Return the progress with which the first run of the way to a place begins.
 
-    If no way stays within the fence, it is the way without a fence. A car that is as near to the
+    If no way stays within the fence, it ignores the fence. A car that is as near to the
     place as it can get stays there.
     """
     if hypot(place.north - pose.north, place.east - pose.east) <= THERE:

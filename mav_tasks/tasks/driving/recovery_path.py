@@ -50,8 +50,8 @@ def is_off_line(task: Task, pose: Pose) -> bool:
 def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     """Return whether somebody has moved a vehicle while it was silent.
 
-    On a straight line it rolls on by itself; it does not turn, and does not come back. Before it
-    was driven it stays where it is.
+    On a straight line a vehicle rolls on by itself, but does not turn or come back. Before its task
+    drove it, it stays where it is.
     """
     if task.progress.anchor is None:
         away = hypot(after.north - before.north, after.east - before.east)
@@ -74,8 +74,8 @@ def resumed(
 ) -> Progress:
     """Return the progress with which to resume from here.
 
-    If the way to a place was left far behind, it begins again from here; ``turns_first`` with a
-    turn on the spot.
+    The way to a place begins again here if the vehicle is far off it; ``turns_first``: with a turn
+    on the spot.
     """
     anchor, pose = progress.anchor, motion.pose
     if not isinstance(goal, GoTo) or anchor is None or progress.target is None:

@@ -21,7 +21,7 @@ SLOW = 0.3  # of the distance commanded; more is motion
 BLIND = 1.0  # m or rad commanded without progress or motion: stuck before the time is up
 
 
-SAID_AFTER = 1.5  # s of a command without motion; the slowest rover began after 0.6
+SAID_AFTER = 1.5  # s of commands without motion before the warning; the slowest rover took 0.6
 LEAST_ASKED = 0.1  # m/s; slower is the approach to an end
 LEAST_PART = 0.1  # of the distance commanded; less is standing
 
@@ -89,7 +89,7 @@ class StuckWatch:
     def is_stuck(
         self, course: PathFollower, seen: VehicleView, *, limit: float, now: float
     ) -> bool:
-        """Return whether it made no progress for ``limit`` seconds, or for BLIND commanded."""
+        """Return whether it made no progress for ``limit`` seconds, or over BLIND commanded."""
         leg = course.leg
         forward, turned = self._last
         lives = self._lives(seen, has_one_try=course.has_one_try)
@@ -114,8 +114,7 @@ class StuckWatch:
 
         A rover that stands for seconds before its speed loop overcomes friction (PX4) is only slow.
         If its estimate is frozen, nobody knows what it does, and it soon counts as stuck. The
-        estimate of a car that is steered by course may go anywhere meanwhile, and still counts as
-        changing.
+        estimate of a car that is steered by course may drift anywhere; it still counts.
         """
         before, self._pose = self._pose, None if seen.motion is None else seen.motion.pose
         if before is None or self._pose is None:
