@@ -1,1 +1,1 @@
-"""The task domain: goals, states, order, guidance. Pure; it knows nothing of MAVLink."""
+"""The task domain: goals, states, scheduling and guidance. Pure, and independent of MAVLink."""

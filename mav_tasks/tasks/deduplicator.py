@@ -1,7 +1,7 @@
-"""Whether a submission is one that came before: driving twice is the worse mistake.
+"""Recognises repeated submissions: driving twice is worse than refusing.
 
-The rules are those of ``dialects/README.md``, "The same task twice". All that they need is in the
-tasks themselves, so that a restart forgets nothing.
+The rules are those of ``dialects/README.md``, "The same task twice". The tasks hold all the data
+that the rules need, so that a restart forgets nothing.
 """
 
 from collections.abc import Iterable
@@ -17,23 +17,23 @@ from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
-SAME_PACKET = 5.0  # s, the very same packet again (rule 1)
+SAME_PACKET = 5.0  # s, the identical packet again (rule 1)
 CONFIRMED = 10.0  # s, confirmation > 0 with equal parameters (rule 3)
 SAME_GOAL = 5.0  # s, equal absolute goals (rule 4)
-NEAR = 1.0  # m between two places that mean the same (rule 4)
+NEAR = 1.0  # m; places this close are the same (rule 4)
 SAME_PAYLOAD = 2.5  # s since the last copy, without a nonce (rule 5)
-#: s after the end of its task, in which a nonce means that task. Copies come within half a minute
-#: of the first (a client repeats for 10 s, a net is late by 20 s), and over a restart of the server
-#: within its time; who was not answered tries again by hand within minutes
+#: s after its task's end for which a nonce means that task. Copies come within half a minute of the
+#: first (a client repeats for 10 s, a network delays by 20 s), plus the time of a server restart; a
+#: person without an answer tries again within minutes
 NONCE_KEPT = 600.0
 LONGEST = max(SAME_PACKET, CONFIRMED, SAME_GOAL, SAME_PAYLOAD)
-PACKETS = 1_000  # of each client, for rule 1; while the server runs its receiver has its own
-SPARE = 1_000  # nonces of tasks that are not kept any more
-MANY_CLIENTS = 256  # remembered; beyond, those whose last submission is old are forgotten
+PACKETS = 1_000  # per client, for rule 1; CommandReceiver has a list, too, but not after a restart
+SPARE = 1_000  # nonces; those of forgotten tasks are removed only beyond this
+MANY_CLIENTS = 256  # remembered; beyond this, those with old submissions are forgotten first
 
 
 class Rule(Enum):
-    """Which rule found that a submission came before."""
+    """Rules that recognise a repeated submission."""
 
     SAME_PACKET = auto()
     NONCE = auto()
@@ -43,7 +43,7 @@ class Rule(Enum):
 
 
 class Known(NamedTuple):
-    """The task that a submission is already, and by which rule."""
+    """The task that a submission repeats, and the rule that found it."""
 
     task_id: TaskId
     rule: Rule
@@ -60,14 +60,14 @@ class _Last:
 
 @dataclass(slots=True)
 class _Client:
-    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)  # vehicle, command
+    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)  # by vehicle, command
     goals: dict[int, _Last] = field(default_factory=dict)  # by vehicle
     packets: dict[str, _Last] = field(default_factory=dict)
     at: float = 0.0
 
 
 class SubmissionDeduplicator:
-    """What each client submitted lately, and the nonces of tasks that are not long over."""
+    """Recent submissions of each client, and the nonces of unfinished and recent tasks."""
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
@@ -75,7 +75,7 @@ class SubmissionDeduplicator:
         self._nonces: dict[tuple[str, int, int, int], TaskId] = {}
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
-        """Remember the tasks of an earlier run, oldest first: all nonces, and what came lately."""
+        """Load the tasks of an earlier run, oldest first: all nonces, and recent submissions."""
         for task in tasks:
             nonce = task.marks.nonce
             if nonce:
@@ -87,10 +87,10 @@ class SubmissionDeduplicator:
     def known(
         self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
     ) -> Known | None:
-        """Return the task that a submission is already, or None if it is new.
+        """Return the task that a submission repeats, or None if it is new.
 
-        ``origin`` is the vehicle's, to compare places in different frames. Rejection(NONCE_REUSED)
-        when the nonce was used for something else.
+        ``origin`` is the vehicle's, to compare places in different frames. Raise
+        Rejection(NONCE_REUSED) if the nonce was used for something else.
         """
         if draft.marks.nonce:
             return self._by_nonce(draft, now=now)
@@ -113,13 +113,13 @@ class SubmissionDeduplicator:
             and now - goal.at <= SAME_GOAL
             and _same_place(goal.draft, draft, origin)
         ):
-            copy = _Last(goal.task_id, draft, now)  # of which copies may follow
+            copy = _Last(goal.task_id, draft, now)  # copies of this command may follow
             client.of_command[draft.vehicle, draft.command] = copy
             return Known(goal.task_id, Rule.SAME_GOAL)
         return None
 
     def remember(self, task: Task, *, at: float, now: float) -> None:
-        """Keep a submission that became a task."""
+        """Remember a submission that became a task."""
         submitter, marks = task.submitter, task.marks
         if marks.nonce:
             self._nonces[_key(submitter, marks.nonce)] = task.id
@@ -134,7 +134,7 @@ class SubmissionDeduplicator:
             client = self._clients[submitter] = _Client()
         client.at = at
         if marks.nonce and not isinstance(task.goal, GoTo):
-            return  # known by its nonce alone
+            return  # its nonce alone identifies it
         draft = Draft(task.vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
         if isinstance(task.goal, GoTo):
@@ -148,9 +148,9 @@ class SubmissionDeduplicator:
                 del client.packets[next(iter(client.packets))]
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
-        """A client wanted its vehicle to stand: the next return is meant anew (rule 4).
+        """Forget a client's last return after its halt: the next return is new (rule 4).
 
-        A "go to" is not: further forms of the one before may still be on their way.
+        A go-to is not forgotten: other messages for the same go-to may still be on their way.
         """
         client = self._clients.get(submitter)
         goal = None if client is None else client.goals.get(vehicle)
@@ -158,7 +158,7 @@ class SubmissionDeduplicator:
             del client.goals[vehicle]
 
     def forget(self, task: Task) -> None:
-        """Forget a submission that was refused in the end: it may be tried again."""
+        """Forget a submission that was refused after all, so that the client may try it again."""
         if task.marks.nonce:
             self._nonces.pop(_key(task.submitter, task.marks.nonce), None)
         client = self._clients.get(task.submitter)
@@ -185,9 +185,7 @@ class SubmissionDeduplicator:
         return Known(task_id, Rule.NONCE)
 
     def _forget_nonces(self) -> None:
-        if (
-            len(self._nonces) > 2 * len(self._registry) + SPARE
-        ):  # most are of tasks not kept any more
+        if len(self._nonces) > 2 * len(self._registry) + SPARE:  # most are of forgotten tasks
             kept = {k: t for k, t in self._nonces.items() if self._registry.get(t) is not None}
             self._nonces = kept
 
@@ -199,13 +197,13 @@ class SubmissionDeduplicator:
 
 
 def _is_long_over(task: Task, *, now: float) -> bool:
-    """Whether a nonce of a task that is over may be another submission's by now."""
+    """Return whether the nonce of a finished task may be used for a new submission."""
     ended_at = task.submitted_at if task.changed_at is None else task.changed_at
     return task.state in TERMINAL and now - ended_at > NONCE_KEPT
 
 
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
-    """A client that comes back from another endpoint is still the same."""
+    """Return a key without the endpoint: a client may come back from another one."""
     return submitter.key, submitter.system_id, submitter.component_id, nonce
 
 
@@ -213,7 +211,7 @@ def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:
     if not isinstance(one.goal, GoTo) or not isinstance(other.goal, GoTo):
         return False
     if (one.goal.yaw, one.goal.wait) != (other.goal.yaw, other.goal.wait):
-        return False  # it is to do something else there
+        return False  # they do different things there
     places = one.goal.place, other.goal.place
     if None in places:
         return places == (None, None)

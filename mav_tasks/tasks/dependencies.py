@@ -1,4 +1,4 @@
-"""Which tasks wait for which: who runs after whom, and whether that can ever be."""
+"""Dependencies between tasks (``Terms.after``), and checks whether they can be met."""
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
@@ -9,7 +9,7 @@ R, S = TaskReason, TaskState
 
 
 class Dependencies:
-    """The tasks that run after others, by those."""
+    """Index of dependents: for each task, the tasks that run after it."""
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
@@ -22,19 +22,19 @@ class Dependencies:
         return task_id in self._dependents
 
     def of(self, task_id: TaskId) -> tuple[TaskId, ...]:
-        """Return the tasks that run after this one, in the order in which they came."""
+        """Return the tasks that run after this one, in the order in which they were added."""
         return tuple(self._dependents.get(task_id, ()))
 
     def add(self, task_id: TaskId, after: int) -> None:
-        """A task runs after another one."""
+        """Note that a task runs after another one."""
         self._dependents.setdefault(TaskId(after), {})[task_id] = None
 
     def take(self, task_id: TaskId) -> tuple[TaskId, ...]:
-        """Return the tasks that run after this one, which is over, and forget that they do."""
+        """Remove and return the tasks that run after this one, which has ended."""
         return tuple(self._dependents.pop(task_id, ()))
 
     def forget(self, task_id: TaskId, after: int) -> bool:
-        """A task does not run after another one any more; whether it did."""
+        """Remove a dependency. Return whether there was one."""
         dependents = self._dependents.get(TaskId(after)) if after else None
         if dependents is None or task_id not in dependents:
             return False
@@ -53,7 +53,7 @@ class Dependencies:
             raise Rejection(R.DEPENDENCY_FAILED, words)
 
     def check_cycle(self, task: Task, after: int) -> None:
-        """Raise Rejection if two tasks would wait for each other."""
+        """Raise Rejection if a task would wait for itself, directly or through others."""
         seen: int = after
         while seen:
             if seen == task.id:
@@ -62,11 +62,11 @@ class Dependencies:
             seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
 
     def is_waited_for(self, after: int) -> bool:
-        """Whether a task that others run after is still to complete."""
+        """Return whether the task ``after`` exists and is not over."""
         task = self._registry.get(after)
         return task is not None and task.state not in TERMINAL
 
     def have_failed(self, task: Task) -> bool:
-        """Whether what a task runs after is over, and was not completed."""
+        """Return whether the task that this one runs after ended without being completed."""
         ahead = self._registry.get(task.terms.after) if task.terms.after else None
         return ahead is not None and ahead.state in TERMINAL and ahead.state is not S.COMPLETED

@@ -1,6 +1,6 @@
-"""Drives the active task of a vehicle while it is EXECUTING: course, arrival, fence, mishaps.
+"""Drives the active task of a vehicle while it is EXECUTING: path, arrival, fence, faults.
 
-It changes no state: what is to become of the task is the outcome, for the executor to record.
+It never changes the task's state: it returns the outcome, which the executor records.
 """
 
 from dataclasses import replace
@@ -36,61 +36,61 @@ from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 
 S, R = TaskState, TaskReason
 
-#: times that a vehicle may drive past a place that its turning circle keeps it from
+#: times that a vehicle may miss a place that its turning circle does not let it reach
 MISSES = 3
-KEEP_EACH = 1.0  # s between two writes of the progress of a task that is being driven
+KEEP_EACH = 1.0  # s between two writes of a driven task's progress
 
 
 class Becomes(NamedTuple):
-    """What is to become of the task that is driven."""
+    """Outcome for the driven task: its next state, and why."""
 
     state: TaskState
     reason: TaskReason = R.NONE
 
 
 class Drive:
-    """The drive of one vehicle's active task; it begins anew with each EXECUTING."""
+    """Driver of one vehicle's active task; ``begin`` precedes each EXECUTING."""
 
     def __init__(self, registry: TaskRegistry, settings: Settings, bounds: Bounds) -> None:
         self._registry = registry
         self._bounds = bounds
         self._settings = settings
-        #: m/s, of tasks that are driven as the vehicle itself would; None: as the settings say
+        #: m/s, speed of tasks that are ``is_cruising``; None: the settings' speed
         self.cruise: float | None = None
         self._course: PathFollower | None = None
-        self._way_back: PathFollower | None = None  # driven before it
+        self._way_back: PathFollower | None = None  # recovery path, driven before the course
         self._last_velocity = ZERO
-        self._moved_at = 0.0  # when a velocity other than zero was last asked for
+        self._moved_at = 0.0  # when a non-zero velocity was last commanded
         self._stuck = StuckWatch()
         self._follows = Follows()
         self._astray = AstrayWatch()
         self._arrival = Arrival()
-        self._is_coming_back = False  # from outside the fence
-        self._kept_at = 0.0  # when progress was last given to the store
+        self._is_coming_back = False  # from outside into the fence
+        self._kept_at = 0.0  # when progress was last recorded for the store
         self._kept_as = 0  # the number of that event
 
     def __repr__(self) -> str:
         return f"Drive({self._course!r}, {self._last_velocity})"
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._settings = settings
 
     def forget(self) -> None:
-        """Another task takes the place of this one."""
+        """Drop the path of the active task, since another task takes its place."""
         self._course = self._way_back = None
 
     def entered(self, *, now: float) -> None:
-        """The task has changed its state: its progress was kept with that."""
+        """Note a change of state, whose event stores the progress, too."""
         self._kept_at = now
 
     def set_speed(self, speed: float | None) -> None:
-        """Drive at this speed from now on, m/s; None: as the task says itself."""
+        """Set the speed from now on, m/s; None: the task's own."""
         if self._course is not None:
             self._course.progress = replace(self._course.progress, speed=speed)
 
     def limit(self, demand: Demand, *, elapsed: float, now: float) -> Demand:
-        """Return a demand as the vehicle may be asked for it, by what it was asked for before."""
+        """Return a demand with its velocity limited and ramped from the last one."""
         if demand.kind is not DemandKind.DRIVE:
             self._last_velocity = ZERO
             return demand
@@ -106,7 +106,7 @@ class Drive:
     def begin(
         self, task: Task, seen: VehicleView, motion: Motion, *, now: float
     ) -> Progress | Becomes:
-        """Set the course of a task that starts, or goes on, where the vehicle stands."""
+        """Plan the path of a task that starts or resumes where the vehicle stands."""
         here = self._set_out(task, task.progress, seen, motion, now=now)
         if isinstance(here, Becomes):
             return here
@@ -124,7 +124,7 @@ class Drive:
     def _set_out(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> Progress | Becomes:
-        """Set the course of a stage that begins here, if it can."""
+        """Plan the path of a stage that begins here, if it can begin."""
         steering = steering_of(seen, self._bounds)
         if steering is not None and isinstance(
             present_goal(task.goal, progress), Rotate | Face | MoveTurned
@@ -156,8 +156,8 @@ class Drive:
         elapsed: float,
         now: float,
     ) -> Demand | Becomes:
-        """Drive on in this tick; ``executed`` are the s of EXECUTING so far."""
-        if self._course is None:  # another step is gone on with
+        """Return this tick's demand, or the outcome; ``executed`` is the s of EXECUTING so far."""
+        if self._course is None:  # another step of a plan begins
             steering = steering_of(seen, self._bounds)
             if not seen.still and not may_go_on_rolling(
                 task.goal, task.progress, seen, motion, steering=steering
@@ -218,7 +218,7 @@ class Drive:
         return Demand(DemandKind.DRIVE, velocity)
 
     def _driving_of(self, task: Task) -> Driving:
-        """Return the settings for a task: of a stock client's the speed is the vehicle's own."""
+        """Return the settings for a task; a task that is cruising has the vehicle's own speed."""
         driving = self._settings.driving
         if self.cruise is None or not task.terms.is_cruising:
             return driving
@@ -233,7 +233,7 @@ class Drive:
     def _within_fence(
         self, course: PathFollower, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
     ) -> Velocity | None:
-        """Slow down before the fence; None: stop. A vehicle that began outside may come back in."""
+        """Return the velocity slowed before the fence; None: stop. Outside, let it drive in."""
         if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
             self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
             if self._is_coming_back:
@@ -244,7 +244,7 @@ class Drive:
     def _arrive(
         self, task: Task, course: PathFollower, seen: VehicleView, motion: Motion, now: float
     ) -> Becomes | None:
-        """The end of a leg: the next one, the next step, back to the task itself, or all done."""
+        """End a leg: begin the next leg or step, leave the recovery path, or complete the task."""
         self._begin_leg(now=now)
         if course.advance(motion):
             if (course.by_course or course.steering) and course.misses > MISSES:
@@ -263,7 +263,7 @@ class Drive:
         return None
 
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
-        """Go on with another step of a plan; at once, if it is being driven."""
+        """Continue at another step of a plan; at once, if it is being driven."""
         assert isinstance(task.goal, Plan), "only plans have steps"
         progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
         self._course = self._way_back = None
@@ -291,22 +291,20 @@ class Drive:
             self._registry.advance(task.id, course.progress, now=now)
 
     def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
-        """A step is done; gives the progress of the next one, unless the plan is over."""
+        """End the current step. Return the progress of the next one, or COMPLETED."""
         assert self._course is not None, "a step is driven on its course"
         progress = self._course.progress
         if not is_over(plan, progress):
             self._registry.reached(task.id, progress.step, performs=False, now=now)
         left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
-        after = following(plan, replace(progress, pending=left))  # nearer than here it will not be
+        after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
         return Becomes(S.COMPLETED) if after is None else after
 
     def _go_on(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> Becomes | None:
-        """Begin the next step where the vehicle is, moving or not; gives why it does not."""
-        self._registry.note_progress(
-            task.id, progress
-        )  # whatever becomes of it: the last one is done
+        """Begin the next step where the vehicle is, moving or not. Return why not, or None."""
+        self._registry.note_progress(task.id, progress)  # in any case the last step is done
         here = self._set_out(task, progress, seen, motion, now=now)
         if isinstance(here, Becomes):
             return here
@@ -314,22 +312,20 @@ class Drive:
         return None
 
     def _has_asked_to_stand(self, now: float) -> bool:
-        """Whether zeros have been asked for long enough to call slowness a standstill."""
+        """Return whether zeros were commanded for long enough to call slowness a standstill."""
         return now - self._moved_at >= self._settings.watch.still_time
 
     def _note_progress(self, task: Task, executed: float, *, now: float) -> None:
         assert self._course is not None
         self._course.progress = replace(self._course.progress, execution_time=executed)
         self._registry.note_progress(task.id, self._course.progress)
-        is_written = (
-            self._registry.durable >= self._kept_as
-        )  # a store that is away is not piled up on
+        is_written = self._registry.durable >= self._kept_as  # no backlog for a store that is away
         if now - self._kept_at >= KEEP_EACH and is_written:
             self._registry.keep_progress(task.id, now=now)
             self._kept_at, self._kept_as = now, self._registry.recorded
 
     def rest(self, task: Task, motion: Motion, *, now: float) -> None:
-        """Count what the vehicle has rolled since the task was paused: it stands here."""
+        """Record how far the vehicle rolled since the task was paused; it stands now."""
         course = self._course
         if course is None or self._way_back:
             return
@@ -338,7 +334,7 @@ class Drive:
 
 
 def _refused(task: Task) -> Becomes:
-    """The way leads over the fence: nothing of it is driven."""
+    """Return the outcome of a way that crosses the fence; none of it is driven."""
     if task.progress.anchor is None and task.progress.step < 0:
         return Becomes(S.FAILED, R.OUTSIDE_FENCE)
     return Becomes(S.HELD, R.FENCE)

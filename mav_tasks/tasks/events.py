@@ -1,7 +1,7 @@
-"""The journal's vocabulary: what happened, as frozen values.
+"""The events of the journal, as frozen values.
 
-Tasks are what these events add up to. ``at`` is monotonic seconds; wall-clock stamps are added
-where events are stored or logged. ``actor`` is a client, or "server".
+A task is the result of its events. ``at`` is in monotonic seconds; the store and the log add
+wall-clock time. ``actor`` is a client, or "server".
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ SERVER = "server"
 
 @dataclass(frozen=True, slots=True)
 class TaskSubmitted:
-    """A task was accepted; it is acknowledged once this event is durable."""
+    """A task was accepted; the server acknowledges it once this event is durable."""
 
     task: Task
     at: float
@@ -34,7 +34,7 @@ class TaskSubmitted:
 class TaskChanged:
     """A task moved along one edge of the lifecycle table.
 
-    ``timing`` is that of its setpoints so far; it says something new where ``old`` is EXECUTING.
+    ``timing`` covers its setpoints so far; it is new only if ``old`` is EXECUTING.
     """
 
     task_id: TaskId
@@ -59,14 +59,14 @@ class TaskChanged:
 
 @dataclass(frozen=True, slots=True)
 class TaskAdvanced:
-    """A task being executed has begun its next leg; not a move in the lifecycle table."""
+    """A task's progress changed, as when it begins its next leg; its state did not."""
 
     task_id: TaskId
     vehicle: int
     version: int
     progress: Progress
     at: float
-    item: int = 0  # its number in the plan's file, from 1
+    item: int = 0  # its number in the plan's file, from 1; 0: none
 
     def __str__(self) -> str:
         item = f"item {self.item}, " if self.item > 0 else ""
@@ -75,9 +75,10 @@ class TaskAdvanced:
 
 @dataclass(frozen=True, slots=True)
 class TaskProgressed:
-    """How far a task has come that is being driven: kept for a crash, and no part of the journal.
+    """Progress of a task that is being driven, stored in case of a crash.
 
-    Only the last one of a task is kept. ``version`` is the task's, which this does not change.
+    It is not part of the journal: only the last one of each task is kept. ``version`` is the
+    task's, which this event does not change.
     """
 
     task_id: TaskId
@@ -93,7 +94,7 @@ class TaskProgressed:
 
 @dataclass(frozen=True, slots=True)
 class StepReached:
-    """A step of a plan is done; ``performs``: it is a command that the vehicle gets now."""
+    """A step of a plan is done; ``performs``: it is a command that is sent to the vehicle now."""
 
     task_id: TaskId
     vehicle: int
@@ -110,10 +111,10 @@ class StepReached:
 
 @dataclass(frozen=True, slots=True)
 class PlanStored:
-    """A vehicle has another mission (``kind`` 0), fence (1) or rally points (2).
+    """A vehicle's mission (``kind`` 0), fence (1) or rally points (2) were replaced or cleared.
 
-    ``plan_id`` names it to clients: a mission's is the id of the task that is made of it; 0 and no
-    ``source``: it has none any more. ``source`` is the items as they came.
+    ``plan_id`` names the plan to clients; a mission has the id of the task made from it. ``source``
+    is the items as uploaded. If the plan was cleared, ``plan_id`` is 0 and ``source`` empty.
     """
 
     vehicle: int
@@ -145,9 +146,9 @@ class TaskModified:
 
 @dataclass(frozen=True, slots=True)
 class TaskWaits:
-    """The next task of a vehicle cannot begin, for a reason that was not there before.
+    """A vehicle's next task cannot start, for a new reason.
 
-    ``words`` are the vehicle's own about it, "" if there are none.
+    ``words`` is the vehicle's own explanation, "" if there is none.
     """
 
     task_id: TaskId
@@ -163,7 +164,7 @@ class TaskWaits:
 
 @dataclass(frozen=True, slots=True)
 class TaskWithdrawn:
-    """A submission that did not become durable in time and was refused: it never was a task."""
+    """A submission was refused because it was not durable in time; it never was a task."""
 
     task_id: TaskId
     vehicle: int
@@ -175,9 +176,10 @@ class TaskWithdrawn:
 
 @dataclass(frozen=True, slots=True)
 class SubmissionRefused:
-    """A submission or request refused, for the audit log.
+    """A submission or request was refused; for the audit log.
 
-    ``command`` is 0 of an upload of a plan, and of another message minus its id.
+    ``command`` is 0 for the upload of a plan, and minus the message id for a message that is no
+    command.
     """
 
     vehicle: int
@@ -196,7 +198,7 @@ class SubmissionRefused:
 
 @dataclass(frozen=True, slots=True)
 class QueuePaused:
-    """A vehicle's queue stands; STOPPED is the STOP latch."""
+    """A vehicle's queue was paused; the reason STOPPED is the STOP latch."""
 
     vehicle: int
     reason: TaskReason
@@ -211,7 +213,7 @@ class QueuePaused:
 
 @dataclass(frozen=True, slots=True)
 class QueueContinued:
-    """A vehicle's queue goes on."""
+    """A vehicle's queue was resumed."""
 
     vehicle: int
     actor: str
@@ -223,9 +225,9 @@ class QueueContinued:
 
 @dataclass(frozen=True, slots=True)
 class VehicleHalted:
-    """Something made a vehicle stand, or would have: ``epoch`` counts these.
+    """Something halted a vehicle, or would have if it had moved; ``epoch`` counts the halts.
 
-    What lets it go on has to be newer than the last one.
+    A request to resume must be newer than the last halt.
     """
 
     vehicle: int
@@ -241,7 +243,7 @@ class VehicleHalted:
 
 @dataclass(frozen=True, slots=True)
 class VehicleIdentified:
-    """The vehicle behind a system id has told its unique id (AUTOPILOT_VERSION)."""
+    """The vehicle with this system id reported its unique id (AUTOPILOT_VERSION)."""
 
     vehicle: int
     uid: str
@@ -253,9 +255,9 @@ class VehicleIdentified:
 
 @dataclass(frozen=True, slots=True)
 class VehicleHomeSet:
-    """Where a vehicle returns to: where it was first armed since it booted, or what a client set.
+    """A vehicle's home was set: where it was first armed since boot, or where a client set it.
 
-    ``frame`` is that of the vehicle at that time: after another boot it has another home.
+    ``frame`` is the vehicle's frame at that time. After a reboot the vehicle has another home.
     """
 
     vehicle: int
@@ -273,7 +275,7 @@ class VehicleHomeSet:
 
 @dataclass(frozen=True, slots=True)
 class VehicleArmingSet:
-    """Whether the server may arm it, as far as that is a person's word: who disarms says no."""
+    """A person's decision whether the server may arm a vehicle: disarming it says no."""
 
     vehicle: int
     may_arm: bool
@@ -300,7 +302,7 @@ class VehicleSpeedSet:
 
 @dataclass(frozen=True, slots=True)
 class VehicleSeen:
-    """A vehicle was found, is heard again, or has said something that is as it should be."""
+    """A vehicle was found, is heard again, or has reported something that is in order."""
 
     vehicle: int
     text: str
@@ -324,9 +326,9 @@ class VehicleNoted:
 
 @dataclass(frozen=True, slots=True)
 class ServerStopped:
-    """The orderly end: every vehicle stands in HOLD, or the time allowed for it is over.
+    """The server shut down: every vehicle stands in HOLD, or the time limit is over.
 
-    ``unconfirmed`` are the vehicles that had been told, but were not seen to stand in HOLD yet.
+    ``unconfirmed`` are the vehicles that were told to stop but not yet seen to stand in HOLD.
     """
 
     unconfirmed: tuple[int, ...]

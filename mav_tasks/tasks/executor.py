@@ -1,7 +1,7 @@
-"""Runs the one active task of a vehicle: from STARTING to its end, through every interruption.
+"""Runs the active task of one vehicle: from STARTING to its end, through every interruption.
 
-It asks for nothing but demands (``view``) and changes states through the registry only. Its first
-non-zero velocity waits until EXECUTING is durable; zeros never wait.
+It returns demands (``view``) and changes states through the registry only. The first non-zero
+velocity waits until EXECUTING is durable; zeros never wait.
 """
 
 from dataclasses import replace
@@ -22,38 +22,38 @@ from mav_tasks.tasks.view import Demand, ModeKind, VehicleView
 
 S, R = TaskState, TaskReason
 
-#: m/s and s after which a vehicle that creeps on zeros is driven: a speed loop that has wound up on
-#: the estimate's offset may never let it stand (PX4, RO_SPEED_I 0.5)
+#: m/s and s: a vehicle that creeps below this speed on zeros is driven after this time. A speed
+#: loop that wound up on the estimate's offset may never let it stand (PX4, RO_SPEED_I 0.5)
 CREEPS, CREEPS_FOR = 0.3, 6.0
-ASK_AGAIN = 4.0  # s, from the end of a try to arm to the next one, while a vehicle is not ready
+ASK_AGAIN = 4.0  # s, from the end of one attempt to arm to the next, while a vehicle is not ready
 
 
 def has_moved(task: Task) -> bool:
-    """Return whether anything of a task may have been driven."""
+    """Return whether any part of a task may have been driven."""
     return task.progress.anchor is not None or task.progress.execution_time > 0.0
 
 
 class Executor:
-    """The active task of one vehicle, if there is one."""
+    """State machine of one vehicle's active task, if there is one."""
 
     def __init__(self, registry: TaskRegistry, settings: Settings, bounds: Bounds) -> None:
         self._registry = registry
         self._settings = settings
-        #: what drives it
+        #: drives the task while it is EXECUTING
         self.drive = Drive(registry, settings, bounds)
         self.task_id: TaskId | None = None  #: of the active task
-        self._since = 0.0  # when the present state was entered
-        self._executed_before = 0.0  # s of EXECUTING in earlier stretches
+        self._since = 0.0  # when the current state was entered
+        self._executed_before = 0.0  # s of EXECUTING before the current state
         self._last_tick = 0.0
-        self._lost_until = 0.0  # while PAUSED by a loss: when data was last not good
+        self._lost_until = 0.0  # while PAUSED by a loss: when data was last bad
         self._resumes_by_itself = False
-        self._lost_at: Pose | None = None  # where it was last, before the loss
-        self._was_silent = False  # during it
-        self._untaken_in: ModeKind | None = None  # when it was lost, and nothing was asked of it
+        self._lost_at: Pose | None = None  # the last pose before the loss
+        self._was_silent = False  # heartbeats were lost, too
+        self._untaken_in: ModeKind | None = None  # mode at the loss, if we had sent nothing
         self._meter: TimingMeter | None = None  # while EXECUTING
-        self._taking_since = 0.0  # while STARTING, or EXECUTING and out of control
-        self._ask_again_at: float | None = None  # while the vehicle is not ready, between two tries
-        #: what a STARTING task waits for, and that in the vehicle's own words
+        self._taking_since = 0.0  # while STARTING, or EXECUTING without control
+        self._ask_again_at: float | None = None  # next attempt to arm, if not ready
+        #: what a STARTING task waits for, and the vehicle's own words for that
         self.waits_for: tuple[TaskReason, str] = (R.NONE, "")
 
     def __repr__(self) -> str:
@@ -66,42 +66,42 @@ class Executor:
 
     @property
     def timing(self) -> Timing | None:
-        """How evenly the active task's setpoints have left up to now."""
+        """Setpoint timing of the active task so far."""
         measured = None if self._meter is None else self._meter.timing()
         return measured or (None if self.task is None else self.task.timing)
 
     def setpoint_left(self, *, now: float) -> None:
-        """A setpoint leaves for the vehicle now."""
+        """Note that a setpoint is sent to the vehicle now."""
         if self._meter is not None:
             self._meter.note(now=now)
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._settings = settings
         self.drive.apply(settings)
 
-    # what others want of it
+    # requests
 
     def begin(self, task: Task, *, actor: str, now: float) -> None:
-        """Take a queued task on, or one that was pre-empted: it is STARTING now."""
+        """Start a queued or a pre-empted task: it becomes STARTING."""
         self.adopt(task)
         self._change(S.STARTING, R.NONE, actor=actor, now=now)
 
     def adopt(self, task: Task) -> None:
-        """Take a task on as it is."""
+        """Make a task the active one, in the state that it has."""
         self.task_id = task.id
         self._executed_before = task.progress.execution_time
         self._resumes_by_itself = False
 
     def give_up(self) -> None:
-        """Let the task go as it is: another takes its place."""
+        """Drop the active task in the state that it has, to make room for another."""
         self.task_id = None
         self.drive.forget()
 
     def resume(self, seen: VehicleView, *, actor: str, now: float) -> None:
-        """Let a PAUSED task start again, from exactly where it was.
+        """Resume a PAUSED task exactly where it was.
 
-        A vehicle that was moved off the task's line meanwhile is not driven back blindly: HELD.
+        If the vehicle was moved off the task's line, hold the task rather than drive back blindly.
         """
         task = self._active(S.PAUSED)
         if seen.motion is not None and is_off_line(task, seen.motion.pose):
@@ -110,20 +110,20 @@ class Executor:
             self._change(S.STARTING, R.NONE, actor=actor, now=now)
 
     def release(self, *, again: bool, actor: str, now: float) -> None:
-        """Let a HELD task start again: all of it from here, or the remainder."""
+        """Restart a HELD task: all of it from here (``again``), or the remainder."""
         task = self._active(S.HELD)
         progress = task.progress
         if again:
             progress = Progress(execution_time=progress.execution_time)
         elif task.reason in (R.FRAME_RESET, R.OFF_TRACK):
-            # its line is lost, or left for good: what was driven counts, where it began does not
+            # its line is lost or left for good: keep the distance driven, not the start pose
             progress = replace(progress, anchor=None, frame=None, target=None, path=())
         self._change(S.STARTING, R.NONE, actor=actor, now=now, progress=progress)
 
     def set_speed(self, speed: float | None) -> None:
-        """Let the active task drive at this speed from now on, m/s; None: as it says itself.
+        """Set the speed of the active task from now on, m/s; None: the task's own.
 
-        Of what a plan says and what somebody asks for, the last word counts.
+        The later one of a plan's SetSpeed and a client's request wins.
         """
         task = self.task
         if task is None:
@@ -132,20 +132,20 @@ class Executor:
         self.drive.set_speed(speed)
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Interrupt a task that is being run; does nothing to one that is not."""
+        """Pause a STARTING or EXECUTING task; stop a lost one from resuming by itself."""
         task = self.task
         if task is not None and task.state in (S.STARTING, S.EXECUTING):
             self._lost_until = now
             self._resumes_by_itself = reason in LOSSES
             self._change(S.PAUSED, reason, actor=actor, now=now)
-        else:  # no edge PAUSED -> PAUSED: what was lost will not resume by itself any more
+        else:  # no edge PAUSED -> PAUSED, but a lost task no longer resumes by itself
             self._resumes_by_itself = False
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Set a active task aside until somebody decides.
+        """Hold the active task until a client decides.
 
-        One of which nothing was driven has no line that could be lost with its frame: a rover that
-        boots may find its place while it is being taken.
+        A STARTING task that has not moved has no line to lose, so FRAME_RESET does not hold it: a
+        booting rover may find its position while it is being taken.
         """
         task = self.task
         is_starting = task is not None and task.state is S.STARTING and not has_moved(task)
@@ -155,7 +155,10 @@ class Executor:
             self._change(S.HELD, reason, actor=SERVER, now=now)
 
     def cancel(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Call the active task off: zeros at once, over when the vehicle stands."""
+        """Cancel the active task: send zeros at once, and end it when the vehicle stands.
+
+        A HELD task, or one that a takeover has paused, ends at once.
+        """
         task = self.task
         if task is None or task.state is S.CANCELLING:
             return
@@ -167,12 +170,12 @@ class Executor:
             self.let_go(actor=actor, now=now)
 
     def let_go(self, *, actor: str, now: float) -> None:
-        """End a task that is being cancelled: somebody else has the vehicle, and it is theirs."""
+        """End a CANCELLING task without standstill: its vehicle was taken over, or has rebooted."""
         task = self._active(S.CANCELLING)
         self._finish(S.CANCELLED, task.reason, actor=actor, now=now)
 
     def kill(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
-        """End the active task at once; gives its id."""
+        """End the active task at once. Return its id, or None."""
         killed = self.task_id
         if killed is not None:
             self._finish(S.KILLED, reason, actor=actor, now=now)
@@ -180,19 +183,19 @@ class Executor:
 
     @property
     def lost_since(self) -> float | None:
-        """Since when, in s, the task has stood that resumes by itself; None: it does not."""
+        """When the task was paused by a loss, in s; None if it does not resume by itself."""
         return self._since if self.resumes_by_itself else None
 
     @property
     def resumes_by_itself(self) -> bool:
-        """Whether it stands only as long as the vehicle, or its position, is not heard of."""
+        """Whether the task is paused only until the vehicle, or its position, is heard again."""
         task = self.task
         return task is not None and task.state is S.PAUSED and self._resumes_by_itself
 
-    # what it wants of the vehicle
+    # demands on the vehicle
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
-        """Return what the active task demands of the vehicle; may change its state."""
+        """Return what the active task demands of the vehicle; its state may change."""
         task = self.task
         if task is None:
             return view.HOLD
@@ -215,19 +218,19 @@ class Executor:
                 self._change(S.HELD, R.STOP_UNCONFIRMED, actor=SERVER, now=now)
                 return view.HALT
             case S.HELD if task.reason is R.STOP_UNCONFIRMED and not seen.still:
-                is_led = seen.mode in (ModeKind.MANUAL, ModeKind.OTHER)  # by who has it now
+                is_led = seen.mode in (ModeKind.MANUAL, ModeKind.OTHER)  # somebody else drives it
                 return view.HOLD if is_led else view.HALT
         return view.HOLD
 
     def begins_again(self, *, now: float) -> bool:
-        """The vehicle has restarted: whether the task begins again by itself, having moved nothing.
+        """Restart a task that has not moved, after a reboot. Return whether it restarts.
 
-        It waits until the vehicle is ready, as one does that is submitted a moment later.
+        It waits until the vehicle is ready, as a task submitted a moment later would.
         """
         task = self.task
         if task is None or has_moved(task):
             return False
-        is_lost = self.resumes_by_itself  # it was silent for a while
+        is_lost = self.resumes_by_itself  # the vehicle was silent for a while
         if is_lost:
             self._change(S.STARTING, R.NONE, actor=SERVER, now=now)
         elif task.state is not S.STARTING:
@@ -261,7 +264,7 @@ class Executor:
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
         creeps = now - self._taking_since > CREEPS_FOR and motion.speed < CREEPS
-        if not seen.still and not creeps:  # the heading at the start is that of a vehicle at rest
+        if not seen.still and not creeps:  # the start heading must be measured at rest
             if now - self._since > 2 * self._settings.watch.start_timeout:
                 self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
                 return view.HOLD
@@ -289,7 +292,7 @@ class Executor:
         return self._becomes(outcome, now=now) if isinstance(outcome, Becomes) else outcome
 
     def _becomes(self, outcome: Becomes, *, now: float) -> Demand:
-        """Record what is to become of the task: it stands."""
+        """Apply an outcome to the task. Return HOLD."""
         state, reason = outcome
         if state in TERMINAL:
             self._finish(state, reason, actor=SERVER, now=now)
@@ -300,9 +303,9 @@ class Executor:
         return view.HOLD
 
     def _wait_until_ready(self, task: Task, seen: VehicleView, now: float) -> Demand:
-        """The vehicle would not arm: stand by, and have it asked again after a while."""
+        """Wait after a refused arming; return TAKE when it is time for another attempt."""
         words = seen.why_not_ready
-        if self._ask_again_at is None:  # a try has just ended: what it was refused with is told
+        if self._ask_again_at is None:  # an attempt has just failed: report why
             self._ask_again_at = now + ASK_AGAIN
             if self.waits_for != (R.NOT_READY, words):
                 self._registry.record(TaskWaits(task.id, task.vehicle, R.NOT_READY, now, words))
@@ -313,7 +316,7 @@ class Executor:
         return view.TAKE
 
     def _pause_if_lost(self, seen: VehicleView, now: float) -> bool:
-        """Interrupt when heartbeats or position are missing; whether it did."""
+        """Pause the task if heartbeats or position are missing. Return whether they are."""
         lost, motion = R.NONE, seen.motion
         if not seen.heard:
             lost = R.LINK_LOST
@@ -326,7 +329,7 @@ class Executor:
         return bool(lost)
 
     def _wait_for_return(self, seen: VehicleView, now: float) -> None:
-        """A task PAUSED by a loss resumes by itself after a while of good data, or fails."""
+        """Resume a task PAUSED by a loss after a while of good data; fail it after a time-out."""
         if not self._resumes_by_itself:
             return
         watch = self._settings.watch
@@ -336,7 +339,7 @@ class Executor:
         self._was_silent |= not seen.heard
         if seen.armed:
             ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD)
-        else:  # as it was when it was lost, before it could be taken
+        else:  # in the mode that it had when it was lost, before we took it
             ours = seen.mode is self._untaken_in
         task = self._active(S.PAUSED)
         if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):

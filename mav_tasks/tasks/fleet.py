@@ -1,6 +1,4 @@
-"""The tasks of all vehicles, whether the vehicles are there or not, and what a restart makes of
-them.
-"""
+"""The tasks of all vehicles, connected or not, and their restoration after a restart."""
 
 from collections.abc import Iterator
 
@@ -16,14 +14,14 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R, S = TaskReason, TaskState
 
-#: s since such a halt, in which a supervisor starts this run and the vehicle is found. Later, what
-#: it does may be somebody's newer word, by another way than through a server
+#: s since a halt by command: enough for a supervisor to start this run and for it to find the
+#: vehicle. Later, the vehicle may already follow a newer command that did not pass a server
 UNSEEN = 15.0
-LONG_IDLE = 600.0  # s without a write before the start: nobody remembers what was queued
+LONG_IDLE = 600.0  # s without a write before the start: nobody remembers the queue
 
 
 class Fleet:
-    """``VehicleTasks`` by system id, and the room in which all their tasks wait."""
+    """``VehicleTasks`` by system id, and the pending tasks of all of them."""
 
     def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
         self._registry = registry
@@ -31,15 +29,15 @@ class Fleet:
         self._of: dict[int, VehicleTasks] = {}
         self.room = PendingTasks(registry, settings)
         self._was_driven: set[int] = set()
-        self._halted: dict[int, LastHalt] = {}  # by somebody, before this run
+        self._halted: dict[int, LastHalt] = {}  # by command, before this run
         self._comes_up_paused = False
-        self.began_at = 0.0  # of this run, by the clock of ``now``
+        self.began_at = 0.0  # start of this run, by the clock of ``now``
 
     def __iter__(self) -> Iterator[VehicleTasks]:
         return iter(self._of.values())
 
     def of(self, vehicle: int) -> VehicleTasks:
-        """Return the tasks of a vehicle; there need not be any yet, nor the vehicle."""
+        """Return the tasks of a vehicle, which may have no tasks and may be unknown."""
         tasks = self._of.get(vehicle)
         if tasks is None:
             tasks = VehicleTasks(vehicle, self._registry, self.room, self._settings)
@@ -50,7 +48,7 @@ class Fleet:
         return tasks
 
     def was_driven(self, vehicle: int) -> bool:
-        """Whether a task was driving a vehicle when the last run ended; said once."""
+        """Return whether a task was driving a vehicle when the last run ended; True only once."""
         was_driven = vehicle in self._was_driven
         self._was_driven.discard(vehicle)
         return was_driven
@@ -61,14 +59,14 @@ class Fleet:
         return halt if halt is not None and now - halt.at <= UNSEEN else None
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._settings = settings
         self.room.apply(settings)
         for tasks in self:
             tasks.apply(settings)
 
     def restore(self, restored: Restored, *, now: float) -> None:
-        """Take over an earlier run: what ran is held, nothing that was under way runs by itself."""
+        """Load an earlier run: hold the tasks that ran, pause queues that must not go on alone."""
         self.room.set_wall_offset(restored.wall_offset, now=now)
         self._registry.restore(restored.tasks, next_id=restored.next_id)
         active: dict[int, list[Task]] = {}
@@ -84,7 +82,7 @@ class Fleet:
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
-        # also where that ended well: it does not wait for a vehicle that does not answer
+        # after a clean end, too: the end does not wait for a silent vehicle
         halted = restored.halted.items()
         self._halted = {each: LastHalt(*halt) for each, halt in halted if halt[0] in WORDS}
         pauses = self._settings.on_restart == "pause"
@@ -109,4 +107,4 @@ class Fleet:
                 now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)
-        self._comes_up_paused = pauses and not restored.ended_well  # those that come now
+        self._comes_up_paused = pauses and not restored.ended_well  # for vehicles found from now on

@@ -1,8 +1,8 @@
-"""When the tasks of one vehicle will start and end, if all goes as it stands now.
+"""Estimates when the waiting tasks of one vehicle will start and end.
 
-The queue is played through once: the best ready task runs, its end lets others go on, start times
-come. Not foreseen are pauses, pre-emption, tasks of other vehicles and aging. Made for one answer
-to a client; what nobody asks for is not reckoned.
+It plays the queue through once: the best ready task runs, its end unblocks others, start times
+come. It ignores pauses, pre-emption, tasks of other vehicles, and aging. A forecast serves one
+answer to a client, and computes nothing until it is asked.
 """
 
 from heapq import heapify, heappop, heappush
@@ -17,7 +17,7 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 S = TaskState
 
-FORESEEN = 500  # tasks, beyond which nobody reckons when one starts
+FORESEEN = 500  # tasks; those behind them get no estimate
 
 #: seconds until a task starts and until it ends; NaN: not known
 Times = tuple[float, float]
@@ -31,7 +31,7 @@ class Forecast:
         self._registry = registry
         self._now = now
         self._known = known_of(tasks)
-        self._times: dict[TaskId, Times] | None = None  # None: not reckoned yet
+        self._times: dict[TaskId, Times] | None = None  # None: not computed yet
         self._ready: list[tuple[Rank, TaskId]] = []
         self._due: list[tuple[float, TaskId]] = []  # seconds from now
         self._dependents: dict[int, list[Task]] = {}
@@ -41,7 +41,7 @@ class Forecast:
         return f"Forecast({self._tasks.vehicle}, at {self._now})"
 
     def of(self, task: Task) -> Times:
-        """Return the seconds until a waiting task starts, and until it ends."""
+        """Return the seconds until a waiting task starts, and until it ends; NaN: not known."""
         if self._times is None:
             self._times = {}
             self._play(self._times)
@@ -68,7 +68,7 @@ class Forecast:
                 self._let_go(dependent)
 
     def _line_up(self, times: dict[TaskId, Times]) -> None:
-        """Sort what waits by what it waits for."""
+        """Sort the waiting tasks into ready, due later, and dependent."""
         tasks = self._tasks
         self._ready = [(tasks.queue.rank(each), each) for each in tasks.queue.page(0, FORESEEN)]
         for suspended in tasks.suspended:
@@ -81,13 +81,13 @@ class Forecast:
             task = self._registry[task_id]
             if task.state is S.SCHEDULED:
                 due = tasks.start_time(task) - self._now
-                times[task_id] = (due, nan)  # at the earliest, whatever else is in its way
+                times[task_id] = (due, nan)  # the earliest; other tasks may delay it
                 heappush(self._due, (due, task_id))
             elif not task.terms.is_staged and not self._is_blocked(task):
                 self._let_go(task)
 
     def _let_go(self, task: Task) -> None:
-        """Line a task up that waits for no other one any more, unless for its time."""
+        """Put a task that waits for no other one among the ready ones, or those due later."""
         due = self._tasks.start_time(task) - self._now
         if due > 0:
             heappush(self._due, (due, task.id))
@@ -95,7 +95,7 @@ class Forecast:
             heappush(self._ready, (self._tasks.room.rank(task), task.id))
 
     def _is_blocked(self, task: Task) -> bool:
-        """Return whether a task whose time has come waits for another one, and note that."""
+        """Return whether a due task waits for another one, and note the dependency."""
         ahead = self._registry.get(task.terms.after) if task.terms.after else None
         if ahead is None or ahead.state in TERMINAL or ahead.id in self._done:
             return False
@@ -103,7 +103,7 @@ class Forecast:
         return True
 
     def _when_free(self) -> Estimate:
-        """Return when the vehicle is free for the next task, and where; UNKNOWN if nothing runs."""
+        """Return when and where the vehicle is free for a task; UNKNOWN if nothing can run."""
         tasks = self._tasks
         is_up = tasks.seen is not None and tasks.seen.heard
         if tasks.paused or tasks.is_held_ahead or tasks.stopping_after_kill or not is_up:
@@ -121,7 +121,7 @@ class Forecast:
 
 
 def known_of(tasks: VehicleTasks) -> Known:
-    """Return what an estimate of a vehicle's tasks starts from."""
+    """Return the inputs for an estimate of a vehicle's tasks."""
     seen, pose = tasks.seen, _pose_of(tasks)
     if seen is None:
         return Known(tasks.terms.driving)

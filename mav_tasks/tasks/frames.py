@@ -1,9 +1,9 @@
-"""Global places in a vehicle's local frame, and back: one mapping, ArduPilot's own.
+"""Converts global places to a vehicle's local frame and back, with ArduPilot's own mapping.
 
-A degree of latitude is 111,318.845 m everywhere; a degree of longitude that, times the cosine of
-the mean of the two latitudes (AP_Common/Location, ``get_distance_NE``). What is compared with the
-autopilot's LOCAL_POSITION_NED has to be computed as it computes it: on an ellipsoid the same two
-places are metres apart at 10 km.
+A degree of latitude is 111,318.845 m everywhere. A degree of longitude is that times the cosine of
+the mean of the two latitudes (AP_Common/Location, ``get_distance_NE``). The results are compared
+with the autopilot's LOCAL_POSITION_NED, so that they must use its formula: on an ellipsoid the same
+two places are metres apart at 10 km.
 """
 
 from math import cos, radians
@@ -25,7 +25,7 @@ def to_local(place: GlobalPlace, origin: GlobalPlace) -> LocalPlace:
 
 
 def local_place(place: Place | None, origin: GlobalPlace | None) -> LocalPlace | None:
-    """Return a place of either kind in the local frame, or None while that is not known."""
+    """Return a place of either kind in the local frame, or None while it is not known there."""
     if isinstance(place, GlobalPlace):
         return None if origin is None else to_local(place, origin)
     return place
@@ -52,5 +52,5 @@ def _east_scale(one_degE7: float, other_degE7: float) -> float:
 
 
 def _wrapped(longitude_degE7: int) -> int:
-    """The short way round the earth."""
+    """Return a longitude or a difference of longitudes within ±180°."""
     return (longitude_degE7 + HALF_TURN) % (2 * HALF_TURN) - HALF_TURN

@@ -1,4 +1,4 @@
-"""What a task can be about: frozen values. SI units and radians; angles clockwise from north."""
+"""The goals of tasks, as frozen values. SI units and radians; angles clockwise from north."""
 
 from dataclasses import dataclass
 from math import degrees
@@ -17,9 +17,9 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class MoveTurned:
-    """Move backwards as one that does not reverse: turn round, drive, turn back.
+    """Move backwards with a vehicle that cannot reverse: turn round, drive, turn back.
 
-    ``distance`` in metres, positive; ``speed`` as of Move.
+    ``distance`` in metres, positive; ``speed`` as in Move.
     """
 
     distance: float
@@ -56,7 +56,7 @@ class LocalPlace:
 
 @dataclass(frozen=True, slots=True)
 class GlobalPlace:
-    """A place on earth, exact as MAVLink's integers have it."""
+    """A place on earth, exactly as MAVLink's integers give it."""
 
     latitude_degE7: int
     longitude_degE7: int
@@ -69,10 +69,10 @@ Place = LocalPlace | GlobalPlace
 class GoTo:
     """Drive to a place in a straight line, facing forward.
 
-    ``place`` None is the vehicle's home. ``speed`` in m/s, None = default. ``radius`` in metres is
-    near enough, None = as near as a move ends. ``yaw`` in radians is turned to in the end, None =
-    as it comes. ``wait`` in seconds is spent there, standing. ``passes``: within a plan it does not
-    stop there, if the way goes on to another place.
+    ``place`` None is the vehicle's home. ``speed`` in m/s, None = default. ``radius`` is the
+    acceptance radius in metres, None = the tolerance of a move. ``yaw`` is the heading in radians
+    to turn to on arrival, None = any. ``wait`` is the seconds to stand there. ``passes``: in a
+    plan, the vehicle does not stop at the place if another one follows.
     """
 
     place: Place | None
@@ -116,25 +116,25 @@ class Wait:
     duration: float
 
 
-#: what is driven by itself: a task's goal, or a step of a plan
+#: a goal that drives on its own: a task's goal, or a step of a plan
 SingleGoal = Move | MoveTurned | Rotate | Drive | GoTo | Face | Head | Wait
 
 
 @dataclass(frozen=True, slots=True)
 class Nothing:
-    """A step that is passed over: home, a take-off, what is about the plan as a whole."""
+    """A step that does nothing: home, a take-off, or options of the whole plan."""
 
 
 @dataclass(frozen=True, slots=True)
 class SetSpeed:
-    """From here on drive at ``speed`` m/s; None: as without a plan."""
+    """Drive at ``speed`` m/s from here on; None: as without a plan."""
 
     speed: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """Go on with the step ``to``, ``times`` times (-1: for ever), then pass over."""
+    """Continue at the step ``to``, ``times`` times (-1: for ever); after that do nothing."""
 
     to: int
     times: int
@@ -142,19 +142,19 @@ class Jump:
 
 @dataclass(frozen=True, slots=True)
 class Perform:
-    """A command to the vehicle itself; which one only the plan's source says."""
+    """A command to the vehicle itself; only the plan's ``source`` says which one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """What follows, up to the next place, waits ``seconds``; the vehicle drives on."""
+    """CONDITION_DELAY: the steps up to the next place wait ``seconds``; the vehicle drives on."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Near:
-    """What follows, up to the next place, waits until that is ``distance`` metres away."""
+    """CONDITION_DISTANCE: the steps up to the next place wait until it is ``distance`` m away."""
 
     distance: float
 
@@ -179,11 +179,12 @@ Step = (
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A mission: steps, one for each of its items, in their order.
+    """A mission: one step for each of its items, in order.
 
-    ``source`` is the items as they came, for who sends and shows them; nothing is read out of it
-    here. ``first`` is the step with which it begins. ``has_home``: the first step is the home that
-    ArduPilot puts before the file's items; ``has_options``: the last one is about the plan itself.
+    ``source`` is the items as uploaded, for the code that sends and shows them; this package does
+    not read it. ``first`` is the step at which the plan starts. ``has_home``: the first step is the
+    home that ArduPilot puts before the file's items. ``has_options``: the last step is about the
+    plan itself.
     """
 
     steps: tuple[Step, ...]
@@ -194,7 +195,7 @@ class Plan:
 
     @property
     def item_count(self) -> int:
-        """The number of items that its file has, without a home and options."""
+        """Number of items in the plan's file, without home and options."""
         return len(self.steps) - self.has_home - self.has_options
 
     def item_number(self, step: int) -> int:
@@ -203,20 +204,20 @@ class Plan:
 
 
 def number_of(step: int, *, has_home: bool) -> int:
-    """Return the number by which a file and its reader know the item of a step, from 1.
+    """Return the number of a step's item as the mission file counts, from 1.
 
-    Home is 0 in the file, and an item of the upload only where the autopilot has it there.
+    Home is 0 in the file. An upload has an item for home only if the autopilot keeps it there.
     """
     return step if has_home else step + 1
 
 
 Goal = SingleGoal | Plan
 
-FEW_STEPS = 4  # of a plan that may be no more than one goal
+FEW_STEPS = 4  # most steps of a plan that may be described as a single goal
 
 
 def describe(goal: Goal) -> str:
-    """Return a goal in words, and in the units of its command."""
+    """Return a goal as text, in the units of its command."""
     if isinstance(goal, GoTo):
         return _describe_way(goal.place)
     if isinstance(goal, Plan):
@@ -239,7 +240,7 @@ def describe(goal: Goal) -> str:
 
 
 def kind_of(goal: SingleGoal) -> str:
-    """Return its kind, as the rules of roles name it: ``TASK_KINDS`` of the settings."""
+    """Return a goal's kind as the rules of roles name it: one of ``TASK_KINDS`` in the settings."""
     match goal:
         case Move() | MoveTurned():
             return "move"
@@ -256,7 +257,7 @@ def kind_of(goal: SingleGoal) -> str:
 
 
 def speed_named_by(step: Step) -> float:
-    """Return the speed that a step names, m/s; 0: none."""
+    """Return the speed that a step names, m/s; 0 if it names none."""
     match step:
         case Move(speed=speed) | MoveTurned(speed=speed) | GoTo(speed=speed):
             return speed or 0.0
@@ -276,10 +277,10 @@ def ends_at_home(goal: Goal) -> bool:
 
 
 def _describe_plan(plan: Plan) -> str:
-    if len(plan.steps) <= FEW_STEPS and not plan.has_home:  # a home: a mission, however short
+    if len(plan.steps) <= FEW_STEPS and not plan.has_home:  # with home it is a mission
         driven = [step for step in plan.steps if not isinstance(step, Nothing | SetSpeed)]
         if len(driven) == 1 and isinstance(driven[0], SingleGoal):
-            return describe(driven[0])  # beside its speed, and options
+            return describe(driven[0])  # the other steps are its speed and options
     count = plan.item_count
     return f"plan of {count} item{'s' if count != 1 else ''}"
 

@@ -1,6 +1,6 @@
-"""What made a vehicle stand last. By it a word that lets go is newer than that, or older.
+"""The last halt of a vehicle, by which a request to resume counts as newer or older.
 
-Each halt raises the epoch, whatever it was: STOP, HOLD, a pause, disarming, a takeover, a loss.
+Each halt raises the epoch, whatever its cause: STOP, HOLD, a pause, disarming, a takeover, a loss.
 """
 
 from collections.abc import Hashable
@@ -10,9 +10,9 @@ from typing import NamedTuple
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, words_of
 
-SAME = 0.2  # s, in which the same halt by the same one is one: five a second of a flood
-SENDERS = 32  # whose halts are remembered
-SHOWN = 2.0  # s after a disarming in which the vehicle shows that it is disarmed, at 1 Hz
+SAME = 0.2  # s, in which equal halts of one actor count once: a flood counts five a second
+SENDERS = 32  # whose last halts are remembered
+SHOWN = 2.0  # s after a disarm command for the vehicle to show that it is disarmed, at 1 Hz
 
 _WORDS = {
     TaskReason.OPERATOR: "a pause",
@@ -25,7 +25,7 @@ _WORDS = {
 }
 
 
-#: what a client, or the server itself, has said
+#: halts by a command of a client or of the server itself
 WORDS = frozenset(
     {
         TaskReason.OPERATOR,
@@ -45,44 +45,44 @@ class LastHalt(NamedTuple):
 
 
 class Halts:
-    """The halts of one vehicle: how many there were, and the last."""
+    """Counter of one vehicle's halts, with the last one."""
 
     def __init__(self, *, epoch: int = 1) -> None:
         self.epoch = epoch
-        self.at = -inf  #: s, when the last came
-        self.by: Hashable = None  #: whose word it was; None: nobody's
-        self.number = -1  #: of that word, among those of its sender
-        self.command = 0  #: of that word, if it is one
+        self.at = -inf  #: s, when the last one came
+        self.by: Hashable = None  #: sender of the command; None: no command
+        self.number = -1  #: of that command, in its sender's sequence
+        self.command = 0  #: MAV_CMD of that command, if it is one
         self._numbers: dict[Hashable, int] = {}  # of the last halt of each sender
-        self.is_undone = False  #: somebody has let the queue go on since
-        self.restored_at = -inf  #: s, when this server began, after another one
+        self.is_undone = False  #: the queue was resumed since
+        self.restored_at = -inf  #: s, when this run loaded an earlier one
         self._reason, self._actor = TaskReason.NONE, ""
-        self._was_asked = False  # to go on, since the last
-        self._shown_at = -inf  # s, the last disarming that was said before
-        self._counted_at = -inf  # s, when the last came that is no other one again
+        self._was_asked = False  # to resume, since the last halt
+        self._shown_at = -inf  # s, when the vehicle last showed a commanded disarming
+        self._counted_at = -inf  # s, when the last halt came that counted
 
     def __repr__(self) -> str:
         return f"Halts({self.epoch}, {self.words})"
 
     @property
     def words(self) -> str:
-        """The last halt, and who said it."""
+        """The last halt and its actor as text."""
         what = _WORDS.get(self._reason) or words_of(self._reason)
-        who = self._actor.partition("@")[0]  # the endpoint says nothing to people
+        who = self._actor.partition("@")[0]  # the endpoint means nothing to people
         return what if self._actor in ("", SERVER) else f"{what} by {who}"
 
     @property
     def is_by_word(self) -> bool:
-        """Whether the last is somebody's word, and not what was seen of the vehicle."""
+        """Whether the last halt was a command, and not seen in the vehicle's telemetry."""
         return self._reason in WORDS
 
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
-        """Count a halt. Return False if it is the last one again, and is not counted."""
+        """Count a halt. Return False if it repeats the last one and does not count."""
         is_same = (reason, actor) == (self._reason, self._actor)
         if self._reason is TaskReason.DISARMED and reason in TAKEN and now <= self._shown_at:
-            self.at = now  # it shows what was said
+            self.at = now  # the vehicle shows the commanded disarming
             return False
-        self.at = now  # the last of them, by which words are overtaken
+        self.at = now  # a repeated halt, too, makes older commands stale
         if is_same and now - self._counted_at < SAME and not self._was_asked:
             return False
         self.epoch += 1
@@ -93,18 +93,18 @@ class Halts:
         return True
 
     def shows_disarmed(self, *, now: float) -> None:
-        """Note that the vehicle shows it is disarmed: that may be what was said just before."""
+        """Note that the vehicle shows it is disarmed, which may be due to the last command."""
         if self._reason is TaskReason.DISARMED and now - self.at <= SHOWN:
             self._shown_at = now
 
     def lets_go(self) -> None:
-        """Note that the queue goes on; that does not arm what was disarmed."""
+        """Note that the queue was resumed; that does not undo a disarming."""
         self.is_undone = self._reason is not TaskReason.DISARMED
 
     def was_said_by(self, sender: Hashable, number: int, *, command: int = 0) -> None:
-        """Note whose word the last halt was, its number among the sender's, and its command.
+        """Note the sender of the last halt, its command, and the number of that command.
 
-        A copy of an older one of the same sender, which comes late, is not the last.
+        A late copy of an older halt of the same sender does not replace the last one.
         """
         before = self._numbers.pop(sender, -1)
         if number >= before:
@@ -115,5 +115,5 @@ class Halts:
             del self._numbers[next(iter(self._numbers))]
 
     def was_asked_to_go_on(self) -> None:
-        """Note that a word that lets go has come, whatever became of it."""
+        """Note a request to resume, whether it was accepted or not."""
         self._was_asked = True

@@ -1,7 +1,7 @@
-"""The states of a task and every move between them, as one table.
+"""The states of a task and every transition between them, as one table.
 
-A move that is not in TRANSITIONS is our own mistake and raises. States in TERMINAL are over for
-good. ``tools/state_diagram.py`` draws this table into ``mav_tasks/README.md``. The numbers are
+A transition that TRANSITIONS lacks is a bug and raises. A task in a TERMINAL state never changes
+again. ``tools/state_diagram.py`` draws this table into ``mav_tasks/README.md``. The numbers are
 those of the dialect's TASK_STATE and TASK_REASON.
 """
 
@@ -11,9 +11,9 @@ from mav_tasks.errors import IllegalTransition
 
 
 class TaskState(IntEnum):
-    """Where a task is in its life."""
+    """The state of a task."""
 
-    #: asked about, but not known here
+    #: the answer for an id that the server does not know
     UNKNOWN = 0
     #: start time not reached
     SCHEDULED = 1
@@ -25,18 +25,18 @@ class TaskState(IntEnum):
     STARTING = 4
     #: the only state in which the vehicle is driven
     EXECUTING = 5
-    #: interrupted with its exact remainder; resumes through STARTING
+    #: interrupted; keeps its exact remainder, and resumes through STARTING
     PAUSED = 6
-    #: zero velocity is out, standstill not yet measured
+    #: zero velocity was sent, standstill not yet measured
     CANCELLING = 7
-    #: somebody must decide what becomes of it; blocks its vehicle's queue
+    #: needs a decision (again, remainder, skip); blocks its vehicle's queue
     HELD = 8
     COMPLETED = 9
     FAILED = 10
     CANCELLED = 11
     #: ended by STOP or by a kill
     KILLED = 12
-    #: its deadline passed before it began
+    #: its deadline passed before it started
     EXPIRED = 13
 
 
@@ -109,12 +109,12 @@ class TaskReason(IntEnum):
 
 #: a task is paused because a person, another program or the rover's own failsafe drives the rover
 TAKEN = frozenset({TaskReason.TAKEOVER, TaskReason.FAILSAFE})
-#: a task goes on by itself when that is over
+#: a task paused by one of these resumes by itself when the loss is over
 LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST})
 
 _WORDS = {
     **{reason: reason.name.lower().replace("_", " ") for reason in TaskReason},
-    # where the name of a reason is not what people say
+    # reasons whose name is not what people say
     TaskReason.FRAME_RESET: "position reference changed",
     TaskReason.OFF_TRACK: "off track",
     TaskReason.FAILSAFE: "failsafe of the rover",
@@ -123,7 +123,7 @@ _WORDS = {
 
 
 def words_of(reason: TaskReason) -> str:
-    """Return a reason as people read it."""
+    """Return a reason as text for people."""
     return _WORDS[reason]
 
 
@@ -191,14 +191,15 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
     },
 }
 
-#: a task begins its life in one of these
+#: the states in which a task can be created
 INITIAL = frozenset({_S.SCHEDULED, _S.BLOCKED, _S.QUEUED})
-#: over for good; never changes again
+#: final: a task never leaves these
 TERMINAL = frozenset({_S.COMPLETED, _S.FAILED, _S.CANCELLED, _S.KILLED, _S.EXPIRED})
-#: not begun
+#: not started
 WAITING = INITIAL
-#: begun and not over: at most one such task a vehicle, except for those pre-empted
+#: has the vehicle: at most one such task per vehicle
 RUNNING = frozenset({_S.STARTING, _S.EXECUTING, _S.CANCELLING})
+#: started and not over: several per vehicle if tasks are suspended
 ACTIVE = frozenset({_S.STARTING, _S.EXECUTING, _S.PAUSED, _S.CANCELLING, _S.HELD})
 
 

@@ -1,7 +1,7 @@
-"""The tasks of one vehicle as they stand: its queue, those begun, and what makes the queue stand.
+"""The tasks of one vehicle as they stand: queue, active and suspended tasks, and the pause.
 
 The STOP latch is the queue's pause reason STOPPED: there is no second flag. One task at a time has
-the vehicle; others may have begun and be set aside: pre-empted, or held.
+the vehicle. Others may have started and be suspended: pre-empted, or held.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from mav_tasks.tasks.view import VehicleView
 
 R, S = TaskReason, TaskState
 
-#: what the person who reads a refusal may do about it
+#: what an operator can do about a refusal
 WAYS_OUT = {
     R.WRONG_MODE: "wrong mode, set HOLD first",
     R.DISARMED: "disarmed; continue, or arm it",
@@ -36,18 +36,18 @@ WAYS_OUT = {
 
 @dataclass(frozen=True, slots=True)
 class Released:
-    """A held task that a person has released, and that goes on when the vehicle is up."""
+    """A held task that a person has released, and that waits for the vehicle or the queue."""
 
     task_id: TaskId
     again: bool
-    may_continue: bool  # who has released it might also let the queue go on
+    may_continue: bool  # the releasing client may also resume the queue
     actor: str
     until: float
     waits_for: TaskReason
 
 
 class Lineup:
-    """What there is of tasks of the vehicle with this system id, and how it stands."""
+    """State of the tasks of the vehicle with this system id."""
 
     def __init__(
         self, vehicle: int, registry: TaskRegistry, room: PendingTasks, settings: Settings
@@ -58,28 +58,28 @@ class Lineup:
         self.settings = settings
         #: the tasks that are ready
         self.queue: TaskQueue = room.queue(vehicle)
-        #: where it may drive, and where it returns to
+        #: its fence, rally points and home
         self.bounds = Bounds()
         self.executor = Executor(registry, settings, self.bounds)
-        #: what its tasks go by beside their own terms
+        #: values of the vehicle that hold for all its tasks
         self.terms = VehicleTerms(vehicle, registry, self.executor, self.bounds, settings)
-        #: how many tasks of a submitter wait, on any vehicle
+        #: how many tasks of a submitter's owner wait, on any vehicle
         self.count_of = room.count_of
-        #: takes a task in; Rejection when too many wait
+        #: add a task; raise Rejection if too many wait
         self.submit = room.submit
         self.suspended_ids: dict[TaskId, None] = {}
         self.of_earlier_run: set[TaskId] = set()
         self.displaced = LedAway()
-        #: why the queue stands, or NONE
+        #: why the queue is paused, or NONE
         self.paused = R.NONE
-        #: what made the vehicle stand, and when
+        #: the halts of the vehicle
         self.halts = Halts()
         #: the task that runs although the queue is paused
         self.immediate: TaskId | None = None
-        #: killed: nothing begins before the vehicle stands
+        #: a task was killed: nothing starts before the vehicle stands
         self.stopping_after_kill = False
         self.begun_at = 0.0
-        #: a held task that waits until the vehicle has restarted, or the queue goes on
+        #: a held task that waits until the vehicle has rebooted, or the queue resumes
         self.released: Released | None = None
 
     def __repr__(self) -> str:
@@ -87,18 +87,18 @@ class Lineup:
 
     @property
     def active(self) -> Task | None:
-        """The task that has the vehicle: begun, not over and not set aside."""
+        """The task that has the vehicle: started, not over and not suspended."""
         task_id = self.executor.task_id
         return None if task_id is None else self.registry.get(task_id)
 
     @property
     def suspended(self) -> list[Task]:
-        """The tasks that are suspended."""
+        """Suspended tasks: pre-empted, or held."""
         return [self.registry[task_id] for task_id in self.suspended_ids]
 
     @property
     def is_driving(self) -> bool:
-        """Whether any task has begun and is not over."""
+        """Whether any task has started and is not over."""
         return self.active is not None or bool(self.suspended_ids)
 
     @property
@@ -113,22 +113,22 @@ class Lineup:
 
     @property
     def next_waiting(self) -> TaskId | None:
-        """The task that is next in the queue."""
+        """The first task in the queue, or None."""
         return self.queue.first()
 
     @property
     def capacity(self) -> int:
-        """How many tasks may wait."""
+        """Maximum number of waiting tasks."""
         return self.settings.queueing.capacity
 
     @property
     def is_idle(self) -> bool:
-        """Whether there is neither a active task nor one that could begin now."""
+        """Whether no task is active, suspended or ready to start."""
         return not self.is_driving and len(self.queue) == 0
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is no task at all that is not over."""
+        """Whether all tasks are over."""
         return not self.is_driving and self.room.count(self.vehicle) == 0
 
     @property
@@ -145,21 +145,21 @@ class Lineup:
         if first + count <= len(self.queue):
             return self.queue.page(first, count)
         if first >= self.room.count(self.vehicle):
-            return []  # without putting all that wait in order
+            return []  # without sorting all waiting tasks
         return self.waiting[first : first + count]
 
     def start_time(self, task: Task) -> float:
-        """Return the monotonic time before which a task does not begin; -inf without one."""
+        """Return the monotonic time before which a task does not start; -inf if it has none."""
         return self.room.times.start(task.terms)
 
     def timing_of(self, task: Task) -> Timing | None:
-        """Return how evenly a task's setpoints have left, None if it was not driven."""
+        """Return a task's setpoint timing, None if it was not driven."""
         active = self.active
         return self.executor.timing if active is not None and active.id == task.id else task.timing
 
     @property
     def held(self) -> Task | None:
-        """The task that somebody must decide about; None: there is none, or it is decided."""
+        """The held task that needs a decision; None without one, or once it is released."""
         active = self.active
         if active is not None and active.state is S.HELD:
             return active if self.released is None else None
@@ -167,7 +167,7 @@ class Lineup:
 
     @property
     def is_held_ahead(self) -> bool:
-        """Whether a held task keeps all others from beginning."""
+        """Whether a held task keeps all others from starting."""
         task_id = self.executor.task_id
         active = None if task_id is None else self.registry.get(task_id)
         if active is not None and active.state is S.HELD:
@@ -176,25 +176,25 @@ class Lineup:
 
     @property
     def resumes_by_itself(self) -> bool:
-        """Whether a task stands only as long as the vehicle, or its position, is not heard of."""
+        """Whether a task is paused only until the vehicle, or its position, is heard again."""
         return self.executor.resumes_by_itself
 
     @property
     def lost_since(self) -> float | None:
-        """Since when, in s, a task has stood that resumes by itself; None: none does."""
+        """When the task that resumes by itself was paused, in s; None without one."""
         return self.executor.lost_since
 
     def waits(self, task: Task) -> bool:
-        """Whether a task has not begun."""
+        """Return whether a task has not started."""
         return task.state in WAITING
 
-    # what several parts do
+    # shared by several parts
 
     def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Note that the vehicle is to stand: what lets it go on has to be newer than this.
+        """Record a halt of the vehicle; a request to resume must be newer.
 
-        What was to run at once and has not begun waits as any other; what was released and has not
-        begun is held as before.
+        An immediate task that has not started becomes an ordinary waiting one. A released task that
+        has not started is held as before.
         """
         self.released = None
         if self.immediate is not None and (self.active is None or self.active.id != self.immediate):
@@ -204,27 +204,27 @@ class Lineup:
             self.registry.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
 
     def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Let the queue stand; a STOP is not undone, nor that somebody else has the vehicle."""
+        """Pause the queue; this undoes neither a STOP nor a takeover."""
         if self.paused in (reason, R.STOPPED):
             return
         if self.paused in TAKEN and reason is R.OPERATOR:
-            return  # a pause does not say that all is well with the vehicle again
+            return  # a pause does not say that the vehicle is ours again
         self.paused = reason
         self.registry.record(QueuePaused(self.vehicle, reason, actor, now))
 
     def set_aside(self, task_id: TaskId) -> None:
-        """Let another task have the vehicle: this one has begun, and is not over."""
+        """Suspend the active task, so that another one can have the vehicle."""
         self.executor.give_up()
         self.suspended_ids[task_id] = None
 
     def check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
-        """Raise Rejection, with what may be done about it, while a goal could not be begun."""
+        """Raise Rejection, with a remedy, if a task with this goal could not start now."""
         blocker = start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
         if blocker:
             raise Rejection(blocker, f"cannot go on: {WAYS_OUT.get(blocker, words_of(blocker))}")
 
     def is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:
-        """Whether what is left of an earlier run was in coordinates that mean nothing any more."""
+        """Return whether a task of an earlier run has coordinates in a frame that is gone."""
         return (
             task.id in self.of_earlier_run
             and task.progress.anchor is not None

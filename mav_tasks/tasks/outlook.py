@@ -1,4 +1,4 @@
-"""What people ask about a task: why it waits, behind how many, how long. It decides nothing."""
+"""The outlook of a task for people: why it waits, its position, its times. It decides nothing."""
 
 from math import nan
 
@@ -24,9 +24,8 @@ def estimate(
 ) -> tuple[float, float]:
     """Return the estimated seconds until a task starts, and until it ends; NaN: not known.
 
-    The end of a finished task is negative: so long ago. Without a ``forecast`` only what costs
-    little is told: the end of a running task, and the times of a scheduled one if it is not kept
-    waiting.
+    The end of a finished task is negative: so long ago. Without a ``forecast`` only two cheap
+    estimates are made: the end of a running task, and both times of a scheduled one.
     """
     if task.state in (S.STARTING, S.EXECUTING):
         is_kept = task.state is S.STARTING and tasks.turns.blocker_of(task.id)
@@ -44,7 +43,7 @@ def estimate(
 
 
 def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
-    """Return why a task is not being executed; its own reason once it has begun."""
+    """Return why a task is not being executed: what blocks it, or its own reason."""
     match task.state:
         case S.SCHEDULED:
             return R.START_TIME

@@ -1,8 +1,8 @@
-"""Every task that has not begun, of all vehicles: what it waits for, and until when.
+"""The tasks of all vehicles that have not started: start times, deadlines, dependencies, queues.
 
-Start times, deadlines and dependencies are no vehicle's own business: a task can wait for one of
-another vehicle. What is ready is in its vehicle's queue. A task that others wait for is as urgent
-as the most urgent of them, directly or through others again.
+One object holds them all, because a task can depend on a task of another vehicle. A ready task is
+in its vehicle's queue. A task inherits the rank of the most urgent task that depends on it,
+directly or through others.
 """
 
 from collections import defaultdict
@@ -24,15 +24,15 @@ R, S = TaskReason, TaskState
 
 @dataclass(slots=True)
 class _Waiter:
-    """What is known of one waiting task beyond the registry."""
+    """Data of one waiting task that the registry does not have."""
 
-    came_at: float  # when it began to compete with others: submitted, or start time reached
+    came_at: float  # when it began to compete with others: submission, or start time
     own: Rank
-    rank: Rank  # its own, or that of one that waits for it
+    rank: Rank  # its own, or that of a more urgent dependent
 
 
 class PendingTasks:
-    """Tasks in SCHEDULED, BLOCKED and QUEUED, by what will let them go on."""
+    """Store of the tasks in SCHEDULED, BLOCKED and QUEUED."""
 
     def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
         self._registry = registry
@@ -42,16 +42,16 @@ class PendingTasks:
         self._of_vehicle: dict[int, int] = {}  # how many wait
         self._of_owner: dict[str, int] = {}
         self._dependencies = Dependencies(registry)
-        #: when each may begin, and until when
+        #: start times and deadlines
         self.times = Times()
-        #: the vehicles whose queues have got a task since they were taken
+        #: the vehicles whose tasks became ready or left since ``take_woken``
         self.woken: set[int] = set()
 
     def __repr__(self) -> str:
         return f"PendingTasks({len(self._waiters)} tasks)"
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings; the order of what waits already is kept."""
+        """Apply new settings; tasks that already wait keep their order."""
         self._settings = settings
 
     def queue(self, vehicle: int) -> TaskQueue:
@@ -63,11 +63,11 @@ class PendingTasks:
         return self._of_vehicle.get(vehicle, 0)
 
     def count_of(self, submitter: Submitter) -> int:
-        """Return how many tasks of a submitter wait, of all who are the same owner."""
+        """Return how many tasks of a submitter's owner wait."""
         return self._of_owner.get(submitter.owner, 0)
 
     def of(self, vehicle: int) -> list[TaskId]:
-        """Return all waiting tasks of a vehicle: first those that are ready, in order."""
+        """Return all waiting tasks of a vehicle: the ready ones in order, then the others."""
         ready = self.queue(vehicle).in_order()
         if len(ready) == self.count(vehicle):
             return ready
@@ -83,21 +83,21 @@ class PendingTasks:
         return ready + sorted(others, key=due_or_rank)
 
     def rank(self, task: Task) -> Rank:
-        """Return a task's rank among those that are ready; of an active one, as if it were."""
+        """Return a task's rank among the ready ones; for an active task, the rank it would have."""
         waiter = self._waiters.get(task.id)
         if waiter is not None:
             return waiter.rank
         return self._most_urgent(task.id, _own_rank(self._settings, task, task.submitted_at))
 
     def take_woken(self) -> set[int]:
-        """Return the vehicles whose queues have got a task since the last call."""
+        """Return the vehicles whose tasks became ready or left since the last call."""
         woken, self.woken = self.woken, set()
         return woken
 
-    # coming
+    # arrival
 
     def submit(self, draft: Draft, *, now: float) -> Task:
-        """Take a new task in; Rejection when there is no room, or nothing to run after."""
+        """Add a new task. Raise Rejection at a limit, or if its dependency cannot complete."""
         queueing = self._settings.queueing
         if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
             raise full(queueing.capacity)
@@ -109,18 +109,18 @@ class PendingTasks:
         state = self._state_by(draft.terms, now=now)
         task = self._registry.submit(draft, state=state, now=now)
         self._enter(task, owner, now=now)
-        if state is S.QUEUED:  # nobody is woken: it is not durable yet
+        if state is S.QUEUED:  # wakes nobody: it is not durable yet
             self._line_up(task)
         return task
 
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
-        """Take in the waiting ones of an earlier run's tasks, as they were."""
+        """Add those tasks of an earlier run that were waiting."""
         waiting = [task for task in tasks if task.state in WAITING]
         for task in waiting:
             due = self.times.start(task.terms)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
             self._enter(task, task.submitter.owner, now=came_at)
-            if task.id in self._dependencies:  # after a modification, in any order
+            if task.id in self._dependencies:  # a modification may have put dependents first
                 self._lift(task.id)
         ready: dict[int, list[Entry]] = {}
         others: list[Task] = []
@@ -134,7 +134,7 @@ class PendingTasks:
         for task in others:
             if task.id not in self._waiters or task.id in self.queue(task.vehicle):
                 continue
-            if self._dependencies.have_failed(task):  # the end of it was kept, what follows was not
+            if self._dependencies.have_failed(task):  # failure was stored, its consequence was not
                 self._fail(task.id, now=now)
                 self.ended(task.id, now=now)
             else:
@@ -151,10 +151,10 @@ class PendingTasks:
             self._dependencies.add(task.id, terms.after)
             self._lift(task.id)
 
-    # going on
+    # changes of state
 
     def _settle(self, task: Task, *, now: float) -> Task:
-        """Put a waiting task into the state that its terms ask for now."""
+        """Move a waiting task to the state and queue that its terms require now."""
         wanted = self._state_by(task.terms, now=now)
         if task.state is S.SCHEDULED and wanted is not S.SCHEDULED:
             waiter = self._waiters[task.id]
@@ -185,7 +185,7 @@ class PendingTasks:
         return S.QUEUED
 
     def handle_deadline(self, *, now: float) -> None:
-        """Let go on whose time has come, and end whose time is over."""
+        """Expire tasks whose deadline has passed, and settle those whose start time has come."""
         for at, task_id in self.times.take_over(now=now):
             task = self._waiting(task_id)
             if task is not None and task.terms.deadline == at:  # not modified since
@@ -196,7 +196,7 @@ class PendingTasks:
                 self._settle(task, now=now)
 
     def set_wall_offset(self, offset: float, *, now: float) -> None:
-        """UTC = monotonic time + offset from now on: moves what starts at a UTC time."""
+        """Set UTC minus monotonic time, s; this moves the tasks that start at a UTC time."""
         waiting = [self._registry[task_id] for task_id in self._waiters]
         self.times.set_wall_offset(offset, waiting)
         for task in waiting:
@@ -204,13 +204,13 @@ class PendingTasks:
                 self._settle(task, now=now)
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
-        """Change the terms of a waiting task; Rejection when it would wait for itself."""
+        """Change the terms of a waiting task. Raise Rejection if its dependency cannot complete."""
         if terms.after and terms.after != task.terms.after:
             self._dependencies.check(terms.after)
             self._dependencies.check_cycle(task, terms.after)
         before = task.terms.after
         if task.terms.is_staged and not terms.is_staged:
-            self._waiters[task.id].came_at = now  # it has not waited for the others until now
+            self._waiters[task.id].came_at = now  # it has not competed with others until now
         task = self._registry.modify(task.id, terms, actor=actor, now=now)
         self.times.note(task)
         if before != terms.after:
@@ -221,10 +221,10 @@ class PendingTasks:
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
 
-    # leaving
+    # removal
 
     def leave(self, task: Task) -> None:
-        """Let a task go: it begins, or is over."""
+        """Remove a task that starts or ends."""
         del self._waiters[task.id]
         self.queue(task.vehicle).discard(task.id)
         self._of_vehicle[task.vehicle] -= 1
@@ -240,13 +240,13 @@ class PendingTasks:
     def end(
         self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
     ) -> None:
-        """End a waiting task, and what waits for it."""
+        """End a waiting task, and fail its dependents."""
         self.leave(task)
         self._registry.change(task.id, state, reason=reason, actor=actor, now=now)
         self.ended(task.id, now=now)
 
     def withdraw(self, task: Task, *, now: float) -> None:
-        """Take back a submission that did not become durable, and what waits for it."""
+        """Withdraw a submission that did not become durable, and fail its dependents."""
         self.leave(task)
         self._registry.withdraw(task.id, now=now)
         for dependent in self._dependencies.take(task.id):
@@ -254,16 +254,16 @@ class PendingTasks:
             self.ended(dependent, now=now)
 
     def clear(self, vehicle: int, reason: TaskReason, *, actor: str, now: float) -> None:
-        """Cancel all that wait for a vehicle."""
+        """Cancel all waiting tasks of a vehicle."""
         cleared = [self._registry[task_id] for task_id in self.of(vehicle)]
-        for task in cleared:  # first all of them: a dependent is cleared, too, and not failed
+        for task in cleared:  # cancel all first, so that no dependent among them fails
             self.leave(task)
             self._registry.change(task.id, S.CANCELLED, reason=reason, actor=actor, now=now)
         for task in cleared:
             self.ended(task.id, now=now)
 
     def ended(self, task_id: TaskId, *, now: float) -> None:
-        """A task is over: let go on, or fail, what waits for it."""
+        """Settle the dependents of a task that completed, or fail those of a task that did not."""
         over = [task_id]
         while over:
             ended = self._registry.get(over.pop())
@@ -287,7 +287,7 @@ class PendingTasks:
         return self._registry[task_id] if task_id in self._waiters else None
 
     def _part(self, task_id: TaskId, after: int) -> None:
-        """A task runs after another one no more, which may be less urgent by that."""
+        """Remove a dependency; the task that was waited for may lose an inherited rank."""
         if self._dependencies.forget(task_id, after):
             self._lift(TaskId(after))
 
@@ -299,12 +299,12 @@ class PendingTasks:
         self._lift(task.id)
 
     def _most_urgent(self, task_id: TaskId, own: Rank) -> Rank:
-        """Return a task's own rank, or that of one that waits for it."""
+        """Return a task's own rank, or that of its most urgent dependent if that is more urgent."""
         dependents = map(self._waiters.get, self._dependencies.of(task_id))
         return min([own, *(waiter.rank for waiter in dependents if waiter is not None)])
 
     def _lift(self, task_id: TaskId) -> None:
-        """Return a task, and through it those that it waits for, the rank of who waits for it."""
+        """Update the rank of a task and, through it, of the tasks that it waits for."""
         seen = task_id
         while True:
             waiter = self._waiters.get(seen)

@@ -1,9 +1,9 @@
-"""The order of waiting tasks: the one place that decides it, and the queue of one vehicle.
+"""The queue of one vehicle, and the order of waiting tasks, which only this module decides.
 
-A higher priority runs first; within a priority, first come first served. Waiting makes a task more
-urgent by one priority in every ``aging`` seconds, which a static rank expresses: what counts is not
-how long each has waited so far but when each came. 10 is a class of its own, which nothing ages
-into.
+A higher priority runs first; within a priority, first come, first served. Every ``aging`` seconds
+of waiting count as one priority. All tasks age at the same rate, so that a static rank suffices: it
+depends on when a task came, not on how long it has waited. Priority 10 is a class of its own; no
+task ages into it.
 """
 
 from bisect import bisect_left, insort
@@ -16,7 +16,7 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, TaskId
 
 
 class Rank(NamedTuple):
-    """A place in the order: the smaller runs first."""
+    """Sort key of a task: the smaller one runs first."""
 
     is_ordinary: bool  # not of the highest priority
     urgency: float
@@ -33,7 +33,7 @@ def rank_of(priority: int, *, came_at: float, task_id: TaskId, aging: float) -> 
 
 
 class Entry(NamedTuple):
-    """One task in the queue; ``rank`` may be another's, of a task that waits for this one."""
+    """A task in the queue; ``rank`` may be inherited from a dependent."""
 
     task_id: TaskId
     rank: Rank
@@ -41,16 +41,16 @@ class Entry(NamedTuple):
     is_preemptive: bool = False
 
 
-#: where a task is in the order of all
+#: sort key in the order of all tasks
 _InOrder = tuple[Rank, TaskId]
-#: where it is among those that may interrupt
+#: sort key among the tasks that may interrupt
 _ByPriority = tuple[int, Rank, TaskId]
 
 
 class TaskQueue:
-    """The tasks of one vehicle that are ready, in the order in which they will run.
+    """The ready tasks of one vehicle, in the order in which they will run.
 
-    In plain sorted lists: nearly all come at the end, and to move 100,000 on takes some 20 µs.
+    Plain sorted lists: nearly all tasks are appended, and shifting 100,000 takes some 20 µs.
     """
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class TaskQueue:
         return task_id in self._entries
 
     def put(self, entry: Entry) -> None:
-        """Put a task in its place, or in its new place."""
+        """Insert a task, or move it to its new place."""
         task_id, rank, priority, is_preemptive = entry
         if task_id in self._entries:
             self.discard(task_id)
@@ -81,7 +81,7 @@ class TaskQueue:
             insort(self._preemptive, by_priority)
 
     def put_all(self, entries: Iterable[Entry]) -> None:
-        """Put many tasks in, of which none is here yet."""
+        """Insert many tasks; none of them may be in the queue yet."""
         for task_id, rank, priority, is_preemptive in (several := list(entries)):
             self._order.append((rank, task_id))
             self._by_priority.append((-priority, rank, task_id))
@@ -92,7 +92,7 @@ class TaskQueue:
             each.sort()
 
     def discard(self, task_id: TaskId) -> None:
-        """Take a task out, if it is here."""
+        """Remove a task if it is in the queue."""
         entry = self._entries.pop(task_id, None)
         if entry is not None:
             by_priority = (-entry.priority, entry.rank, task_id)
@@ -102,24 +102,24 @@ class TaskQueue:
                 _remove(self._preemptive, by_priority)
 
     def first(self) -> TaskId | None:
-        """Return the task that runs next."""
+        """Return the task that runs next, or None."""
         return self._order[0][1] if self._order else None
 
     def interrupters(self) -> list[TaskId]:
-        """Return the only tasks that may interrupt: the first pre-emptive one, and the first.
+        """Return the only tasks that may interrupt: the first pre-emptive one, and the first one.
 
-        By their own priority, and by their order within it: neither aging nor the urgency of
-        others makes a task interrupt.
+        First by priority, then by rank: neither aging nor an inherited rank lets a lower priority
+        interrupt.
         """
         firsts = (self._preemptive[:1], self._by_priority[:1])
         return [first[0][2] for first in firsts if first]
 
     def rank(self, task_id: TaskId) -> Rank:
-        """Return the rank by which a task waits here."""
+        """Return the rank with which a task waits in the queue."""
         return self._entries[task_id].rank
 
     def position(self, task_id: TaskId) -> int | None:
-        """Return how many tasks here run before this one, or None if it is not here."""
+        """Return how many queued tasks run before this one, or None if it is not queued."""
         entry = self._entries.get(task_id)
         return None if entry is None else bisect_left(self._order, (entry.rank, task_id))
 
@@ -133,10 +133,10 @@ class TaskQueue:
 
 
 def _remove(ordered: list[Any], item: tuple[Any, ...]) -> None:
-    """Take out of a sorted list what is in it."""
+    """Remove an item that a sorted list contains."""
     del ordered[bisect_left(ordered, item)]
 
 
 def full(capacity: int) -> Rejection:
-    """Return the refusal of one task too many for a vehicle."""
+    """Return the refusal of a task for a full queue."""
     return Rejection(TaskReason.QUEUE_FULL, f"queue full: {capacity} tasks wait")

@@ -1,7 +1,7 @@
-"""Every task of the server as its events have left it, and the events not yet taken.
+"""Every task of the server, and the events that ``take_events`` has not returned yet.
 
-All state changes of tasks go through here, so that the journal and the tasks cannot disagree.
-Events are numbered from 1; the store reports back up to which number they are durable.
+All changes of tasks go through the registry, so that the journal and the tasks cannot disagree.
+Events are numbered from 1. The store reports the number up to which they are durable.
 """
 
 from collections import Counter, defaultdict, deque
@@ -26,11 +26,11 @@ from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.timing import Timing
 
 STATES = len(TaskState)
-KEPT_FINISHED = 10_000  # tasks; the oldest finished are forgotten beyond this
+KEPT_FINISHED = 10_000  # tasks; beyond this the registry forgets the oldest finished ones
 
 
 class TaskRegistry:
-    """Tasks by id, and the numbered journal of what happens to them."""
+    """Tasks by id, and the numbered journal of their events."""
 
     def __init__(self, *, next_id: int = 1) -> None:
         self._next_id = next_id
@@ -40,7 +40,7 @@ class TaskRegistry:
         self._live: dict[tuple[Submitter, int, int], dict[TaskId, None]] = {}
         #: by vehicle, then by state
         self._counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
-        #: give a task, or None if there is none of that id (any more)
+        #: return a task, or None if the id is unknown or forgotten
         self.get: Callable[[int], Task | None] = cast("dict[int, Task]", self._tasks).get
         self._events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
@@ -66,7 +66,7 @@ class TaskRegistry:
         return list(self._counts.get(vehicle, [0] * STATES))
 
     def restore(self, tasks: Sequence[Task], *, next_id: int) -> None:
-        """Take over the tasks of an earlier run, all of them durable."""
+        """Load the tasks of an earlier run, all of them durable."""
         self._next_id = next_id
         self._tasks.update((task.id, task) for task in tasks)
         self._last_event.update(dict.fromkeys(self._tasks, 0))
@@ -83,10 +83,10 @@ class TaskRegistry:
                 self._note_live(task)
 
     def submit(self, draft: Draft, *, state: TaskState = TaskState.QUEUED, now: float) -> Task:
-        """Turn a draft into a task with an id of its own.
+        """Create a task from a draft, with the next free id.
 
-        After MAX_TASK_ID they begin at 1 again: whatever had such an id is long forgotten, and one
-        that is still kept is passed over.
+        Ids begin at 1 again after MAX_TASK_ID. The earlier tasks with these ids are long forgotten;
+        an id that is still in use is skipped.
         """
         task_id = TaskId(self._next_id)
         while task_id in self._tasks:
@@ -121,9 +121,9 @@ class TaskRegistry:
         progress: Progress | None = None,
         timing: Timing | None = None,
     ) -> Task:
-        """Move a task along an edge of the lifecycle table; IllegalTransition if it has none.
+        """Move a task to another state. Raise IllegalTransition if the lifecycle lacks the edge.
 
-        None for progress or timing: as they were.
+        ``progress`` and ``timing`` stay as they were if None.
         """
         old = self._tasks[task_id]
         check_transition(old.state, new)
@@ -170,7 +170,7 @@ class TaskRegistry:
         return task
 
     def advance(self, task_id: TaskId, progress: Progress, *, now: float) -> None:
-        """Keep that a task has begun its next leg."""
+        """Record a task's progress, as when it begins its next leg."""
         old = self._tasks[task_id]
         task = replace(old, progress=progress, version=old.version + 1)
         self._tasks[task_id] = task
@@ -178,23 +178,23 @@ class TaskRegistry:
         self.record(TaskAdvanced(task_id, task.vehicle, task.version, progress, now, item))
 
     def reached(self, task_id: TaskId, step: int, *, performs: bool, now: float) -> None:
-        """Tell of a step of a plan that is done; ``performs``: it is sent to the vehicle."""
+        """Record that a step of a plan is done; ``performs``: it is sent to the vehicle."""
         task = self._tasks[task_id]
         item = _item_number(task, step)
         self.record(StepReached(task_id, task.vehicle, step, performs, now, item))
 
     def note_progress(self, task_id: TaskId, progress: Progress) -> None:
-        """Keep live progress, for status only: no event, no new version."""
+        """Set live progress, for status only: no event, no new version."""
         self._tasks[task_id] = replace(self._tasks[task_id], progress=progress)
 
     def keep_progress(self, task_id: TaskId, *, now: float) -> None:
-        """Have the live progress stored, for whoever starts after a crash. No new version."""
+        """Store the live progress, for the next run after a crash. No new version."""
         task = self._tasks[task_id]
         event = TaskProgressed(task_id, task.vehicle, task.version, task.progress, now)
         self.record(event)
 
     def withdraw(self, task_id: TaskId, *, now: float) -> None:
-        """Take back a submission that did not become durable in time."""
+        """Withdraw a submission that did not become durable in time."""
         task = self._tasks.pop(task_id)
         self._counts[task.vehicle][task.state] -= 1
         self._forget_live(task)
@@ -202,17 +202,17 @@ class TaskRegistry:
         self.record(TaskWithdrawn(task_id, task.vehicle, now))
 
     def latest(self, submitter: Submitter, command: int, *, vehicle: int) -> Task | None:
-        """Return a client's latest task of a command that is not over."""
+        """Return a client's latest unfinished task of a command, or None."""
         live = self._live.get((submitter, command, vehicle))
         return self._tasks[next(reversed(live))] if live else None
 
     def finished(self, vehicle: int, first: int, count: int) -> list[TaskId]:
-        """Return up to ``count`` tasks of a vehicle that are over, newest first; skip ``first``."""
+        """Return a vehicle's finished tasks, newest first: ``count`` from offset ``first`` on."""
         over = (each for each in reversed(self._finished) if self._tasks[each].vehicle == vehicle)
         return list(islice(over, first, first + count))
 
     def is_awaited_at(self, link: str, endpoint: str) -> bool:
-        """Whether a task from a client's endpoint is not over."""
+        """Return whether a client's endpoint has an unfinished task."""
         return any((s.link, s.endpoint) == (link, endpoint) for s, _, _ in self._live)
 
     def record(self, event: Event) -> None:
@@ -221,7 +221,7 @@ class TaskRegistry:
         self._events.append(event)
 
     def is_durable(self, task_id: TaskId) -> bool:
-        """Whether all that happened to the task so far is on the disk."""
+        """Return whether the task's last submission, state change or modification is durable."""
         return self._last_event[task_id] <= self.durable
 
     def take_events(self) -> list[Event]:
@@ -250,7 +250,7 @@ class TaskRegistry:
 
 
 def _item_number(task: Task, step: int) -> int:
-    """Return the number of an item in its file; 0: no item, as past the end or of no plan."""
+    """Return a step's item number in its file; 0: home, past the end, or no plan."""
     if not isinstance(task.goal, Plan) or not 0 <= step < len(task.goal.steps):
         return 0
     return task.goal.item_number(step)

@@ -1,4 +1,4 @@
-"""Held tasks that somebody releases: what is left of them, and what they wait for before it."""
+"""Releases of held tasks: checks of the remainder, and what a released task waits for."""
 
 from dataclasses import replace
 
@@ -16,12 +16,12 @@ from mav_tasks.tasks.view import VehicleView
 
 R, S = TaskReason, TaskState
 
-#: of a vehicle that restarts: what a release waits for
+#: what a release waits for while a vehicle reboots
 OF_RESTART = frozenset({R.VEHICLE_SILENT, R.NO_POSITION})
 
 
 class Releases:
-    """The releases of one vehicle's held tasks; one waits at a time."""
+    """Handler of the releases of one vehicle's held tasks; one release waits at a time."""
 
     def __init__(self, lineup: Lineup) -> None:
         self._lineup = lineup
@@ -39,12 +39,12 @@ class Releases:
         actor: str,
         now: float,
     ) -> None:
-        """Let a held task go on from here: all of it again, or its remainder.
+        """Resume a held task from here: all of it (``again``), or its remainder.
 
-        Raise Rejection, and change nothing, while it could not take the vehicle. While the queue is
-        paused, or a vehicle that has restarted is not up yet, the task waits for that, until
-        something halts it. A pause for a restart is over for it if who releases it
-        ``may_continue``.
+        Raise Rejection, and change nothing, if the task could not take the vehicle now. If the
+        queue is paused, or the vehicle has rebooted and is not ready, the task waits for that, for
+        ``ready_timeout`` at most for the reboot, or until something halts it. It does not wait for
+        a queue that is paused for a restart if the client ``may_continue`` it.
         """
         if self._lineup.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
@@ -71,7 +71,7 @@ class Releases:
         self._begin_released(again=again, actor=actor, now=now)
 
     def look(self, seen: VehicleView, *, now: float) -> None:
-        """Let a released task begin when the vehicle is up, or hold it as before."""
+        """Start a released task once nothing blocks it; hold it as before if it cannot start."""
         release, task = self._lineup.released, self._lineup.active
         if release is None:
             return
@@ -100,16 +100,16 @@ class Releases:
     def _waits_for(
         self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
     ) -> TaskReason:
-        """Return what a held task waits for that is released, NONE if it can go on."""
+        """Return what a released task waits for, NONE if it can go on."""
         if self._lineup.paused and not (self._lineup.paused is R.RESTARTED and may_continue):
             return R.QUEUE_PAUSED
         return self._waits_for_restart(task, seen, now=now)
 
     def _waits_for_restart(self, task: Task, seen: VehicleView, *, now: float) -> TaskReason:
-        """Return what a held task waits for, NONE unless the vehicle restarts and is not up."""
+        """Return what a held task waits for while its vehicle reboots, NONE otherwise."""
         if task.reason is not R.FRAME_RESET:
             return R.NONE
-        if seen.heard and seen.is_booting:  # and shows another mode for a moment
+        if seen.heard and seen.is_booting:  # it shows another mode for a moment
             return R.NO_POSITION
         goal = goal_of(task)
         blocker = start_blocker(seen, watch=self._lineup.settings.watch, now=now, goal=goal)
@@ -121,7 +121,7 @@ class Releases:
         self._lineup.registry.record(VehicleNoted(self._lineup.vehicle, words, now))
 
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:
-        """What is left must be known: measured along its line, or counted until it was held."""
+        """Raise Rejection unless the remainder is known, on its line or by what was counted."""
         progress = task.progress
         if task.reason is R.FRAME_RESET and has_local_place(task.goal):
             words = (

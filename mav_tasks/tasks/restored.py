@@ -1,4 +1,4 @@
-"""What a store gives back when the server starts: the tasks as their events had left them."""
+"""The state that a store returns when the server starts, as the events had left it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,14 +13,14 @@ from mav_tasks.tasks.task import Task
 class Restored:
     """The state of an earlier run. All times are monotonic seconds of the present one.
 
-    ``tasks`` are in the order of their submission, ``next_id`` is the id of the next. ``paused``
-    are the queues that stood, with the reason, ``uids`` the vehicles' unique ids, ``speeds`` their
-    default speeds in m/s, ``homes`` where they return to, ``halt_epochs`` how often they were
-    halted, and ``halted`` why and when the last time, each by system id; ``disarmed`` are those
-    that somebody has disarmed. ``plans`` by system id and kind are (id, source) as PlanStored has
-    them, ``parameters`` the last value of each by name, ``signatures`` and ``signed_until`` what
-    SignaturesSeen had said. ``ended_well``: the last run closed its store; ``idle`` is the seconds
-    since it last wrote. ``wall_offset`` is UTC less monotonic time.
+    ``tasks`` are in the order of their submission, ``next_id`` is the id of the next. By system id:
+    ``paused`` are the paused queues with the reason, ``uids`` the vehicles' unique ids, ``speeds``
+    their default speeds in m/s, ``homes`` their homes, ``halt_epochs`` their numbers of halts,
+    ``halted`` the reason and time of the last halt, ``disarmed`` the vehicles that a person
+    disarmed. ``plans`` by system id and kind are (id, source) as in PlanStored, ``parameters`` the
+    last value of each by name, ``signatures`` and ``signed_until`` those of SignaturesSeen.
+    ``ended_well``: the last run closed its store; ``idle`` is the seconds since it last wrote.
+    ``wall_offset`` is UTC minus monotonic time.
     """
 
     tasks: tuple[Task, ...] = ()

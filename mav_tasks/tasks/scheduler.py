@@ -1,4 +1,4 @@
-"""Which task may run, what it waits for, and which may interrupt which: pure decisions."""
+"""Scheduling decisions as pure functions: what blocks a start, and which task may interrupt."""
 
 from mav_tasks.settings import Queueing, Watch
 from mav_tasks.tasks.frames import local_place
@@ -11,9 +11,9 @@ from mav_tasks.tasks.view import ModeKind, VehicleView
 def start_blocker(
     view: VehicleView, *, watch: Watch, now: float, goal: SingleGoal | None = None
 ) -> TaskReason:
-    """Return why no task, or not one of this goal, can take control of the vehicle now, or NONE.
+    """Return why no task (or none with this goal) can take control of the vehicle now, or NONE.
 
-    Modes are taken only from HOLD or from one that we set; from MANUAL only while disarmed.
+    The server takes over only from HOLD, from a mode that it set, or from MANUAL while disarmed.
     """
     if not view.heard or view.is_unknown:
         return TaskReason.VEHICLE_SILENT
@@ -37,14 +37,14 @@ def start_blocker(
 
 
 def place_of(goal: GoTo, view: VehicleView) -> LocalPlace | None:
-    """Return a goal's place in the vehicle's frame, or None while that is unknown."""
+    """Return a goal's place in the vehicle's local frame, or None while that is unknown."""
     return local_place(view.home if goal.place is None else goal.place, view.origin)
 
 
 def outranks(waiting: Task, running: Task, *, queueing: Queueing) -> bool:
-    """Whether a waiting task may interrupt a running one.
+    """Return whether a waiting task may interrupt a running one.
 
-    By what they were submitted or modified with: neither aging nor the urgency of others counts.
+    Only the submitted or modified terms count, not aging and not an inherited rank.
     """
     if not running.terms.is_preemptible:
         return False

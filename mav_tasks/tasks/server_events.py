@@ -1,11 +1,11 @@
-"""What happens to the server itself, beside its tasks: parameters that were set, and signatures."""
+"""Events of the server itself, not of its tasks: parameters set, and signatures."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterSet:
-    """A setting was changed by a client, in the unit of its parameter; None: as configured."""
+    """A client changed a setting, in the unit of its parameter; None: as configured."""
 
     name: str
     value: float | None
@@ -19,9 +19,9 @@ class ParameterSet:
 
 @dataclass(frozen=True, slots=True)
 class SignatureTime:
-    """The time of the last signed packet that was accepted of one sender, in 10 µs since 2015.
+    """Timestamp of the last signed packet accepted from one sender, in 10 µs since 2015.
 
-    ``key`` is the fingerprint of the key that it was signed with.
+    ``key`` is the fingerprint of the signing key.
     """
 
     key: str
@@ -33,10 +33,10 @@ class SignatureTime:
 
 @dataclass(frozen=True, slots=True)
 class SignaturesSeen:
-    """Up to which times signatures are used up, so that none is accepted twice.
+    """The last accepted signature timestamps, stored so that no packet is accepted twice.
 
-    ``gone`` are senders of which nothing is remembered any more; ``signed_until``: no signature of
-    our own is later than this. Kept, but no part of the journal: there are many.
+    ``gone`` are senders that the server has forgotten. ``signed_until``: no signature of our own is
+    later than this. The store keeps these events, but not in the journal: there are too many.
     """
 
     times: tuple[SignatureTime, ...]
@@ -50,7 +50,7 @@ class SignaturesSeen:
 
 @dataclass(frozen=True, slots=True)
 class SignatureRefused:
-    """A packet that was signed well, for another time than the server's, was not looked at.
+    """A packet with a valid signature was dropped because of its timestamp.
 
     ``seconds`` is how long before the server's time it was signed; negative: after it.
     """

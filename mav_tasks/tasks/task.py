@@ -1,4 +1,4 @@
-"""What a task is: frozen values. SI units and radians; angles clockwise from north."""
+"""Tasks and their parts, as frozen values. SI units and radians; angles clockwise from north."""
 
 from dataclasses import dataclass
 from typing import NewType
@@ -8,28 +8,28 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.timing import Timing
 
 TaskId = NewType("TaskId", int)
-#: the largest that a parameter can name (``mavlink.float_param``): 34 years of a task a second
+#: the largest that a float parameter can carry (``mavlink.float_param``): 34 years at one task/s
 MAX_TASK_ID = 0x3F7FFFFF
 MAX_NONCE = MAX_TASK_ID
 
 
 def following(task_id: int) -> TaskId:
-    """Return the id that is given after this one."""
+    """Return the id after this one; 1 follows MAX_TASK_ID."""
     return TaskId(task_id % MAX_TASK_ID + 1)
 
 
 DEFAULT_PRIORITY = 5
 MAX_PRIORITY = 10  # 10 runs first
 
-#: degE7, 0.1 m: one that is worked out from positions differs by 1 each time (ArduPilot 4.6.3)
+#: degE7, 0.1 m: an origin computed from positions varies by 1 each time (ArduPilot 4.6.3)
 SAME_ORIGIN = 10
-CLOCK_ERROR = 0.12  # of the time: simulators run at 0.9 of it and less, a real clock at 0.9999
-SAME_BOOT = 5.0  # s between two estimates of when a vehicle booted, that may be of the same boot
+CLOCK_ERROR = 0.12  # of the elapsed time: simulators run at 0.9 or less, a real clock at 0.9999
+SAME_BOOT = 5.0  # s; two estimates of the boot time this close may be of the same boot
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a vehicle stands in its local frame: metres north and east, yaw in radians."""
+    """A vehicle's pose in its local frame: metres north and east, yaw in radians."""
 
     north: float
     east: float
@@ -38,7 +38,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """A piece of a path: ``length`` m on a circle or straight on, negative if driven backwards.
+    """A piece of a path: ``length`` m of arc or straight line, negative if driven backwards.
 
     ``curvature`` in 1/m, positive where driving forwards turns clockwise, 0 = straight.
     """
@@ -49,10 +49,10 @@ class Bend:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Which local frame coordinates are in: its origin, if known, and when the vehicle booted.
+    """The identity of a vehicle's local frame: its origin, if known, and the vehicle's boot time.
 
-    ``booted_at`` in monotonic seconds, as of ``heard_at``, good to a second or two; a vehicle whose
-    clock is slow seems to have booted later and later. Another boot is another frame.
+    ``booted_at`` is in monotonic seconds, estimated at ``heard_at``, and good to a second or two.
+    It drifts later if the vehicle's clock is slow. A reboot begins a new frame.
     """
 
     latitude_degE7: int | None
@@ -62,7 +62,7 @@ class Frame:
 
 
 def same_frame(one: Frame | None, other: Frame | None) -> bool:
-    """Whether coordinates of one frame mean the same in the other, as far as can be told."""
+    """Return whether coordinates mean the same in both frames, as far as is known."""
     if one is None or other is None:
         return False
     is_near = _is_near(one.latitude_degE7, other.latitude_degE7) and _is_near(
@@ -76,7 +76,7 @@ def _is_near(one_degE7: int | None, other_degE7: int | None) -> bool:
 
 
 def _drift(one: Frame, other: Frame) -> float:
-    """Return by how many seconds a vehicle's clock may have gone wrong between the two."""
+    """Return the seconds by which a vehicle's clock may have drifted between two estimates."""
     if one.heard_at is None or other.heard_at is None:
         return 0.0
     return CLOCK_ERROR * abs(one.heard_at - other.heard_at)
@@ -84,21 +84,21 @@ def _drift(one: Frame, other: Frame) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Submitter:
-    """Who submitted a task: link, endpoint on it, MAVLink address, and key.
+    """The client that submitted a task: link, endpoint on it, MAVLink address, and key.
 
-    All QGroundControls are 255/190 and all MAVSDK scripts 245/190: only the endpoint tells two of
-    them apart.
+    Every QGroundControl is 255/190 and every MAVSDK script 245/190, so only the endpoint
+    distinguishes two of them.
     """
 
     link: str
     endpoint: str
     system_id: int
     component_id: int
-    #: name of the key that signed it, "" for none
+    #: name of the signing key, "" for none
     key: str = ""
 
     def __hash__(self) -> int:
-        return hash(self.endpoint)  # nearly unique, and a string keeps its hash
+        return hash(self.endpoint)  # nearly unique, and a string caches its hash
 
     def __str__(self) -> str:
         signed = f" signed {self.key}" if self.key else ""
@@ -106,26 +106,26 @@ class Submitter:
 
     @property
     def place(self) -> str:
-        """MAVLink address and endpoint in words, as settings name a client."""
+        """MAVLink address and endpoint as text, the form in which settings name a client."""
         return f"{self.address}@{self.endpoint}"
 
     @property
     def owner(self) -> str:
-        """Whose its tasks are: of all who sign with its key, or of its endpoint."""
+        """Owner of the client's tasks: its key if it has one, otherwise its link and endpoint."""
         return f"key {self.key}" if self.key else f"{self.link} {self.endpoint}"
 
     @property
     def address(self) -> str:
-        """The MAVLink address in words."""
+        """MAVLink address as text."""
         return f"{self.system_id}/{self.component_id}"
 
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """By what a submission is recognised when it comes again.
+    """The fields that identify a repeated submission.
 
-    ``payload`` and ``packet`` are digests: of what it asks for, and of the packet byte by byte.
-    ``nonce`` is the client's own mark, 0 for none.
+    ``payload`` is a digest of the request, ``packet`` a digest of the packet's bytes. ``nonce`` is
+    chosen by the client, 0 for none.
     """
 
     nonce: int = 0
@@ -135,14 +135,14 @@ class Marks:
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """On what terms a task waits and runs; all of it can be modified later.
+    """When and how a task runs; every term can be modified later.
 
-    ``start_at`` and ``deadline`` are monotonic seconds: not begun before, begun by then;
-    ``start_utc`` is in seconds since 1970. ``after`` is the id of the task that must complete
-    first, 0 for none. ``is_staged``: waits until somebody starts it. ``top_speed`` in m/s: it is
-    driven no faster, whatever speed is set; None: as fast as the settings allow. ``is_cruising``:
-    where it names no speed it is driven as fast as the vehicle itself would. ``label`` is a name
-    that its submitter gave it, "" for none; it changes nothing.
+    A task does not start before ``start_at`` (monotonic seconds) and ``start_utc`` (seconds since
+    1970), and expires if it has not started by ``deadline`` (monotonic seconds). ``after`` is the
+    id of the task that must complete first, 0 for none. ``is_staged``: it waits for a start
+    command. ``top_speed`` in m/s limits any other speed; None: only the settings limit it.
+    ``is_cruising``: if the goal names no speed, the task drives at the vehicle's own cruise speed.
+    ``label`` is the submitter's name for the task, "" for none; it changes nothing.
     """
 
     priority: int = DEFAULT_PRIORITY
@@ -160,7 +160,7 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A submission that passed parsing, before it has an id. ``command`` is the MAV_CMD number."""
+    """A parsed submission that has no id yet. ``command`` is the MAV_CMD number."""
 
     vehicle: int
     command: int
@@ -172,18 +172,18 @@ class Draft:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a task has come; enough to resume it exactly.
+    """How far a task has got; enough to resume it exactly.
 
-    ``leg`` is the part of the goal that is being driven, ``anchor`` the pose from which it counts
-    (None: not begun), ``done`` the metres along the line, the radians turned or the seconds spent
-    since then, ``target`` the place that a GoTo means; ``frame`` is the local frame that both are
-    in. ``path`` is the way from the anchor to the end of the leg, where the vehicle steers as a
-    car. ``execution_time`` is the seconds spent EXECUTING, all legs together.
+    ``leg`` is the leg being driven and ``anchor`` the pose where it started (None: not started).
+    ``done`` is the metres along the line, the radians turned or the seconds spent since the anchor.
+    ``target`` is the place of a GoTo. ``frame`` is the local frame of anchor and target. ``path``
+    leads from the anchor to the end of the leg if the vehicle steers as a car. ``execution_time``
+    is the seconds in EXECUTING, over all legs.
 
-    Of a plan, ``step`` is the one that is being driven (-1: not begun) and legs are its legs;
-    ``jumps`` are pairs of a jump's step and how often it was made, ``pending`` the steps on the way
-    that are still to be done, the first of them waiting for ``pending_for`` seconds; ``speed`` is
-    what the plan, or somebody meanwhile, has set, m/s.
+    In a plan, ``step`` is the step being driven (-1: not started), and legs are legs of that step.
+    ``jumps`` are pairs of a jump's step and how often it was taken. ``pending`` are the steps on
+    the way that are still to be done; the first of them has waited for ``pending_for`` seconds.
+    ``speed`` is the last one set by the plan or a client, m/s.
     """
 
     anchor: Pose | None = None
@@ -202,10 +202,10 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One task as its events have left it; ``version`` counts them.
+    """One task, the result of its events; ``version`` counts its changes.
 
-    ``timing`` is that of its setpoints, as of the last time that it stopped being driven;
-    ``changed_at`` is when its state changed last, monotonic seconds, None if it never did.
+    ``timing`` covers its setpoints up to the last time it left EXECUTING. ``changed_at`` is when
+    its state last changed, monotonic seconds, None if it never did.
     """
 
     id: TaskId
@@ -225,10 +225,10 @@ class Task:
 
     @property
     def priority(self) -> int:
-        """0–10, 10 runs first: as submitted or modified."""
+        """Priority as submitted or modified, 0–10; 10 runs first."""
         return self.terms.priority
 
     @property
     def nonce(self) -> int:
-        """The client's own mark, 0 for none."""
+        """Nonce chosen by the client, 0 for none."""
         return self.marks.nonce

@@ -1,4 +1,4 @@
-"""Start times and deadlines of waiting tasks: which come next, by the clock that counts on."""
+"""Start times and deadlines of waiting tasks, in monotonic time."""
 
 from collections.abc import Iterable
 from heapq import heapify, heappop, heappush
@@ -8,27 +8,27 @@ from mav_tasks.tasks.task import Task, TaskId, Terms
 
 
 class Times:
-    """What is due when. Entries out of date stay in the heaps, and are passed over."""
+    """Heaps of start times and deadlines. Outdated entries stay until due; callers skip them."""
 
     def __init__(self) -> None:
         self._starts: list[tuple[float, TaskId]] = []
         self._deadlines: list[tuple[float, TaskId]] = []
         self._wall_offset = 0.0
-        #: when the first of all is due; inf: never, as things are
+        #: when the first entry is due; inf without one
         self.next_at = inf
 
     def __repr__(self) -> str:
         return f"Times({len(self._starts)} starts, {len(self._deadlines)} deadlines)"
 
     def start(self, terms: Terms) -> float:
-        """Return the monotonic time before which a task does not begin; -inf without one."""
-        if terms.start_utc is None and terms.start_at is None:  # as nearly always
+        """Return the monotonic time before which a task does not start; -inf without one."""
+        if terms.start_utc is None and terms.start_at is None:  # nearly always
             return -inf
         from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
         return max(from_utc, -inf if terms.start_at is None else terms.start_at)
 
     def note(self, task: Task) -> None:
-        """Keep when a waiting task may begin, and until when."""
+        """Add the start time and the deadline of a waiting task."""
         terms = task.terms
         if terms.start_utc is not None or terms.start_at is not None:
             heappush(self._starts, (self.start(terms), task.id))
@@ -42,11 +42,11 @@ class Times:
         self.next_at = min(first_start, self._deadlines[0][0] if self._deadlines else inf)
 
     def take_over(self, *, now: float) -> list[tuple[float, TaskId]]:
-        """Return the deadlines that have passed, and of what."""
+        """Remove and return the deadlines that have passed, with their tasks."""
         return self._take(self._deadlines, now)
 
     def take_starts(self, *, now: float) -> list[tuple[float, TaskId]]:
-        """Return the start times that have come, and of what."""
+        """Remove and return the start times that have come, with their tasks."""
         return self._take(self._starts, now)
 
     def _take(self, heap: list[tuple[float, TaskId]], now: float) -> list[tuple[float, TaskId]]:
@@ -57,7 +57,7 @@ class Times:
         return due
 
     def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
-        """UTC = monotonic time + offset from now on, for all that wait."""
+        """Set UTC minus monotonic time, s, and rebuild the start times of all waiting tasks."""
         self._wall_offset = offset
         starts = [(self.start(task.terms), task.id) for task in tasks]
         self._starts = [(due, task_id) for due, task_id in starts if due > -inf]
@@ -66,5 +66,5 @@ class Times:
 
 
 def is_too_late(task: Task, *, now: float) -> bool:
-    """Whether a waiting task must not begin any more."""
+    """Return whether a waiting task's deadline has passed."""
     return task.terms.deadline is not None and task.terms.deadline <= now

@@ -1,32 +1,31 @@
-"""How evenly the setpoints of a task left: the intervals between one and the next.
+"""Setpoint timing of a task: the intervals between one setpoint and the next.
 
-Measured with the time at which the engine gives a setpoint, the ``now`` of that turn. The loop
-reads it when it gets to the turn, so a timer that fires late, a process that was stopped and an
-earlier turn that took long are in the figures; what comes after (the rest of the turn, the kernel,
-the net) is not. Only while a task is EXECUTING: an interval never reaches over a pause.
+A setpoint's time is the engine's ``now`` in the turn that returns it. The loop reads the clock at
+the start of a turn. Hence the figures include a late timer, a stopped process and a long earlier
+turn. They exclude what follows: the rest of the turn, the kernel, the network. Only EXECUTING
+counts: no interval spans a pause.
 """
 
 from dataclasses import dataclass, replace
 from math import ceil
 
-FINE = 1e-4  # s, the resolution of the percentiles up to
+FINE = 1e-4  # s, resolution of the percentiles up to FINE_END
 FINE_END = 0.2  # s
-COARSE = 1e-2  # s, the same from there on up to
-COARSE_END = 10.0  # s; what is longer is counted together, and the longest is exact anyway
+COARSE = 1e-2  # s, resolution from there up to COARSE_END
+COARSE_END = 10.0  # s; longer intervals are counted together, and the longest is exact anyway
 _FINE_BUCKETS = round(FINE_END / FINE)
 _PER_FINE, _PER_COARSE = 1 / FINE, 1 / COARSE
 
-LATE = 1.5  # periods: a longer interval means that a setpoint was half a period late, or left out
+LATE = 1.5  # periods; a longer interval means a setpoint half a period late, or left out
 
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Figures of ``count`` intervals. ``period`` is the one asked for; all of them seconds.
+    """Statistics of ``count`` intervals. ``period`` is the nominal one; all times in seconds.
 
-    ``p50`` and ``p99`` are rounded to FINE or COARSE, ``longest`` is exact; ``late`` of the
-    intervals were longer than LATE periods. ``spread`` is how many there were of each length,
-    bucket and number in turns: with it a task that is not over is gone on with, also after a
-    restart.
+    ``p50`` and ``p99`` are rounded to FINE or COARSE, ``longest`` is exact. ``late`` intervals were
+    longer than LATE periods. ``spread`` is the histogram: bucket and number in turns. With it the
+    statistics of an unfinished task continue, also after a restart.
     """
 
     period: float
@@ -45,15 +44,15 @@ class Timing:
 
     @property
     def final(self) -> "Timing":
-        """The same of a task that is over: nothing will be added."""
+        """Timing of a finished task: without the histogram."""
         return replace(self, spread=())
 
 
 class TimingMeter:
-    """Takes the intervals of one task. Its memory has a bound, however long the task drives."""
+    """Meter of one task's intervals. Its memory is bounded, however long the task drives."""
 
     def __init__(self, *, period: float, before: Timing | None = None) -> None:
-        """``before``: what is known of the task already, with its spread."""
+        """``before`` is the timing of the task so far, with its spread."""
         self._period = period
         self._late_after = LATE * period
         self._counts: dict[int, int] = {}  # by bucket
@@ -68,7 +67,7 @@ class TimingMeter:
         return f"TimingMeter({self.timing()})"
 
     def note(self, *, now: float) -> None:
-        """A setpoint leaves now; the first one begins an interval and ends none."""
+        """Note that a setpoint is sent now; the first one only begins an interval."""
         last, self._last = self._last, now
         if last is None:
             return
@@ -83,7 +82,7 @@ class TimingMeter:
             self._late += 1
 
     def timing(self) -> Timing | None:
-        """Return the figures so far, None while there is no interval."""
+        """Return the statistics so far, None without an interval."""
         spread = sorted(self._counts.items())
         count = sum(number for _, number in spread)
         if not count:
@@ -99,7 +98,7 @@ class TimingMeter:
         )
 
     def _percentile(self, spread: list[tuple[int, int]], rank: int) -> float:
-        """Return the length below or at which ``rank`` of the intervals are."""
+        """Return the length that ``rank`` of the intervals do not exceed."""
         seen = 0
         for bucket, number in spread:
             seen += number

@@ -1,4 +1,4 @@
-"""Whose turn it is: which task of a vehicle begins next, what keeps it, and which may interrupt."""
+"""Selects which task of a vehicle starts next, what blocks it, and which one may interrupt."""
 
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.events import SERVER, TaskWaits
@@ -14,11 +14,11 @@ R, S = TaskReason, TaskState
 
 
 class Turns:
-    """The turns of one vehicle's tasks."""
+    """Selector of one vehicle's next task."""
 
     def __init__(self, lineup: Lineup) -> None:
         self._lineup = lineup
-        self._blocker = R.NONE  # why the next task does not begin
+        self._blocker = R.NONE  # why the next task does not start
         self._blocked: TaskId | None = None  # which task that was
 
     def __repr__(self) -> str:
@@ -26,12 +26,12 @@ class Turns:
 
     @property
     def awaits_commit(self) -> bool:
-        """Whether the next task waits for nothing but its submission being durable."""
+        """Whether there is a next task whose submission is not durable yet."""
         first = None if self._lineup.executor.task_id is not None else self._next()
         return first is not None and not self._lineup.registry.is_durable(first)
 
     def blocker_of(self, task_id: TaskId) -> TaskReason:
-        """Return what keeps the next task, or an active one, from being driven; NONE for others."""
+        """Return what blocks the next, an active or a released task; NONE for others."""
         if self._lineup.released is not None and self._lineup.released.task_id == task_id:
             return self._lineup.released.waits_for
         active = self._lineup.active
@@ -40,12 +40,12 @@ class Turns:
         return self._blocker if self._blocked == task_id else R.NONE
 
     def words_of_blocker(self, task_id: TaskId) -> str:
-        """Return what the vehicle itself says of what keeps a task from beginning, or ""."""
+        """Return the vehicle's own words for what blocks an active task, or ""."""
         executor = self._lineup.executor
         return executor.waits_for[1] if executor.task_id == task_id else ""
 
     def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
-        """Set the running task aside if a waiting one may interrupt it, and could begin."""
+        """Let a waiting task pre-empt the running one, if it may and can start. Return whether."""
         running = self._lineup.active
         if (
             running is None
@@ -77,13 +77,13 @@ class Turns:
         return False
 
     def begin_next(self, seen: VehicleView, *, now: float) -> None:
-        """Begin the task whose turn it is, if it can begin."""
+        """Start the next task, if it can start."""
         first = None if self._lineup.active is not None else self._next()
         if first is None:
             return
         task = self._lineup.registry[first]
         if task.state is S.QUEUED and is_too_late(task, now=now):
-            self._lineup.room.handle_deadline(now=now)  # after a delay this may be looked at first
+            self._lineup.room.handle_deadline(now=now)  # after a delay this may precede its timer
             self.begin_next(seen, now=now)
             return
         blocker = start_blocker(
@@ -94,7 +94,7 @@ class Turns:
             self._begin(task, seen, now=now)
 
     def _next(self) -> TaskId | None:
-        """The task that has the next turn: the urgent one, a pre-empted one, or a waiting one."""
+        """Return the next task: the immediate one, a pre-empted one, or a waiting one."""
         if self._lineup.is_held_ahead:
             return None
         if self._lineup.immediate is not None and self._lineup.immediate in self._lineup.queue:
@@ -131,7 +131,7 @@ class Turns:
             self._lineup.executor.begin(task, actor=SERVER, now=now)
 
     def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
-        """Keep why the next task does not begin, and tell of it once each time that it changes."""
+        """Note why the next task does not start, and record it each time that it changes."""
         if blocker and (first, blocker) != (self._blocked, self._blocker):
             self._lineup.registry.record(TaskWaits(first, self._lineup.vehicle, blocker, now))
         self._blocked, self._blocker = first, blocker

@@ -1,6 +1,6 @@
-"""The tasks of one vehicle: what is done to them, and what they make the vehicle do.
+"""The tasks of one vehicle: requests that change them, and what they demand of the vehicle.
 
-Nothing here knows how a vehicle is spoken to; ``step`` says what it must be made to do.
+It knows no protocol: ``step`` returns what the vehicle must be made to do.
 """
 
 from collections.abc import Iterable
@@ -34,18 +34,18 @@ class VehicleTasks(Lineup):
         self, vehicle: int, registry: TaskRegistry, room: PendingTasks, settings: Settings
     ) -> None:
         super().__init__(vehicle, registry, room, settings)
-        #: whose turn it is
+        #: selects the next task
         self.turns = Turns(self)
-        #: of tasks that are held
+        #: releases held tasks
         self.releases = Releases(self)
         self._jumps = JumpWatch()
-        #: the vehicle at the last look
+        #: the vehicle at the last step
         self.seen: VehicleView | None = None
 
-    # coming, changing, going
+    # requests
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self.settings = settings
         self.terms.apply(settings)
 
@@ -60,7 +60,7 @@ class VehicleTasks(Lineup):
         may_be_armed: bool = True,
         now: float,
     ) -> None:
-        """Take on what had begun in an earlier run, as it was left."""
+        """Load the active and suspended tasks of an earlier run."""
         self.halts = Halts(epoch=halt_epoch)
         self.halts.restored_at = now
         self.halt(R.RESTARTED, actor=SERVER, now=now)
@@ -74,12 +74,12 @@ class VehicleTasks(Lineup):
                 self.suspended_ids[task.id] = None
 
     def identified(self, uid: str, *, now: float) -> None:
-        """The vehicle says which one it is; another one does not run these tasks unasked."""
+        """Note the vehicle's unique id. If it is another vehicle, pause these tasks."""
         if self.terms.is_another(uid, now=now):
             self._may_be_another(now=now)
 
     def unidentified(self, *, now: float) -> None:
-        """The vehicle does not say which one it is, though the one of these tasks has."""
+        """Pause these tasks: their vehicle has a unique id, and this one reports none."""
         self.terms.forget_which()
         self._may_be_another(now=now)
 
@@ -91,13 +91,14 @@ class VehicleTasks(Lineup):
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
 
     def withdraw(self, task: Task, *, now: float) -> None:
-        """Take back a submission that did not become durable; it cannot have begun."""
+        """Withdraw a submission that did not become durable; it cannot have started."""
         self.room.withdraw(task, now=now)
 
     def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> Task:
-        """Take a task in that runs at once; what runs and what waits goes on when continued.
+        """Add a task that runs at once; all others wait until the queue is resumed.
 
-        Rejection when it could not: nobody expects it to begin when somebody parks the vehicle.
+        Raise Rejection if it cannot start now: it must not start later, when somebody parks the
+        vehicle.
         """
         if self.is_stopped:
             raise Rejection(R.STOPPED, "STOP is latched: continue first")
@@ -109,7 +110,7 @@ class VehicleTasks(Lineup):
         return task
 
     def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
-        """Let a waiting task run at once; what runs and what waits goes on when continued."""
+        """Run a waiting task at once; all others wait until the queue is resumed."""
         active = self.active
         if active is not None and active.id == self.immediate:
             self.executor.cancel(R.REPLACED, actor=actor, now=now)
@@ -128,9 +129,9 @@ class VehicleTasks(Lineup):
             self.room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
 
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
-        """Call a task off, or (kill) end it at once; the vehicle stands before anything begins.
+        """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.
 
-        One that somebody else has is not made to stand: that is what STOP is for.
+        A vehicle that somebody else has is not made to stand: STOP does that.
         """
         state = S.KILLED if kill else S.CANCELLED
         if task.state in WAITING:
@@ -153,19 +154,19 @@ class VehicleTasks(Lineup):
                 self._ended(task.id, now=now)
 
     def _is_of_another_driver(self, task: Task) -> bool:
-        """Whether a active task stands because somebody else has the vehicle, who keeps it."""
+        """Return whether an active task was interrupted because somebody else has the vehicle."""
         was_taken = self.paused in TAKEN and task.reason is R.FRAME_RESET
         return task.reason in TAKEN or was_taken
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
-        """Change a task's terms; Rejection when it would wait for itself, or for nothing."""
+        """Change a task's terms. Raise Rejection if its dependency cannot complete."""
         if task.state in WAITING:
             self.room.modify(task, terms, actor=actor, now=now)
         else:
             self.registry.modify(task.id, terms, actor=actor, now=now)
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
-        """Cancel what waits; with ``begun_too`` also what has begun."""
+        """Cancel the waiting tasks; with ``begun_too`` the active and suspended ones, too."""
         self.room.clear(self.vehicle, R.CLEARED, actor=actor, now=now)
         if not begun_too:
             return
@@ -173,11 +174,11 @@ class VehicleTasks(Lineup):
             self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
 
     def forget_release(self) -> None:
-        """A released task that has not begun is held as before: something has halted it."""
+        """Drop a release that waits, since something halted it; the task is held as before."""
         self.released = None
 
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
-        """Let a plan that is not over go on, or begin, with another of its steps."""
+        """Continue, or start, an unfinished plan at another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
         if self.active is not None and self.active.id == task.id:
             self.executor.drive.skip_to(self.active, step, now=now)
@@ -186,21 +187,20 @@ class VehicleTasks(Lineup):
             self.registry.advance(task.id, progress, now=now)
 
     def rest(self, seen: VehicleView, *, now: float) -> None:
-        """The server ends, and the vehicle was stopped for it: what it has rolled counts."""
+        """Record how far the vehicle rolled after it was stopped for the end of the server."""
         active = self.active
         if seen.motion is not None and active is not None and active.state is S.PAUSED:
             self.executor.drive.rest(active, seen.motion, now=now)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> TaskId | None:
-        """Set the speed of the task that runs, and of those to come; gives the one that runs."""
+        """Set the speed of the active and later tasks. Return the active task's id, or None."""
         self.terms.set_speed(speed, actor=actor, now=now)
         return None if self.active is None else self.active.id
 
     def pause(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
-        """Let the active task and the queue stand; gives the task's id. Never undoes a STOP.
+        """Pause the active task and the queue. Return the task's id, or None. Never undo a STOP.
 
-        Where somebody else has the vehicle, nobody waits for it to stand before a cancelled task is
-        over.
+        If somebody else has the vehicle, a CANCELLING task ends without waiting for standstill.
         """
         self.halt(reason, actor=actor, now=now)
         self.released = None
@@ -219,12 +219,11 @@ class VehicleTasks(Lineup):
     def proceed(
         self, seen: VehicleView, *, allows: bool = False, actor: str, now: float
     ) -> TaskId | None:
-        """Release the STOP latch or any other pause; gives the task that goes on, if one does.
+        """Release the STOP latch or any other pause. Return the id of the resumed task, or None.
 
-        A task that could not take the vehicle now is not resumed: Rejection says what is in its
-        way, and everything stays as it is. A held task keeps the queue standing all the same; if
-        that is all that makes it stand, and arming is not what is allowed again (``allows``),
-        there is nothing to continue: Rejection.
+        Raise Rejection, and change nothing, if the task to resume could not take the vehicle now. A
+        held task keeps blocking the queue. Raise Rejection also if only a held task blocks it and
+        the request does not allow arming again (``allows``): then there is nothing to resume.
         """
         active = self.active
         held = self.held
@@ -257,9 +256,9 @@ class VehicleTasks(Lineup):
             self.begun_at = now
 
     def hold(self, reason: TaskReason, *, now: float) -> None:
-        """Set the active task aside until somebody decides what becomes of it.
+        """Hold the active task until a client decides.
 
-        With its frame every other line is lost, too.
+        FRAME_RESET also holds the paused tasks that had started a leg: their lines are lost, too.
         """
         if self.is_driving:
             self.halt(reason, actor=SERVER, now=now)
@@ -270,11 +269,11 @@ class VehicleTasks(Lineup):
                     self.registry.change(task.id, S.HELD, reason=reason, actor=SERVER, now=now)
 
     def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
-        """The vehicle has restarted: hold what has begun, and let the queue stand until continued.
+        """Hold the tasks of a vehicle that has rebooted, and pause the queue until it is resumed.
 
-        Return whether the active task, of which nothing was driven, begins again by itself instead.
-        ``was_paused`` is why the queue stood before the vehicle was seen disarmed: that was the
-        restart, and no takeover.
+        Return whether the active task, which has not moved, starts again by itself instead.
+        ``was_paused`` is why the queue was paused before the vehicle showed disarmed: the reboot
+        disarmed it, no takeover.
         """
         self.released = None
         active = self.active
@@ -289,7 +288,7 @@ class VehicleTasks(Lineup):
         return False
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
-        """Kill the active task and latch; with ``clear`` all others are cancelled too."""
+        """Kill the active task and latch STOP; with ``clear`` cancel the others. Return its id."""
         self.halt(R.STOPPED, actor=actor, now=now)
         killed = self.executor.kill(R.STOP, actor=actor, now=now)
         self.immediate = None
@@ -301,17 +300,17 @@ class VehicleTasks(Lineup):
         return killed
 
     def end_halting(self) -> None:
-        """Somebody has the vehicle: what was killed need not be seen to stand."""
+        """Stop waiting for standstill after a kill, since somebody else has the vehicle."""
         self.stopping_after_kill = False
 
     # time
 
     def setpoint_left(self, *, now: float) -> None:
-        """A setpoint leaves for the vehicle now."""
+        """Note that a setpoint is sent to the vehicle now."""
         self.executor.setpoint_left(now=now)
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
-        """Begin what can begin, and give what the vehicle must be made to do now."""
+        """Start the tasks that can start. Return what the vehicle must be made to do now."""
         self.seen = seen
         has_jumped = self._jumps.has_jumped(seen.motion, driving=self.settings.driving)
         if has_jumped and self.is_driving:
@@ -330,12 +329,12 @@ class VehicleTasks(Lineup):
         if self.active is not None and not self.turns.is_interrupted(seen, now=now):
             return demand
         self.turns.begin_next(seen, now=now)
-        if self.active is not None:  # what was refused was refused to the one before
+        if self.active is not None:  # the refusal was for the task before
             return self.executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 
     def _note_step(self, before: Task, *, now: float) -> None:
-        """See what became of the active task in this step: it ended, or something halted it."""
+        """Handle a task that ended or was interrupted in this step."""
         active = self.active
         if active is None:
             self._ended(before.id, now=now)
@@ -343,7 +342,7 @@ class VehicleTasks(Lineup):
             self.halt(active.reason, actor=SERVER, now=now)
 
     def _ended(self, task_id: TaskId, *, now: float) -> None:
-        """A task is over. After a failure that had moved the vehicle, somebody should look."""
+        """Handle the end of a task. Pause the queue after a failure that had moved the vehicle."""
         task = self.registry[task_id]
         if task_id == self.immediate:
             self.immediate = None

@@ -1,4 +1,4 @@
-"""What the tasks of one vehicle go by beside their own terms: speed, brakes, home, identity."""
+"""Values of one vehicle that hold for all its tasks: speed, braking, home, identity, arming."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from mav_tasks.tasks.task import Frame
 
 
 class VehicleTerms:
-    """What is kept of one vehicle."""
+    """Store of one vehicle's values for its tasks."""
 
     def __init__(
         self,
@@ -33,11 +33,11 @@ class VehicleTerms:
         self._executor = executor
         self._bounds = bounds
         self._settings = settings
-        self._uid = ""  # of the vehicle, as far as it was heard
-        self._speed: float | None = None  # of what names none; None: the settings' one
-        self._cruise: float | None = None  # m/s, at which the vehicle itself would drive
-        self._stop: tuple[float, float] | None = None  # m/s and m of one that was measured
-        #: nobody has disarmed it, or somebody has let go since
+        self._uid = ""  # unique id, "" until it was heard
+        self._speed: float | None = None  # m/s, of goals that name none; None: the settings' one
+        self._cruise: float | None = None  # m/s, the vehicle's own cruise speed
+        self._stop: tuple[float, float] | None = None  # m/s and m of a measured stop
+        #: no person has disarmed it, or one has allowed arming since
         self.may_be_armed = True
 
     def __repr__(self) -> str:
@@ -45,16 +45,16 @@ class VehicleTerms:
 
     @property
     def has_uid(self) -> bool:
-        """Whether it is known by its unique id whose tasks these are."""
+        """Whether the unique id of the vehicle of these tasks is known."""
         return bool(self._uid)
 
     def restore(self, *, speed: float | None, uid: str, may_be_armed: bool) -> None:
-        """Take on what was kept by an earlier run."""
+        """Load the values of an earlier run."""
         self._speed, self._uid, self.may_be_armed = speed, uid, may_be_armed
         self._apply_driving()
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
+        """Apply new settings."""
         self._settings = settings
         self._apply_driving()
 
@@ -64,34 +64,34 @@ class VehicleTerms:
 
     @property
     def driving(self) -> Driving:
-        """The settings for driving, with the speed that a client has set, and known brakes."""
+        """Driving settings, with the speed set by a client, and the measured braking."""
         driving = self._settings.driving
         if self._stop is not None:
             driving = replace(driving, acceleration=safe_braking(driving, *self._stop))
         return driving if self._speed is None else replace(driving, speed=self._speed)
 
     def cruises(self, speed: float | None) -> None:
-        """Note at what speed the vehicle itself drives, m/s, where none is named; None: unknown."""
+        """Note the vehicle's own cruise speed, m/s; None: unknown."""
         if speed != self._cruise:
             self._cruise = speed
             self._apply_driving()
 
     def brakes(self, stop: tuple[float, float] | None) -> None:
-        """Note how it was seen to stop, m/s and the metres that it took; None: that is unknown."""
+        """Note a measured stop: the speed in m/s and the metres that it took; None: unknown."""
         if stop != self._stop:
             self._stop = stop
             self._apply_driving()
 
     def let_arm(self, *, may_be_armed: bool, now: float) -> None:
-        """Keep, over a restart too, whether somebody has disarmed it."""
+        """Set whether the vehicle may be armed; a person who disarms it forbids that. Store it."""
         if may_be_armed != self.may_be_armed:
             self.may_be_armed = may_be_armed
             self._registry.record(VehicleArmingSet(self._vehicle, may_be_armed, now))
 
     def is_another(self, uid: str, *, now: float) -> bool:
-        """Take in which vehicle it says it is; whether that is not the one whose tasks these are.
+        """Note the reported unique id. Return whether it is another vehicle than the tasks' own.
 
-        "" is what a vehicle says that does not know.
+        A vehicle that does not know its id reports "", which changes nothing.
         """
         if not uid or uid == self._uid:
             return False
@@ -100,18 +100,18 @@ class VehicleTerms:
         return bool(before)
 
     def forget_which(self) -> None:
-        """It does not say which one it is, though the one of these tasks has."""
+        """Forget the unique id: the vehicle reports none, but the vehicle of these tasks did."""
         self._uid = ""
 
     def set_home(self, place: GlobalPlace, frame: Frame, *, actor: str, now: float) -> None:
-        """Keep where the vehicle returns to, as long as it does not boot again."""
+        """Set the vehicle's home, which holds until it reboots."""
         latitude, longitude = place.latitude_degE7, place.longitude_degE7
         home = VehicleHomeSet(self._vehicle, latitude, longitude, frame, actor, now)
         self._bounds.home = home
         self._registry.record(home)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> None:
-        """Set the speed of the task that runs, and of those to come that name none."""
+        """Set the speed of the active task, and of later goals that name none."""
         self._speed = speed
         self._apply_driving()
         self._executor.set_speed(speed)

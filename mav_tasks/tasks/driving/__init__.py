@@ -1,1 +1,1 @@
-"""How a rover gets from where it is to where it is to be: geometry and closed loop, all pure."""
+"""Guidance: path geometry and closed-loop control of a rover. Pure."""

@@ -1,12 +1,11 @@
-"""How the end of a leg is reached as exactly as this rover can.
+"""Controls the end of a leg: the rover stops as close to it as it can.
 
-No rover moves at any speed that it is asked for: below some speed its wheels stand, and at that
-speed it rolls on for a while after zero. Both differ ten times from one rover to the next (0.02 to
-0.5 m/s and 0.1 to 1.7 s were measured), so both are learnt while it drives. Near its end a leg is
-driven at the least speed that moves the rover, and zero is asked for where it will roll to the end.
-Where it then stands is judged: within the tolerance it has arrived. Otherwise it is corrected, but
-not for ever: within the settling distance what it cannot do better is good enough, and the error
-that remains is in the task's status.
+Below some speed a rover's wheels stand still, and at that speed it still rolls on after a zero.
+Both values differ tenfold between rovers (0.02 to 0.5 m/s and 0.1 to 1.7 s were measured), so both
+are learnt while it drives. Near its end a leg is driven at the lowest speed that moves the rover,
+and zero is commanded where the rover will roll to the end. A rover that stands within the tolerance
+has arrived. Otherwise the end is corrected a limited number of times. After that, an error within
+the settling distance is good enough, and the task's status shows it.
 """
 
 from math import radians
@@ -25,72 +24,72 @@ from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import Move, Rotate
 
-CORRECTIONS = 2  # times that the end is corrected from a standstill
-STALLED = 4.0  # s without getting nearer, within the settling distance, after which it stands
-NEARER = 0.005  # m or rad, less than this is not getting nearer
-ASKED = 0.7  # s of a slow speed without an effect, after which the least speed is raised
+CORRECTIONS = 2  # corrections of the end from a standstill
+STALLED = 4.0  # s without progress, within the settling distance, after which it stops
+NEARER = 0.005  # m or rad; less is no progress
+ASKED = 0.7  # s of a slow setpoint without effect, after which the least speed is raised
 NEAR = 0.5  # m or rad from the end; farther off, slowness has other reasons
-TURNS = radians(5)  # rad/s, faster than this it turns to where it is to go
-EFFECT = 0.2  # of the way that was asked for; less is no effect
-RAISE = 1.6  # times the least speed, when it had no effect
-MOST_CREEP = 0.4  # m/s or rad/s, the most that it is raised to
+TURNS = radians(5)  # rad/s; above this a move still turns to its heading
+EFFECT = 0.2  # of the distance commanded; less is no effect
+RAISE = 1.6  # factor on the least speed when it had no effect
+MOST_CREEP = 0.4  # m/s or rad/s, to which it is raised at most
 LONGEST_LAG = 2.5  # s; 1.7 was measured
-MOST_COAST = 0.12  # m or rad before the end at which zero is asked for at the most
-#: the same of a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot's)
+MOST_COAST = 0.12  # m or rad; zero is commanded at most this far before the end
+#: the same for a car, which rolls out: 0.47 m from 0.5 m/s and 0.96 m from 1 m/s (ArduPilot)
 MOST_COAST_OF_CAR = 1.0  # m
-#: m/s, below which a car that is steered by course is not asked to drive. PX4's speed loop sticks
-#: and slips there: where 0.3 was asked it did 0.1, and went 0.3 m in one leap where 0.15 was asked.
+#: m/s, the least setpoint for a car that is steered by course. Below it PX4's speed loop sticks and
+#: slips: at 0.3 it drove 0.1, and at 0.15 it went 0.3 m in one leap.
 LEAST_OF_ONE_TRY = 0.5
-TELLING = 0.3  # m/s, from which a car's stops are alike: from 0.05 it rolls on for half as long
-LAG_OF_CAR = 0.6  # s, until it is learnt: 0.5 and 0.7 were measured (ArduPilot's)
+TELLING = 0.3  # m/s; above it a car's stops are alike, from 0.05 it rolls on for half as long
+LAG_OF_CAR = 0.6  # s, until it is learnt: 0.5 and 0.7 were measured (ArduPilot)
 LAG_OF_ONE_TRY = 0.3  # s, until it is learnt: 0.15 (SIH) and 0.4 (at 1 m/s²) were measured
-GAIN_BY_LAG = 0.7  # the approach is slower for a rover that rolls on for longer
+GAIN_BY_LAG = 0.7  # gain times lag; a rover that rolls on for longer approaches slower
 
 
 class Creeping:
-    """What was learnt of one rover's slowest motion, along or around: kept for all its tasks."""
+    """Learnt low-speed behaviour of one rover, along or around; kept for all its tasks."""
 
     def __init__(
         self, *, least: float, lag: float, most: float = MOST_COAST, telling: float = CREEP_RATE
     ) -> None:
         self._least_known, self._most = least, most
-        self._telling = telling  # m/s or rad/s; a stop from less than this tells less of others
+        self._telling = telling  # m/s or rad/s; slower stops count less
         self.least = least  # m/s or rad/s that moves it
-        self.lag = lag  # s times the speed: how far it rolls on after zero
+        self.lag = lag  # s; times the speed, it is how far the rover rolls on after zero
 
     def __repr__(self) -> str:
         return f"Creeping(least {self.least:.3f}, rolls on {self.lag:.2f} s)"
 
     def coast(self, speed: float) -> float:
-        """Return how far before the end zero is to be asked for, m or rad."""
+        """Return how far before the end to command zero, m or rad."""
         return min(abs(speed) * self.lag, self._most)
 
     def gain(self, usual: float) -> float:
-        """Return the speed per distance left, 1/s, that does not overshoot."""
+        """Return the speed per remaining distance, 1/s, that does not overshoot."""
         return min(usual, GAIN_BY_LAG / self.lag) if self.lag > 0 else usual
 
     def rolled_on(self, way: float, speed: float) -> None:
-        """Take in how far it rolled on after zero was asked for at a speed."""
+        """Learn from the distance ``way`` that it rolled on after zero was commanded at a speed."""
         if speed > 0:
             seen = max(0.0, min(LONGEST_LAG, way / speed))
             weight = 0.5 * min(1.0, speed / self._telling)
             self.lag += weight * (seen - self.lag)
 
     def had_no_effect(self, speed: float) -> None:
-        """Ask for more than this speed from now on: at this speed it stands."""
+        """Raise the least speed, since the rover stands at this speed."""
         self.least = max(self.least, min(MOST_CREEP, speed * RAISE))
 
     def overshot(self) -> None:
-        """Ask for less from now on: it went past the end."""
+        """Lower the least speed, since the rover overshot the end."""
         self.least = max(self._least_known, self.least / RAISE)
 
     def begins_again(self) -> None:
-        """Another leg begins: it may have been the ground, so a little less is tried."""
+        """Lower the least speed a little for another leg: the ground may have been the cause."""
         self.least = max(self._least_known, 0.8 * self.least)
 
 
 class Arrival:
-    """The memory of one rover's arrivals; ``begin_leg`` for each leg."""
+    """Arrival control of one rover; ``begin_leg`` precedes each leg."""
 
     def __init__(self) -> None:
         self.along = Creeping(least=CREEP_SPEED, lag=0.1)
@@ -101,25 +100,25 @@ class Arrival:
         self.in_one_try = Creeping(
             least=LEAST_OF_ONE_TRY, lag=LAG_OF_ONE_TRY, most=MOST_COAST_OF_CAR, telling=TELLING
         )
-        self._is_settling = False  # zero is asked for until it stands
-        self._gives_up = False  # what it reached is good enough, if it is near
+        self._is_settling = False  # zero is commanded until it stands
+        self._gives_up = False  # accept the error, if the end is near
         self._corrections = 0
-        self._left_at_zero: tuple[float, float] | None = None  # what was left, at which speed
-        self._best = 0.0  # the least that was left
+        self._left_at_zero: tuple[float, float] | None = None  # what remained, at which speed
+        self._best = 0.0  # the least that remained
         self._best_at: float | None = None
-        #: since when it is asked for a slow speed, what was left then, and the least speed since
+        #: since when a slow speed is commanded, what remained then, and the least speed since
         self._crept: tuple[float, float, float] | None = None
 
     def __repr__(self) -> str:
         return f"Arrival({self.along}, {self.around}, corrected {self._corrections} times)"
 
     def slowest(self, course: PathFollower) -> Slowest:
-        """Return how the last of a leg is to be driven."""
+        """Return the learnt values for the end of a leg."""
         along, around = self._driven(course), self.around
         return Slowest(along.least, around.least, along.gain(APPROACH_GAIN), around.gain(TURN_GAIN))
 
     def begin_leg(self) -> None:
-        """Begin anew with another leg."""
+        """Reset for another leg."""
         self._is_settling = self._gives_up = False
         self._corrections = 0
         self._left_at_zero = self._best_at = self._crept = None
@@ -138,9 +137,9 @@ class Arrival:
         driving: Driving,
         now: float,
     ) -> bool:
-        """Return whether zero is to be asked for: the end is here, or as near as it gets.
+        """Return whether to command zero: the rover is at the end, or as near as it gets.
 
-        ``last`` is the velocity that was asked for last. If the rover also ``stands``, it arrived.
+        ``last`` is the last velocity commanded. If the rover also ``stands``, it has arrived.
         """
         if not isinstance(course.leg, Move | Rotate | Follow):
             return course.has_arrived(stands=stands, driving=driving)
@@ -159,7 +158,7 @@ class Arrival:
         return False
 
     def _judge(self, course: PathFollower, *, driving: Driving) -> bool:
-        """It stands: whether that is the end."""
+        """Return whether a rover that stands has arrived; learn from its stop."""
         if self._is_settling and self._left_at_zero is not None:
             left, speed = self._left_at_zero
             self._creeping(course).rolled_on(left - course.remaining, speed)
@@ -174,7 +173,7 @@ class Arrival:
         return tried and course.is_settled(driving=driving)
 
     def _watch(self, course: PathFollower, *, driving: Driving, now: float) -> None:
-        """Look whether it still gets nearer."""
+        """Note whether the rover still makes progress."""
         left = abs(course.remaining)
         if self._best_at is None or left < self._best - NEARER:
             self._best, self._best_at = left, now
@@ -184,7 +183,7 @@ class Arrival:
     def _look_for_effect(
         self, course: PathFollower, motion: Motion, last: Velocity, *, now: float
     ) -> None:
-        """Look whether a slow speed near the end has an effect, unless it still turns."""
+        """Raise the least speed if a slow setpoint near the end has no effect; not in a turn."""
         asked = self._asked(course, last)
         is_turning = isinstance(course.leg, Move) and abs(motion.yaw_rate) > TURNS
         if not 0.0 < asked <= MOST_CREEP or is_turning or abs(course.remaining) > NEAR:
@@ -209,7 +208,7 @@ class Arrival:
         return self.along if course.steering is None else self.as_car
 
     def _measured(self, course: PathFollower, motion: Motion) -> float:
-        """What it does: a rover slows down later than it is asked to."""
+        """Return the measured speed: a rover slows down later than commanded."""
         return abs(motion.yaw_rate if isinstance(course.leg, Rotate) else motion.forward)
 
     def _asked(self, course: PathFollower, last: Velocity) -> float:
@@ -217,7 +216,7 @@ class Arrival:
 
 
 def _corrections(course: PathFollower) -> int:
-    """Return how often the end of a leg is corrected from a standstill, at the most."""
+    """Return how often the end of a leg may be corrected from a standstill."""
     if course.has_one_try:
         return 0
     return CORRECTIONS

@@ -1,4 +1,4 @@
-"""Where one vehicle may drive, and where it returns to: its fence and its rally points."""
+"""Where one vehicle may drive, and where it returns to: fence, rally points and home."""
 
 from collections.abc import Sequence
 from math import cos, sin
@@ -25,12 +25,12 @@ from mav_tasks.tasks.task import Frame, Pose, Progress, same_frame
 
 
 class Bounds:
-    """The fence and the rally points of a vehicle; coordinates in the frame of an ``origin``."""
+    """The fence, rally points and home of one vehicle; ``origin`` is that of its local frame."""
 
     def __init__(self) -> None:
         self.fence = Fence()
         self.rally: tuple[GlobalPlace, ...] = ()
-        #: where it was first armed, or what a client has set; None: neither is known
+        #: where it was first armed, or what a client has set; None: not known
         self.home: VehicleHomeSet | None = None
         self._local: LocalFence | None = None
         self._made_of: tuple[Fence, GlobalPlace] | None = None
@@ -39,18 +39,18 @@ class Bounds:
         return f"Bounds({len(self.fence.zones)} zones, {len(self.rally)} rally points)"
 
     def home_in(self, frame: Frame | None) -> GlobalPlace | None:
-        """Return the home of a vehicle in this frame; None: none is known since it booted."""
+        """Return the vehicle's home in this frame; None if it has none since it booted."""
         home = self.home
         if home is None or not same_frame(home.frame, frame):
             return None
         return GlobalPlace(home.latitude_degE7, home.longitude_degE7)
 
     def is_unknown(self, origin: GlobalPlace | None) -> bool:
-        """Whether there is a fence, and nobody knows where it is in the vehicle's frame."""
+        """Return whether there is a fence whose place in the vehicle's frame is unknown."""
         return bool(self.fence.zones) and origin is None
 
     def local(self, origin: GlobalPlace | None) -> LocalFence | None:
-        """Return the fence in the frame of an origin, None where there is none."""
+        """Return the fence in the frame of an origin; None without a fence or an origin."""
         if origin is None or not self.fence.zones:
             return None
         if self._made_of != (self.fence, origin):
@@ -58,16 +58,17 @@ class Bounds:
         return self._local
 
     def allows(self, pose: Pose, origin: GlobalPlace | None) -> bool:
-        """Whether a vehicle may be here."""
+        """Return whether the vehicle may be at a pose."""
         fence = self.local(origin)
         return fence is None or fence.allows(LocalPlace(pose.north, pose.east))
 
     def allows_stage(
         self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
     ) -> bool:
-        """Whether the way of a goal that begins, or goes on, here stays where it may be.
+        """Return whether the way of a goal that starts or resumes here stays within the fence.
 
-        From outside it may lead back in. What has no place to end at is watched while it drives.
+        From outside, the way may lead back in. A goal without a place to end at is allowed, and
+        watched while it drives.
         """
         fence = self.local(origin)
         end = _end_of(goal, progress)
@@ -81,9 +82,9 @@ class Bounds:
         return fence.allows_way(start, end) or fence.escapes(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:
-        """Return a step that the straight way from the one before may not reach, or None.
+        """Return a step to which the straight way from the place before crosses the fence, or None.
 
-        As far as places are known beforehand; the rest is looked at when it begins.
+        It checks the places that are known beforehand; others are checked when their step begins.
         """
         fence = self.local(origin)
         if fence is None:
@@ -97,7 +98,7 @@ class Bounds:
         return None
 
     def refuge(self, pose: Pose, origin: GlobalPlace | None) -> GlobalPlace | None:
-        """Return the nearest rally point, None where there is none."""
+        """Return the nearest rally point, or None."""
         if origin is None or not self.rally:
             return None
         return min(self.rally, key=lambda place: distance(pose, to_local(place, origin)))
@@ -111,7 +112,7 @@ def _end_of(goal: SingleGoal, progress: Progress) -> LocalPlace | None:
         return None
     way = goal.distance
     if isinstance(goal, MoveTurned) and progress.leg != WAY:
-        way = -way if progress.leg < WAY else 0.0  # not turned round yet, or there
+        way = -way if progress.leg < WAY else 0.0  # it has not turned round yet, or is there
     return LocalPlace(anchor.north + way * cos(anchor.yaw), anchor.east + way * sin(anchor.yaw))
 
 
@@ -120,7 +121,7 @@ def _place_of(step: Step, origin: GlobalPlace | None) -> LocalPlace | None:
 
 
 def _next_places(steps: Sequence[Step], number: int) -> list[int]:
-    """Return the steps whose places may be driven to next, by whichever jumps."""
+    """Return the steps whose places may come next, whichever jumps are taken."""
     found: list[int] = []
     seen: set[int] = set()
     waiting = [number + 1]
@@ -133,7 +134,7 @@ def _next_places(steps: Sequence[Step], number: int) -> list[int]:
             case GoTo():
                 found.append(step)
             case Move() | MoveTurned() | Drive() | Head():
-                pass  # where that ends is not known
+                pass  # its end is not known
             case Jump(to=to):
                 waiting += [step + 1, to]
             case _:

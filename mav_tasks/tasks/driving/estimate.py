@@ -1,7 +1,7 @@
-"""How long tasks take, roughly: for people who wait, never for a decision.
+"""Rough durations of tasks, for people who wait; no decision depends on them.
 
-A goal is followed leg by leg from where the vehicle is, without its neighbours on the road: nothing
-is known of corrections near the end, of pauses, or of a car's bends.
+A goal is followed leg by leg from where the vehicle is. The estimate ignores other traffic,
+corrections near the end, pauses, and a car's bends.
 """
 
 from math import cos, nan, sin, sqrt
@@ -30,12 +30,12 @@ from mav_tasks.tasks.goal import (
 from mav_tasks.tasks.task import Pose, Progress
 
 SETTLING = 1.5  # s from one task's end to motion, and from near its end to a measured standstill
-MOST_STEPS = 300  # of a plan, beyond which nobody reckons when it ends
+MOST_STEPS = 300  # of a plan; a longer one has no estimate
 SOMEWHERE = Pose(0.0, 0.0, 0.0)
 
 
 class Known(NamedTuple):
-    """What an estimate starts from; None: not known."""
+    """Inputs of an estimate; None: not known."""
 
     driving: Driving
     pose: Pose | None = None
@@ -44,7 +44,7 @@ class Known(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Seconds that a goal takes, NaN: not known; and where the vehicle is then."""
+    """Seconds that a goal takes (NaN: not known), and where the vehicle is then."""
 
     seconds: float
     pose: Pose | None
@@ -54,7 +54,7 @@ UNKNOWN = Estimate(nan, None)
 
 
 def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
-    """Return how long a task still takes, all of it if it has not begun."""
+    """Return how long a task still takes; all of it if it has not started."""
     if isinstance(goal, Plan):
         return _time_of_plan(goal, progress, known)
     return _time_of_goal(goal, progress, known, known.driving.speed)
@@ -75,7 +75,7 @@ def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
         took, pose = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
         seconds += took
         after = following(plan, progress)
-        if after is None or took != took:  # the way from an unknown place is not known either
+        if after is None or took != took:  # from an unknown place the rest is unknown, too
             break
         progress = after
     return UNKNOWN
@@ -105,7 +105,7 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
 
 
 def _end_of(leg: Leg, anchor: Pose, place: LocalPlace | None) -> Pose:
-    """Return where a leg ends that begins at ``anchor``; ``place``: where a go-to ends."""
+    """Return the end of a leg that begins at ``anchor``; ``place`` is the end of a go-to."""
     north, east, yaw = anchor.north, anchor.east, anchor.yaw
     if place is not None:
         return Pose(place.north, place.east, yaw)
@@ -139,7 +139,7 @@ def _seconds(leg: Leg, left: float, driving: Driving, speed: float) -> float:
 
 
 def _ramped(way: float, top: float, acceleration: float) -> float:
-    """Seconds for a way with equal ramps up and down."""
+    """Return the seconds for a distance with equal ramps up and down."""
     if way * acceleration < top * top:
         return 2 * sqrt(way / acceleration)
     return way / top + top / acceleration

@@ -1,10 +1,10 @@
-"""The fence: where a vehicle may be, which straight ways stay there, and how much room is ahead.
+"""The fence: allowed places, allowed straight ways, and the room ahead of a vehicle.
 
-A vehicle has to be outside every exclusion zone and, where there are inclusion zones, inside all
-those of at least one group (common.xml, MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION and its kin).
-The boundary of any zone is forbidden, and so is what is within a millimetre of it: a vehicle has a
-size. Edges are straight in the local frame. What becomes of a vehicle that is where it may not be
-is for others to decide.
+A vehicle must be outside every exclusion zone. If there are inclusion zones, it must be inside all
+zones of at least one group (common.xml, MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION and its kin).
+The boundary of a zone and a millimetre to either side are forbidden: a vehicle has a size. Edges
+are straight in the local frame. Other modules decide what happens to a vehicle in a forbidden
+place.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,16 +17,16 @@ from mav_tasks.tasks.frames import to_local
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from mav_tasks.tasks.task import Pose
 
-EDGE = 0.001  # m to either side of a boundary that belong to it
+EDGE = 0.001  # m to either side of a boundary that count as boundary
 MIN_CORNERS = 3
-MIN_WIDTH = 0.02  # m; less may be nothing but the rounding of a place's integers, 11 mm
+MIN_WIDTH = 0.02  # m; less may be only the rounding of a place's integers, 11 mm
 
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """A zone by its corners in order, either way round; the last is joined to the first.
+    """A zone by its corners in order, either way round; the last joins the first.
 
-    Where it crosses itself the even-odd rule holds. ``group`` counts for inclusion zones only.
+    The even-odd rule holds where it crosses itself. ``group`` counts for inclusion zones only.
     """
 
     corners: tuple[GlobalPlace, ...]
@@ -49,15 +49,15 @@ Zone = Polygon | Circle
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """All zones that hold for a vehicle; without any it may be everywhere."""
+    """All zones of a vehicle; without zones it may be everywhere."""
 
     zones: tuple[Zone, ...] = ()
 
 
 def check(fence: Fence) -> str | None:
-    """Say in words what is wrong with a fence; None if nothing is.
+    """Return in words what is wrong with a fence, or None.
 
-    A polygon has no area if all its corners are on one line; one that crosses itself is all right.
+    A polygon has no area if all its corners are on one line. It may cross itself.
     """
     for zone in fence.zones:
         match zone:
@@ -81,9 +81,9 @@ def _has_area(corners: tuple[GlobalPlace, ...]) -> bool:
 
 
 class LocalFence:
-    """A fence in the coordinates of one local frame, made once for many questions.
+    """A fence in the coordinates of one local frame, computed once for many queries.
 
-    ``fence`` is one in which ``check`` finds nothing wrong.
+    ``check`` must have found nothing wrong with ``fence``.
     """
 
     def __init__(self, fence: Fence, origin: GlobalPlace) -> None:
@@ -97,11 +97,11 @@ class LocalFence:
 
     @property
     def is_empty(self) -> bool:
-        """Whether there is no zone at all."""
+        """Whether the fence has no zones."""
         return not self._zones
 
     def allows(self, place: LocalPlace) -> bool:
-        """Whether it is a place where the vehicle may be."""
+        """Return whether the vehicle may be at a place."""
         north, east = place.north, place.east
         if any(zone.side(north, east) is not _Side.OUTSIDE for zone in self._exclusions):
             return False
@@ -110,22 +110,22 @@ class LocalFence:
         )
 
     def allows_way(self, start: LocalPlace, end: LocalPlace) -> bool:
-        """Whether every place of the straight way is allowed, both its ends included."""
+        """Return whether every place of the straight way is allowed, including both ends."""
         return all(is_allowed for _, is_allowed in self._walk(_Way(start, end)))
 
     def escapes(self, start: LocalPlace, end: LocalPlace) -> bool:
-        """Whether the straight way leads back from where the vehicle may not be.
+        """Return whether the straight way leads back from a forbidden place.
 
-        It goes from forbidden to allowed places exactly once, and never from allowed to forbidden.
+        It must change from forbidden to allowed exactly once, and never from allowed to forbidden.
         """
         states = [is_allowed for _, is_allowed in self._walk(_Way(start, end))]
         return states[0] < states[-1] and states == sorted(states)
 
     def room(self, pose: Pose, *, forward: bool, limit: float) -> float:
-        """Return the metres straight ahead, or straight back, until the first forbidden place.
+        """Return the metres straight ahead, or straight back, to the first forbidden place.
 
-        ``limit``, finite and not negative, if there is none before; 0.0 if the pose itself is not
-        allowed.
+        Return ``limit``, finite and not negative, if there is none before; 0.0 if the pose itself
+        is forbidden.
         """
         reach = limit if forward else -limit
         start = LocalPlace(pose.north, pose.east)
@@ -136,9 +136,9 @@ class LocalFence:
         return limit
 
     def _walk(self, way: "_Way") -> Iterator[tuple[float, bool]]:
-        """Yield from where on, in metres along a way, its places are allowed or not; in order.
+        """Yield (metres along a way, whether its places are allowed from there on), in order.
 
-        Between two marks all places are alike, and the one in the middle speaks for them.
+        All places between two marks are alike, so only the middle is checked.
         """
         yield 0.0, self.allows(way.start)
         marks = (mark for zone in self._zones for mark in zone.marks(way) if 0 < mark < way.length)
@@ -147,11 +147,11 @@ class LocalFence:
         yield way.length, self.allows(way.end)
 
 
-_Point = tuple[float, float]  # north and east, bare: LocalPlace is too slow for a corner
+_Point = tuple[float, float]  # north and east; LocalPlace is too slow for corners
 
 
 class _Way:
-    """A straight way; ``north`` and ``east`` are its direction, 0 if it has no length."""
+    """A straight way; ``north`` and ``east`` are its direction, 0 if its length is 0."""
 
     def __init__(self, start: LocalPlace, end: LocalPlace) -> None:
         self.start = start
@@ -166,12 +166,12 @@ class _Way:
         return LocalPlace(north, east)
 
     def along(self, place: _Point) -> float:
-        """Return how far along the way, or its line beyond, a place is."""
+        """Return how far along the way, or its extension, a place is."""
         north, east = place
         return (north - self.start.north) * self.north + (east - self.start.east) * self.east
 
     def rights(self, places: Iterable[_Point]) -> list[float]:
-        """Return for each place how far it is to the right of the way or its line."""
+        """Return how far each place is to the right of the way or its extension."""
         to_north, to_east = self.north, self.east
         here = self.start.east * to_north - self.start.north * to_east
         return [east * to_north - north * to_east - here for north, east in places]
@@ -182,16 +182,16 @@ class _Way:
 
 
 class _Side(Enum):
-    """On which side of a zone's boundary a place is; NEAR: within EDGE of it."""
+    """Side of a zone's boundary; NEAR: within EDGE of it."""
 
     INSIDE = auto()
     NEAR = auto()
     OUTSIDE = auto()
 
 
-# Both kinds of zones tell by ``side`` where a place is, and give by ``marks`` where, in metres
-# along a way, its side may change; a mark too many does no harm. Inside and outside are never less
-# than 2 mm apart, so that nothing hangs on rounding: no corner just touched, no edge followed.
+# Both kinds of zones have ``side``, which returns the side of a place, and ``marks``, which yields
+# the metres along a way where the side may change. Extra marks do no harm. Inside and outside are
+# at least 2 mm apart, so that rounding decides nothing: no touched corner, no followed edge.
 
 
 class _LocalPolygon:
@@ -207,13 +207,13 @@ class _LocalPolygon:
         low_north, high_north, low_east, high_east = self._box
         if not (low_north <= north <= high_north and low_east <= east <= high_east):
             return _Side.OUTSIDE
-        is_odd = False  # the number of edges that a ray straight east meets
+        is_odd = False  # parity of the edges that a ray to the east crosses
         for low_north, high_north, low_east, high_east, edge in self._edges:
             if not (low_north <= north <= high_north and east <= high_east):
                 continue
             if east >= low_east and edge.is_near((north, east)):
                 return _Side.NEAR
-            # half open: a corner counts once where the ray passes through, else twice or never
+            # half open: a corner counts once if the ray passes through it, else twice or never
             begin = edge.start
             if (begin.north > north) != (edge.end.north > north):
                 is_odd ^= east < begin.east + (north - begin.north) * edge.east / edge.north
@@ -263,7 +263,7 @@ def _local(zone: Zone, origin: GlobalPlace) -> _LocalZone:
 
 
 def _box(places: Iterable[LocalPlace]) -> tuple[float, float, float, float]:
-    """Return the least and greatest north, then east, of all that is near these places."""
+    """Return the least and greatest north, then east, of these places, widened by EDGE."""
     norths = [place.north for place in places]
     easts = [place.east for place in places]
     return min(norths) - EDGE, max(norths) + EDGE, min(easts) - EDGE, max(easts) + EDGE

@@ -1,6 +1,6 @@
-"""(path, where the vehicle is) → the velocity to ask for. Closed loop, no memory.
+"""Path following for a car: (path, where the vehicle is) → the velocity to command. Stateless.
 
-For a vehicle that steers as a car: the curvature of the path, and what brings it back to the path.
+The loop is closed: the curvature is the path's, plus a correction that leads back to the path.
 """
 
 from math import atan2, copysign, inf, sqrt
@@ -19,21 +19,21 @@ from mav_tasks.tasks.driving.guidance import (
 from mav_tasks.tasks.driving.path import Follow, beside, curvature_at, path_length, pose_on
 from mav_tasks.tasks.task import Pose
 
-#: m/s², across the vehicle, in bends; ArduPilot's own limit is 0.6 g (ATC_TURN_MAX_G), at which
+#: m/s², lateral acceleration in bends. ArduPilot's own limit is 0.6 g (ATC_TURN_MAX_G), at which
 #: its simulated car (4.6.3) is far outside a bend before its wheels have turned
 ACROSS = 0.5
-#: m/s, at which a bend may end just before the path does. With 0.15 s of delay, 30 % overspeed and
-#: half the curvature asked for, a place is then met within 6 cm (p95), else within 13
+#: m/s, limit for a bend that ends just before the path does. With 0.15 s of delay, 30 % overspeed
+#: and half the commanded curvature, a place is then reached within 6 cm (p95), otherwise 13 cm
 SLOW_BEND = 0.35
-SETTLING = 2.5  # s, in which a vehicle is back on its path after a bend: five times REACH_TIME
-PREVIEW = 0.2  # s, in which the wheels do not yet point as they are told to
-LEAST_REACH = 0.25  # m, in which an error of heading is put right
-REACH_TIME = 0.5  # s, the same of a fast vehicle: what it is told it does 0.2 s later
-SLOWEST = 0.1  # m/s; a measured speed below says little, and a turn rate goes by the speed
-#: m ahead on the path, that a vehicle which is steered by course drives towards; metre-class GPS is
-#: off by 0.2 m from one moment to the next
+SETTLING = 2.5  # s until a vehicle is back on its path after a bend: five times REACH_TIME
+PREVIEW = 0.2  # s until the wheels point as commanded
+LEAST_REACH = 0.25  # m in which a heading error is corrected
+REACH_TIME = 0.5  # s, the same for a fast vehicle, which reacts 0.2 s late
+SLOWEST = 0.1  # m/s; a measured speed below it is too vague to compute a turn rate
+#: m ahead on the path, the aim of a vehicle that is steered by course; metre-class GPS is off by
+#: 0.2 m from one moment to the next
 LOOKAHEAD = 1.0
-LOOKAHEAD_TIME = 1.0  # s, the same of a fast vehicle
+LOOKAHEAD_TIME = 1.0  # s, the same for a fast vehicle
 
 
 def steer_along(
@@ -49,12 +49,12 @@ def steer_along(
     by_course: bool = False,
     slowest: Slowest = USUAL,
 ) -> Velocity:
-    """Return the velocity that brings the vehicle along its path, and back to it.
+    """Return the velocity that drives the vehicle along its path, and back to it.
 
-    ``along`` is where on the path it is, ``remaining`` what is left, negative beyond the end.
-    ``passing`` is the speed that it has there, m/s, where it goes on. ``radius`` is its least, m.
+    ``along`` is its place on the path, ``remaining`` the rest, negative beyond the end. ``passing``
+    is its speed at the end, m/s, if it goes on there. ``radius`` is its minimum turning radius, m.
     """
-    # one that is steered by course is not as exact, and may not move at all when it is slow: PX4's
+    # a vehicle that is steered by course is less exact, and may not move at all at low speed: PX4's
     # simulated one does not at 0.5 m/s (1.17, factory gains)
     settles = passing == 0.0 and not by_course
     bends = _speed_in_bends(leg, along, driving, settles=settles)
@@ -80,7 +80,7 @@ def steer_along(
 
 
 def bend_speed(curvature: float, driving: Driving) -> float:
-    """Return the speed in m/s at which a vehicle may drive on a circle."""
+    """Return the highest speed in m/s for a circle of this curvature."""
     bend = abs(curvature)
     if bend == 0.0:
         return inf
@@ -88,9 +88,9 @@ def bend_speed(curvature: float, driving: Driving) -> float:
 
 
 def _speed_in_bends(leg: Follow, along: float, driving: Driving, *, settles: bool) -> float:
-    """Return the speed at which it can still be slow enough in each bend that is to come.
+    """Return the highest speed that still lets it slow down for every bend ahead.
 
-    ``settles``: out of the last one it comes slowly enough to be back on its path at the end.
+    ``settles``: it leaves the last bend slowly enough to be back on its path at the end.
     """
     fastest, begins = inf, 0.0
     left = path_length(leg.path)
@@ -108,10 +108,10 @@ def _speed_in_bends(leg: Follow, along: float, driving: Driving, *, settles: boo
 
 
 def _curvature(leg: Follow, anchor: Pose, motion: Motion, along: float, forward: float) -> float:
-    """Return the path's curvature, corrected by heading and by distance from the path.
+    """Return the path's curvature, corrected for heading error and cross-track error.
 
-    Sideways error e and heading error h change, for each metre, by d*h and d*(k - path's k), with
-    d 1 forwards and -1 backwards. With reach r, k - path's k = -(h + d*e/2r) * d/r damps both.
+    Cross-track error e and heading error h change, for each metre, by d*h and d*(k - path's k),
+    with d 1 forwards and -1 backwards. With reach r, k - path's k = -(h + d*e/2r) * d/r damps both.
     """
     path, d = leg.path, copysign(1.0, forward)
     reach = max(LEAST_REACH, REACH_TIME * motion.speed)
@@ -124,7 +124,7 @@ def _curvature(leg: Follow, anchor: Pose, motion: Motion, along: float, forward:
 
 
 def _rolling(forward: float, motion: Motion) -> float:
-    """Return the speed by which a curvature becomes a turn rate: its own, if that is known."""
+    """Return the speed that turns a curvature into a turn rate: the measured one, bounded."""
     asked = abs(forward)
     measured = abs(motion.forward)
     return copysign(min(max(measured, min(asked, SLOWEST)), 2 * asked), forward)

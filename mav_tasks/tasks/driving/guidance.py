@@ -1,7 +1,7 @@
-"""(leg, where the vehicle is) → the velocity to ask for, or arrival. Closed loop, no memory.
+"""Guidance: (leg, where the vehicle is) → the velocity to command, or arrival. Stateless.
 
-Measured pose in, body velocity out; nothing is integrated, so that a lost setpoint, a pause or a
-pre-emption leaves no error behind. ``limits`` has the last word on what comes out.
+The loop is closed on the measured pose. Nothing is integrated, so that a lost setpoint, a pause or
+a pre-emption leaves no error behind. ``limits`` bounds the velocity before it is sent.
 """
 
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from mav_tasks.tasks.driving.path import Follow, nearest
 from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
 from mav_tasks.tasks.task import Pose
 
-#: what can be steered; every goal comes down to these (``legs``)
+#: the goals that can be steered; ``legs`` splits every goal into these
 Leg = Move | Rotate | Drive | Head | Wait | Follow
 
-APPROACH_GAIN = 1.2  # 1/s, of the last centimetres: speed = gain * remaining
-#: m/s, the least that is asked for; half of it moved no ArduPilot reliably (its PWM is then 1500)
+APPROACH_GAIN = 1.2  # 1/s, in the last centimetres: speed = gain * remaining
+#: m/s, the least setpoint; half of it moved no ArduPilot reliably (its PWM is then 1500)
 CREEP_SPEED = 0.05
 TURN_GAIN = 1.6  # 1/s, the same for turning
 CREEP_RATE = 0.03  # rad/s
@@ -25,23 +25,23 @@ HEADING_GAIN = 1.5  # 1/s, heading error -> turn rate while moving
 CROSS_TRACK_GAIN = 1.2  # 1/m, sideways error -> approach angle
 MAX_APPROACH_ANGLE = pi / 6  # rad, towards the line
 MAX_STEER_RATE = 0.5  # rad/s, of corrections while moving
-AHEAD = 0.5  # s that the course is ahead of the heading, where a vehicle turns to it by itself
-LEAST_AHEAD = radians(10)  # rad, at the least
-PIVOT_ERROR = pi / 4  # rad, pointing further off than this it turns on the spot before it moves
-#: m/s, at the most, while a vehicle that is steered by course points further off than that: it may
-#: turn on the spot by itself, or in a bow
+AHEAD = 0.5  # s by which the course leads the heading if a vehicle turns to it by itself
+LEAST_AHEAD = radians(10)  # rad, least lead
+PIVOT_ERROR = pi / 4  # rad; with a larger heading error it turns on the spot before it drives
+#: m/s, limit at such an error for a car, and for a vehicle that is steered by course: it may turn
+#: on the spot by itself, or in an arc
 BOW_SPEED = 0.2
-#: of the curvature that a car is known to drive, as much may be asked for: with default gains
-#: ArduPilot's steering reaches half of what is asked for (4.6.3, SITL)
+#: factor on a car's known curvature that may be commanded: with default gains ArduPilot's steering
+#: reaches half of it (4.6.3, SITL)
 MORE_CURVATURE = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What the vehicle measures of itself, and when (monotonic seconds).
+    """A vehicle's measured pose and velocity, and when (monotonic seconds).
 
-    ``forward`` and ``sideways`` in m/s along and across the body, ``yaw_rate`` in rad/s.
-    ``at`` is the older of the times of position and attitude.
+    ``forward`` and ``sideways`` in m/s along and across the body, ``yaw_rate`` in rad/s. ``at`` is
+    the older of the times of position and attitude.
     """
 
     pose: Pose
@@ -60,8 +60,8 @@ class Motion:
 class Velocity:
     """A setpoint in the body frame: m/s forward, rad/s clockwise.
 
-    ``course``: the direction in which to drive, rad from north, for a vehicle that does not turn
-    on the spot; the yaw rate is 0 then, and ``forward`` not negative.
+    ``course`` is the direction to drive in, rad from north, for a vehicle that is steered by
+    course; the yaw rate is 0 then, and ``forward`` not negative.
     """
 
     forward: float
@@ -70,7 +70,7 @@ class Velocity:
 
     @property
     def is_zero(self) -> bool:
-        """Whether this asks to stand still; with a course it asks to turn there."""
+        """Whether this asks for standstill; a course alone asks for a turn to it."""
         return self.forward == 0.0 and self.yaw_rate == 0.0 and self.course is None
 
 
@@ -78,7 +78,7 @@ ZERO = Velocity(0.0, 0.0)
 
 
 class Slowest(NamedTuple):
-    """How the last of a leg is driven by one rover, as ``arrival`` has learnt it."""
+    """One rover's values for the end of a leg, as ``arrival`` has learnt them."""
 
     speed: float = CREEP_SPEED  # m/s, the least that moves it
     rate: float = CREEP_RATE  # rad/s, the same for turning
@@ -90,7 +90,7 @@ USUAL = Slowest()
 
 
 def wrap(angle: float) -> float:
-    """Return the same direction within ±pi."""
+    """Return an angle wrapped to ±pi."""
     return atan2(sin(angle), cos(angle))
 
 
@@ -99,9 +99,10 @@ def done_so_far(
 ) -> float:
     """Return the metres along the line, the radians turned, or the seconds, since the anchor.
 
-    ``before`` is the last such value: of the turns that fit a measured heading, the nearest to it
-    is meant, which holds as long as the vehicle is seen at least twice in half a turn. Negative
-    when the vehicle is behind its anchor. ``elapsed`` is the time since ``before``.
+    ``before`` is the last such value, and ``elapsed`` the time since. A rotation counts full turns:
+    the result is the one nearest to ``before`` that fits the measured heading. This holds if the
+    vehicle is seen at least twice in half a turn. The result is negative if the vehicle is behind
+    its anchor.
     """
     match leg:
         case Move(distance=distance):
@@ -126,7 +127,7 @@ def cross_track(anchor: Pose, pose: Pose) -> float:
 
 
 def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) -> bool:
-    """Whether the measured place is the leg's end; ``within`` is a factor on the tolerance."""
+    """Return whether ``remaining`` is within tolerance; ``within`` is a factor on the tolerance."""
     match leg:
         case Move() | Follow():
             return abs(remaining) <= within * driving.arrival_distance
@@ -137,7 +138,7 @@ def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) 
 
 
 def is_settled(leg: Leg, remaining: float, *, driving: Driving) -> bool:
-    """Return whether the leg's end is as near as a rover must come that can come no nearer."""
+    """Return whether the end is near enough for a rover that can come no nearer."""
     match leg:
         case Move() | Follow():
             return abs(remaining) <= max(driving.settle_distance, driving.arrival_distance)
@@ -159,12 +160,11 @@ def steer(
     radius: float | None = None,
     slowest: Slowest = USUAL,
 ) -> Velocity:
-    """Return the velocity towards the leg's end; ``follow`` has its own for its legs.
+    """Return the velocity towards the leg's end; ``follow.steer_along`` does so for a path.
 
-    ``remaining`` is signed: negative beyond the end, where the way back is driven slowly.
-    ``passing`` is the speed that a move has at its end, m/s, when another follows. ``by_course``:
-    the vehicle neither turns on the spot nor reverses. ``radius``: the least in m, of one that
-    steers as a car.
+    ``remaining`` is negative beyond the end; the vehicle then drives back slowly. ``passing`` is
+    the speed of a move at its end, m/s, if another follows. ``by_course``: the vehicle is steered
+    by course and does not reverse. ``radius`` is the minimum turning radius of a car, m.
     """
     match leg:
         case Move(distance=distance, speed=speed):
@@ -188,7 +188,7 @@ def steer(
                 creep=slowest.rate,
             )
             turn = copysign(towards_end, angle * remaining)
-            if by_course:  # it turns there by itself, as fast as it can: so not far ahead
+            if by_course:  # it turns by itself at its full rate: keep the lead small
                 ahead = max(LEAST_AHEAD, AHEAD * abs(turn))
                 lead = copysign(min(abs(remaining), ahead), turn)
                 return Velocity(0.0, 0.0, wrap(pose.yaw + lead))
@@ -205,7 +205,10 @@ def steer(
 def _towards(
     heading_error: float, forward: float, *, pose: Pose, by_course: bool, radius: float | None
 ) -> Velocity:
-    """Drive while pointing about right, and turn on the spot until then; or drive there slowly."""
+    """Return a velocity that drives if the heading is about right, and first turns otherwise.
+
+    A car, or a vehicle steered by course, drives slowly meanwhile instead of turning on the spot.
+    """
     if by_course:
         slow = min(forward, BOW_SPEED) if is_far_off(heading_error) else forward
         return Velocity(max(slow, 0.0), 0.0, wrap(pose.yaw + heading_error))
@@ -218,14 +221,14 @@ def _towards(
 
 
 def is_far_off(heading_error: float) -> bool:
-    """Whether a vehicle has to turn before it can drive on."""
+    """Return whether a vehicle has to turn before it can drive on."""
     return abs(heading_error) > PIVOT_ERROR
 
 
 def corner_speed(turn: float, *, lead: float) -> float:
-    """Return the speed in m/s at which a way may bend by ``turn`` rad, begun ``lead`` m before.
+    """Return the speed in m/s for a corner of ``turn`` rad that is cut ``lead`` m before.
 
-    0 where it has to stop first and turn on the spot.
+    Return 0 if the vehicle has to stop and turn on the spot.
     """
     bend = abs(turn)
     if bend > PIVOT_ERROR:
@@ -242,14 +245,14 @@ def approach(
     creep: float,
     at_end: float = 0.0,
 ) -> float:
-    """Return the speed at a distance: as fast as one may and can still brake, then gently."""
+    """Return the speed at a distance: the highest that allows braking, then ``gain`` * distance."""
     left = abs(remaining)
     braked = sqrt(at_end * at_end + 2 * 0.5 * braking * left)
     return max(min(creep, top), min(top, max(gain * left, at_end), braked))
 
 
 def _heading_error(anchor: Pose, pose: Pose, *, forward: float) -> float:
-    """Angle to turn by so as to come back to the line; less the slower the vehicle goes."""
+    """Return the angle to turn by to get back to the line; smaller at low speed."""
     ahead = copysign(1.0, forward)
     speed_share = min(1.0, abs(forward) / 0.2)  # below 0.2 m/s only the heading counts
     approach = atan(CROSS_TRACK_GAIN * cross_track(anchor, pose)) * speed_share

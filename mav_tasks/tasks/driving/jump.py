@@ -1,27 +1,27 @@
-"""Whether a vehicle's position or heading has moved further than it can have driven or turned."""
+"""Detects a jump of a vehicle's position or heading: more than it can have driven or turned."""
 
 from math import radians
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Motion, wrap
 
-JUMP = 2.0  # m, beyond what the vehicle can have driven meanwhile
-TURN = radians(45)  # rad, the same of a heading
+JUMP = 2.0  # m beyond the distance that the vehicle can have driven meanwhile
+TURN = radians(45)  # rad, the same for the heading
 
 
 class JumpWatch:
-    """The last pose of one vehicle."""
+    """Detector of jumps of one vehicle's pose."""
 
     def __init__(self) -> None:
         self._last: Motion | None = None
 
     @property
     def last(self) -> Motion | None:
-        """Where it was at the last look."""
+        """The motion at the last look."""
         return self._last
 
     def has_jumped(self, motion: Motion | None, *, driving: Driving) -> bool:
-        """Look at the present pose; whether nobody can have driven or turned there."""
+        """Return whether the vehicle cannot have got to this pose from the last; remember it."""
         last = self._last
         if motion is None or motion is last:
             return False

@@ -1,8 +1,8 @@
-"""What a goal comes down to: one leg after another, each counted from its own anchor.
+"""Splits a goal into legs, each counted from its own anchor.
 
-A leg is a goal that ``guidance`` can steer. The legs follow from the goal, from where the task was
-when each began (``Progress.anchor``) and from the place that was meant (``Progress.target``), so
-that a resumed task drives the very same ones.
+A leg is a goal that ``guidance`` can steer. The legs depend only on the goal, on the pose where
+each one began (``Progress.anchor``) and on the place meant (``Progress.target``). Hence a resumed
+task drives the very same ones.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ from mav_tasks.tasks.goal import (
 from mav_tasks.tasks.task import Pose, Progress
 
 #: the legs of a GoTo: face the place (as a car: drive to where the last run to it begins), drive
-#: there, then what else was asked for
+#: there, then turn to ``yaw`` and wait, if asked for
 FACE, WAY = range(2)
 
 
@@ -37,7 +37,7 @@ def leg_count(goal: SingleGoal) -> int:
 
 
 def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None) -> Pose:
-    """Return the pose from which a leg that begins at ``pose`` counts."""
+    """Return the anchor of a leg that begins at ``pose``."""
     if isinstance(goal, GoTo) and leg == WAY:
         assert target is not None, "the place was found before the task began"
         return replace(pose, yaw=bearing(pose, target))
@@ -66,12 +66,12 @@ def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
 
 
 def first_leg(goal: SingleGoal) -> Leg | None:
-    """Return the first leg of a task that has not begun, if its size can be known by then."""
+    """Return the first leg of a task that has not started, or None if its size is unknown."""
     return goal if isinstance(goal, Move | Rotate | Drive | Wait | Head) else None
 
 
 def length_of(leg: Leg) -> float:
-    """Return the whole of a leg, unsigned: metres, radians or seconds."""
+    """Return the whole length of a leg, unsigned: metres, radians or seconds."""
     match leg:
         case Move(distance=distance):
             return abs(distance)
@@ -84,9 +84,9 @@ def length_of(leg: Leg) -> float:
 
 
 def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
-    """Return the anchor of a goal of which ``done`` is behind a vehicle that stands at ``pose``.
+    """Return the anchor of a goal if a vehicle that stands at ``pose`` has already driven ``done``.
 
-    For what is continued from here, because where it began can no longer be said.
+    It is for a task that resumes from here because its own anchor is lost.
     """
     match goal:
         case Move(distance=distance):
@@ -103,7 +103,7 @@ def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
 
 
 def bearing(pose: Pose, place: LocalPlace) -> float:
-    """Return the direction of a place; where the vehicle already is, its own heading."""
+    """Return the direction of a place, or the vehicle's heading if it is already there."""
     if distance(pose, place) < 1e-6:
         return pose.yaw
     return atan2(place.east - pose.east, place.north - pose.north)
@@ -128,7 +128,7 @@ def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
 
 
 def _turn(have: float, want: float, direction: int) -> float:
-    """Return the angle between two headings: the shorter way, or the one asked for."""
+    """Return the angle between two headings, in ``direction``, or the shorter way if that is 0."""
     short = wrap(want - have)
     if direction == 0 or short * direction >= 0 or abs(abs(short) - pi) < 1e-9:
         return copysign(short, direction) if direction else short

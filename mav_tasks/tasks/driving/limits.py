@@ -1,6 +1,6 @@
-"""The last word before a setpoint leaves: finite, not too fast, not too suddenly faster.
+"""Limits on a velocity before it is sent: finite, not too fast, ramped up, clear of the fence.
 
-Zeros pass at once and unramped: they are STOP, cancel and faults.
+Zeros pass at once and without a ramp: they are STOP, cancel and faults.
 """
 
 from dataclasses import replace
@@ -11,20 +11,20 @@ from mav_tasks.tasks.driving.fence import LocalFence
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
 
 MARGIN = 0.05  # m left between a vehicle and its fence
-LATENCY = 0.3  # s in which a vehicle does not yet do what it is told; what it says is that old, too
-USUAL_AGE = 0.05  # s, of telemetry: as much is in LATENCY; if older, the way since then counts
-TURNS_ON = LATENCY + 0.3  # s in which a vehicle that is told to stand still turns
-APART = 0.1  # rad, at the most, between directions that are looked in
-CREEP = 0.02  # m/s; slower than this is standing
+LATENCY = 0.3  # s until a vehicle does what it is told, including the age of its telemetry
+USUAL_AGE = 0.05  # s of telemetry age in LATENCY; if it is older, the way since then counts
+TURNS_ON = LATENCY + 0.3  # s for which a vehicle that is told to stand keeps turning
+APART = 0.1  # rad, at most, between the directions that are checked
+CREEP = 0.02  # m/s; less counts as standing
 
 
 def within_fence(
     wish: Velocity, motion: Motion, fence: LocalFence | None, *, driving: Driving, now: float
 ) -> Velocity | None:
-    """Return what may be asked for so that the vehicle can stop before the fence; None: stop now.
+    """Return a velocity from which the vehicle can stop before the fence; None: stop now.
 
-    It goes by the room ahead, or behind for one that reverses, in every direction in which the
-    vehicle may point until it stands; and it has driven on since it was measured.
+    It checks the room ahead, or behind in reverse, in every direction that the vehicle may point in
+    until it stands. The distance driven since the measurement is deducted.
     """
     if fence is None or wish.forward == 0.0:
         return wish
@@ -45,7 +45,7 @@ def within_fence(
 
 
 def _headings(wish: Velocity, motion: Motion) -> list[float]:
-    """Return directions, close to each other, in which a vehicle may point until it stands."""
+    """Return closely spaced headings that a vehicle may have until it stands."""
     yaw = motion.pose.yaw
     if wish.course is not None:  # it turns there by itself, as fast as it can
         turns = [0.0, wrap(wish.course - yaw)]
@@ -58,10 +58,10 @@ def _headings(wish: Velocity, motion: Motion) -> list[float]:
 
 
 def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float) -> Velocity:
-    """Return what may be sent ``elapsed`` seconds after ``last``.
+    """Return the velocity that may be sent ``elapsed`` seconds after ``last``.
 
-    Speeding up is ramped at the settings' accelerations, slowing down is not. A number that is not
-    finite becomes a stop: NaN in a velocity setpoint aborts an ArduPilot SITL.
+    Acceleration is ramped as the settings say, deceleration is not. A number that is not finite
+    becomes a stop: NaN in a velocity setpoint aborts an ArduPilot SITL.
     """
     if wish.is_zero or not (isfinite(wish.forward) and isfinite(wish.yaw_rate)):
         return ZERO
@@ -85,10 +85,11 @@ def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float)
 
 
 def safe_braking(driving: Driving, speed: float, distance: float) -> float:
-    """Return the deceleration to plan for where a stop from ``speed`` took ``distance``.
+    """Return the deceleration to plan for if a stop from ``speed`` took ``distance``.
 
-    The settings', or less if it took more room than is planned for; all of it counts as braking
-    then, for a lag at low speed says little of a higher one. It makes more careful, never less.
+    It is the settings' value, or less if the stop took more room than planned. The whole distance
+    counts as braking then, since a lag at low speed says little about a higher one. The result is
+    never above the settings' value.
     """
     planned = driving.acceleration
     if distance <= speed * LATENCY + speed * speed / (2 * planned):

@@ -1,8 +1,8 @@
-"""The order in which a plan's steps come: which is driven next, what is done on the way. Pure.
+"""Sequences a plan's steps: which one is driven next, and which are done on the way. Pure.
 
-Steps that drive come one after the other. Those between two of them (speeds, commands, conditions)
-belong to the way to the second one, as autopilots have it: they are ``pending`` when it begins, and
-done while it is being driven.
+Steps that drive follow one another. Steps between two of them (speeds, commands, conditions) belong
+to the way to the second one, as in autopilots: they are ``pending`` when it begins, and are done
+while it is driven.
 """
 
 from dataclasses import replace
@@ -24,18 +24,18 @@ from mav_tasks.tasks.goal import (
 from mav_tasks.tasks.task import Progress, Task
 
 ON_THE_WAY = (SetSpeed, Perform, Delay, Near)
-SHORT = 1.0  # s; a loop of shorter waits would only keep everybody busy
-END = Wait(0.0)  # past the last step: what is pending is still done
+SHORT = 1.0  # s; a loop of shorter waits would only keep the server busy
+END = Wait(0.0)  # past the last step: pending steps are still done
 
 
 def has_local_place(goal: Goal) -> bool:
-    """Whether a goal names a place in the vehicle's own frame, which means nothing in another."""
+    """Return whether a goal has a place in local coordinates, which no other frame shares."""
     steps = goal.steps if isinstance(goal, Plan) else (goal,)
     return any(isinstance(step, GoTo) and isinstance(step.place, LocalPlace) for step in steps)
 
 
 def present_goal(goal: Goal, progress: Progress) -> SingleGoal:
-    """Return what is being driven, or, before the beginning, what will be first."""
+    """Return the goal that is being driven, or that will be first."""
     if not isinstance(goal, Plan):
         return goal
     step = progress.step if progress.step >= 0 else started(goal, progress).step
@@ -43,50 +43,50 @@ def present_goal(goal: Goal, progress: Progress) -> SingleGoal:
 
 
 def goal_of(task: Task) -> SingleGoal:
-    """Return what a task is driving, or will be first."""
+    """Return the goal that a task is driving, or will drive first."""
     return present_goal(task.goal, task.progress)
 
 
 def started(plan: Plan, progress: Progress) -> Progress:
-    """Return the progress of a plan of which nothing has been driven."""
+    """Return the progress with which a plan starts."""
     return _at(plan, replace(progress, jumps=(), speed=None), plan.first)
 
 
 def following(plan: Plan, progress: Progress) -> Progress | None:
-    """Return the progress with which the next step begins; None: the plan is over."""
+    """Return the progress with which the next step begins; None if the plan is over."""
     return None if is_over(plan, progress) else _at(plan, progress, progress.step + 1)
 
 
 def skipped_to(plan: Plan, progress: Progress, step: int) -> Progress:
-    """Return the progress with which a plan goes on with another step."""
+    """Return the progress with which a plan continues at another step."""
     return _at(plan, progress, step)
 
 
 def is_over(plan: Plan, progress: Progress) -> bool:
-    """Whether nothing is left to be driven to."""
+    """Return whether no step is left to drive."""
     return progress.step >= len(plan.steps)
 
 
 def goes_on_to_a_place(plan: Plan, progress: Progress) -> GoTo | None:
-    """Return the place that is driven to after the present one, if that is what comes next."""
+    """Return the next step that drives, if it is a GoTo, or None."""
     after = following(plan, progress)
     goal = None if after is None else _driven(plan, after.step)
     return goal if isinstance(goal, GoTo) else None
 
 
 def loops_in_vain(plan: Plan) -> int | None:
-    """Return the step of a jump that closes a loop in which nothing is driven; None: there is none.
+    """Return the step that closes a loop in which nothing is driven, or None.
 
-    As if every jump could be made, or not made, at any time.
+    It assumes that every jump may be taken, or not taken, at any time.
     """
     done: set[int] = set()
     for start in range(len(plan.steps)):
-        path: list[int] = []  # from ``start``, each step's way on not looked at in full yet
+        path: list[int] = []  # from ``start``: the steps that are not fully explored
         on_path: set[int] = set()
         waiting = [start]
         while waiting:
             step = waiting.pop()
-            if step < 0:  # everything after this one has been looked at
+            if step < 0:  # everything after this step is explored
                 on_path.discard(path.pop())
                 done.add(~step)
             elif step in on_path:
@@ -116,10 +116,10 @@ def _driven(plan: Plan, step: int) -> SingleGoal | None:
 
 
 def _at(plan: Plan, progress: Progress, step: int) -> Progress:
-    """Walk on to the next step that drives, or past the end."""
+    """Return the progress at the next step that drives, or past the end."""
     made = dict(zip(progress.jumps[::2], progress.jumps[1::2], strict=True))
-    pending = dict.fromkeys(progress.pending)  # each once, or a loop would carry ever more of them
-    while 0 <= step < len(plan.steps):  # it ends: a plan that loops in vain is none
+    pending = dict.fromkeys(progress.pending)  # each once, or a loop would add ever more
+    while 0 <= step < len(plan.steps):  # it ends: no plan loops in vain
         present = plan.steps[step]
         if isinstance(present, Jump):
             count = made.get(step, 0)

@@ -1,6 +1,6 @@
-"""Paths of bounded curvature: pieces of circles and straights, one after another. Geometry only.
+"""Paths of bounded curvature: arcs and straights, one after another. Geometry only.
 
-A path counts from a pose, its anchor, and a place on it is given in metres along it, so that the
+A path begins at a pose, its anchor, and a place on it is given in metres along it. Hence the
 anchor, the pieces and one number say how far a vehicle has come. Within one path a vehicle drives
 in one direction, forwards or backwards.
 """
@@ -13,10 +13,10 @@ from mav_tasks.tasks.task import Bend, Pose
 
 Path = tuple[Bend, ...]
 
-#: m along a path, to either side of where a vehicle was last seen, in which it is looked for: where
-#: a path crosses itself, the nearest place may be one that is yet to come
+#: m along a path, to either side of a vehicle's last place, in which it is searched: where a path
+#: crosses itself, the nearest place may be one that is yet to come
 WINDOW = 1.0
-STRAIGHT = 1e-9  # 1/m; less curvature is none
+STRAIGHT = 1e-9  # 1/m; less curvature counts as straight
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +46,12 @@ def moved(pose: Pose, curvature: float, length: float) -> Pose:
 
 
 def path_length(path: Path) -> float:
-    """Return the metres from one end to the other."""
+    """Return the length of a path in metres."""
     return sum(abs(bend.length) for bend in path)
 
 
 def pose_on(anchor: Pose, path: Path, along: float) -> Pose:
-    """Return the pose at a place on a path; before and beyond it straight on."""
+    """Return the pose ``along`` metres on a path; it extends straight before and beyond."""
     pose = anchor
     ahead = _direction(path)
     if along <= 0:
@@ -66,7 +66,7 @@ def pose_on(anchor: Pose, path: Path, along: float) -> Pose:
 
 
 def curvature_at(path: Path, along: float) -> float:
-    """Return the curvature of the piece at a place in 1/m, clockwise positive; 0 outside."""
+    """Return the curvature at a place on a path in 1/m, clockwise positive; 0 outside."""
     for bend in path:
         if 0 <= along < abs(bend.length):
             return bend.curvature
@@ -77,7 +77,7 @@ def curvature_at(path: Path, along: float) -> float:
 def nearest(
     anchor: Pose, path: Path, pose: Pose, *, around: float, window: float = WINDOW
 ) -> float:
-    """Return the place on a path that is nearest to a pose, not far from where it last was."""
+    """Return the place on a path that is nearest to a pose, within ``window`` of ``around``."""
     best, least = around, inf
     for along in _candidates(anchor, path, pose, around=around):
         if abs(along - around) > window:
@@ -86,20 +86,20 @@ def nearest(
         away = hypot(there.north - pose.north, there.east - pose.east)
         if away < least:
             best, least = along, away
-    if least == inf:  # it is nowhere near: as far as one may have come meanwhile
+    if least == inf:  # no place in the window: stay at the last one
         return min(max(around, 0.0), path_length(path))
     return best
 
 
 def beside(anchor: Pose, path: Path, pose: Pose, along: float) -> float:
-    """Return the metres to the right of a place on a path."""
+    """Return how many metres a pose is to the right of a place on a path."""
     there = pose_on(anchor, path, along)
     east, north = pose.east - there.east, pose.north - there.north
     return east * cos(there.yaw) - north * sin(there.yaw)
 
 
 def joined(first: Path, second: Path) -> Path:
-    """Return one path after the other, without pieces of no length or that only go on."""
+    """Return two paths joined: empty pieces removed, equal neighbours merged."""
     pieces: list[Bend] = []
     for bend in (*first, *second):
         last = pieces[-1] if pieces else None
@@ -113,7 +113,7 @@ def joined(first: Path, second: Path) -> Path:
 
 
 def rest_of(path: Path, done: float) -> Path:
-    """Return what is left of a path of which ``done`` metres are behind."""
+    """Return the rest of a path after ``done`` metres."""
     left: list[Bend] = []
     for bend in path:
         length = abs(bend.length)
@@ -124,7 +124,7 @@ def rest_of(path: Path, done: float) -> Path:
 
 
 def runs_of(path: Path) -> list[Path]:
-    """Return the parts of a way between which a vehicle changes its direction."""
+    """Return the runs of a way, between which a vehicle changes its direction."""
     runs: list[list[Bend]] = []
     for bend in path:
         if runs and (runs[-1][0].length < 0) == (bend.length < 0):
@@ -139,7 +139,7 @@ def _direction(path: Path) -> float:
 
 
 def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Iterator[float]:
-    """Yield for each piece its place nearest to a pose."""
+    """Yield the nearest place to a pose for each piece, and for both extensions."""
     start, begins, ahead = anchor, 0.0, _direction(path)
     yield min(0.0, ahead * _forward_of(anchor, pose))
     for bend in path:
@@ -159,7 +159,7 @@ def _forward_of(start: Pose, pose: Pose) -> float:
 
 
 def _on_circle(start: Pose, curvature: float, ahead: float, pose: Pose, *, around: float) -> float:
-    """Return how far along a circle a pose is; of its turns the one nearest to ``around``."""
+    """Return how far along a circle a pose is, in the turn that is nearest to ``around``."""
     north = start.north - sin(start.yaw) / curvature
     east = start.east + cos(start.yaw) / curvature
     yaw = atan2(curvature * (pose.north - north), -curvature * (pose.east - east))
@@ -169,17 +169,17 @@ def _on_circle(start: Pose, curvature: float, ahead: float, pose: Pose, *, aroun
 
 
 def turn_of(yaw: float, to: float, side: float) -> float:
-    """Return the angle from a heading to another, by that side only (1 clockwise), 0 to 2 pi."""
+    """Return the angle from one heading to another on that side (1 clockwise), 0 to 2 pi."""
     turn = (side * (to - yaw)) % tau
     return 0.0 if tau - turn < 1e-9 else turn
 
 
-#: rad; pieces of a circle that are looked at as straights: those of 2 m leave it by 1 cm
+#: rad; arcs up to this are treated as chords, which at a radius of 2 m are off by 1 cm
 CHORD = pi / 15
 
 
 def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pose]:
-    """Yield the corners of a way along a path; ``outside`` m further out in its bends."""
+    """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends."""
     start = anchor
     for bend in path:
         turn = abs(bend.curvature * bend.length)

@@ -1,7 +1,8 @@
-"""Whether a vehicle goes where it was told to: what it measures of itself contradicts that.
+"""Detects a vehicle that does not go where it is told, from its own measurements.
 
 A closed loop on a wrong heading, or on wheels that turn the wrong way, drives away from its end
-ever faster. Two ways to see it: it moves otherwise than it points, or it drives off its line.
+ever faster. There are two signs: the vehicle moves in another direction than it points, or it
+drives off its line.
 """
 
 from math import copysign, cos, hypot, radians, sin
@@ -13,37 +14,37 @@ from mav_tasks.tasks.driving.recovery_path import OFF_TRACK
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.task import Pose
 
-WRONG_WAY = 0.5  # m, driven in another direction than it points, or reverses, in
-#: m, the same of a car that is steered by course: for seconds its estimate went 0.6 m to the side
-#: while it stood (PX4 1.17 with metre-class GPS)
+WRONG_WAY = 0.5  # m driven in another direction than it points, or reverses, in
+#: m, the same for a car that is steered by course: while it stood, its estimate went 0.6 m to the
+#: side for seconds (PX4 1.17 with metre-class GPS)
 WRONG_WAY_OF_ONE_TRY = 1.5
-WENT = 0.5  # of that: what its position must have gone, or its reported speed was no motion
-MOVES = 0.05  # m/s; the direction of what is slower means nothing
-ALONG = 0.5  # cosine of 60 degrees: the part of its speed that goes where it points
-TURNS = radians(15)  # off the course that it was told to drive in: it is still turning there
-CORRECTED = 0.1  # m beyond what it drove, from one look to the next: its position was corrected
+WENT = 0.5  # of that; if its position has moved less, its reported speed was no motion
+MOVES = 0.05  # m/s; the direction of a slower motion means nothing
+ALONG = 0.5  # cosine of 60 degrees: least part of its speed in the direction that it points in
+TURNS = radians(15)  # rad off the commanded course: it is still turning there
+CORRECTED = 0.1  # m beyond what it drove between two looks: its estimate was corrected
 
 
 class AstrayWatch:
-    """The memory of one vehicle while it executes one task."""
+    """Divergence detector of one vehicle for one task."""
 
     def __init__(self) -> None:
-        self._asked = 0.0  # m/s forward, the last that was not zero
-        self._is_asked = False  # for now, or only to turn or to stand
+        self._asked = 0.0  # m/s forward, the last non-zero setpoint
+        self._is_asked = False  # now; otherwise it is only to turn or to stand
         self._course: float | None = None
-        self._rolls_on = False  # from before it was told to go the other way
+        self._rolls_on = False  # from before the direction was reversed
         self._wrong = 0.0  # m, since it last went where it pointed
         self._wrong_from = Pose(0.0, 0.0, 0.0)  # where that began
         self._last: Motion | None = None
         self._beside = 0.0  # m from its line, at the last look
-        self._least: float | None = None  # m from its line at which it was on this leg
+        self._least: float | None = None  # least m from its line on this leg
 
     def begin_leg(self) -> None:
-        """Another line begins; which way it went before still counts."""
+        """Note that another line begins; wrong-way motion before it still counts."""
         self._least = None
 
     def commanded(self, velocity: Velocity) -> None:
-        """Take in what is asked of the vehicle now."""
+        """Note the velocity that is commanded now."""
         self._course = velocity.course
         self._is_asked = velocity.forward != 0.0
         if not self._is_asked:
@@ -53,7 +54,7 @@ class AstrayWatch:
         self._asked = velocity.forward
 
     def is_astray(self, course: PathFollower, motion: Motion) -> bool:
-        """Look at the present motion; whether it is not the one that was asked for."""
+        """Return whether the vehicle's motion contradicts its setpoints; call with each motion."""
         last = self._last
         if motion is last:
             return False
@@ -80,9 +81,9 @@ class AstrayWatch:
         return self._wrong > most
 
     def _got_there(self, motion: Motion, *, most: float) -> bool:
-        """Whether its position has gone the wrong way, too.
+        """Return whether its position has gone the wrong way, too.
 
-        Reported speeds alone add up to metres where a rover stands, or crawls on: with metre-class
+        Reported speeds alone add up to metres for a rover that stands or crawls: with metre-class
         GPS they are off by 0.3 m/s for minutes (PX4 1.17).
         """
         started, here = self._wrong_from, motion.pose
@@ -94,7 +95,7 @@ class AstrayWatch:
     def _has_left(
         self, course: PathFollower, motion: Motion, last: Motion | None, *, elapsed: float
     ) -> bool:
-        """Whether it has got away from its line by driving; a corrected position is not that."""
+        """Return whether it has driven off its line; a corrected position does not count."""
         anchor = course.progress.anchor
         leg = course.leg
         if anchor is None or not isinstance(leg, Move | Follow):

@@ -1,4 +1,4 @@
-"""Drives one goal, leg after leg: where the vehicle is → the velocity to ask for, or the end."""
+"""Follows one goal, leg after leg: where the vehicle is → the velocity to command, or the end."""
 
 from dataclasses import replace
 from math import copysign
@@ -21,16 +21,16 @@ from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
 from mav_tasks.tasks.task import Progress
 
-BESIDE = 0.15  # m from a place, at the end of the way there: not arrived
+BESIDE = 0.15  # m from a place, at the end of the way there; farther off has missed it
 #: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
 BESIDE_OF_LOOP = 0.4
-TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: near enough
-ONE_TRY = 3.0  # times the settling distance, for a car that is steered by course
-MOVING_TOLERANCE = 0.4  # of the tolerance: zero is asked for nearer to the end than is required
+TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: close enough
+ONE_TRY = 3.0  # factor on the settling distance of a car that is steered by course
+MOVING_TOLERANCE = 0.4  # of the tolerance: zero is commanded nearer to the end than required
 
 
 class PathFollower:
-    """One goal on its way; ``progress`` is all that there is to resume it."""
+    """Follower of one goal; ``progress`` is enough to resume it."""
 
     def __init__(
         self,
@@ -43,16 +43,16 @@ class PathFollower:
         steering: Steering | None = None,
     ) -> None:
         self.goal = goal
-        #: of a vehicle that steers as a car; None: it turns on the spot
+        #: how a car steers; None: the vehicle turns on the spot
         self.steering = steering
         self.progress = progress
-        #: whether the vehicle neither turns on the spot nor reverses
+        #: whether the vehicle is steered by course, and does not reverse
         self.by_course = by_course
-        #: m/s, of a way that goes on at its end to another place
+        #: m/s at the end of a way that goes on to another place; 0: it stops
         self.passing = passing
-        #: m from that end, where it does
+        #: m from that end at which it goes on
         self.within = within
-        #: how often a place was driven past beside it, and driven to again
+        #: how often a place was missed and driven to again
         self.misses = 0
 
     def __repr__(self) -> str:
@@ -60,32 +60,32 @@ class PathFollower:
 
     @property
     def leg(self) -> Leg:
-        """The present leg."""
+        """The current leg."""
         return leg_of(self.goal, self.progress)
 
     @property
     def remaining(self) -> float:
-        """What is left of the present leg; negative beyond its end."""
+        """Rest of the current leg in m, rad or s; negative beyond its end."""
         return length_of(self.leg) - self.progress.done
 
     @property
     def has_one_try(self) -> bool:
-        """Whether what is short of the end, or past it, cannot be corrected: a car by course."""
+        """Whether an error at the end cannot be corrected: a car that is steered by course."""
         return self.by_course and self.steering is not None
 
     @property
     def is_passing(self) -> bool:
-        """Whether the present leg ends without standing."""
+        """Whether the current leg ends without a stop."""
         return self.passing > 0.0 and self.progress.leg == WAY
 
     @property
     def _near_enough(self) -> float:
-        """Metres from a place, within which it is reached."""
+        """Metres from a place within which it is reached."""
         radius = self.goal.radius if isinstance(self.goal, GoTo) else None
         return max(radius or 0.0, BESIDE_OF_LOOP if self.has_one_try else BESIDE)
 
     def has_passed(self, motion: Motion) -> bool:
-        """Whether the place is near enough to go on to the next."""
+        """Return whether a place to pass is near enough to go on to the next."""
         target = self.progress.target
         return (
             self.is_passing
@@ -94,7 +94,7 @@ class PathFollower:
         )
 
     def look(self, motion: Motion, *, elapsed: float) -> None:
-        """Take in where the vehicle is, ``elapsed`` seconds after the last look."""
+        """Update the progress from the motion, ``elapsed`` seconds after the last look."""
         anchor = self.progress.anchor
         assert anchor is not None, "a course has an anchor"
         before = self.progress.done
@@ -104,9 +104,9 @@ class PathFollower:
             self.passing = 0.0  # missed: it stops, and tries again from there
 
     def has_arrived(self, *, stands: bool, driving: Driving, coast: float = 0.0) -> bool:
-        """Whether to stand here: near the end while moving; anywhere within tolerance at rest.
+        """Return whether to stop here: near the end while moving, within the tolerance at rest.
 
-        ``coast`` is how far it will roll on, m or rad.
+        ``coast`` is how far the vehicle will roll on, m or rad.
         """
         within = 1.0 if stands else MOVING_TOLERANCE
         remaining = self.remaining
@@ -120,15 +120,15 @@ class PathFollower:
             if self.goal.radius:
                 return abs(remaining) <= self.goal.radius
         if self.by_course and isinstance(self.leg, Move | Follow):
-            remaining = max(remaining, 0.0)  # what it drove too far it cannot drive back
+            remaining = max(remaining, 0.0)  # it cannot drive back from beyond the end
         if not stands and 0.0 <= remaining <= coast:
             return True
         return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
 
     def is_settled(self, *, driving: Driving) -> bool:
-        """Whether the end is as near as a rover must come that can come no nearer.
+        """Return whether the end is near enough for a rover that can come no nearer.
 
-        A car that is steered by course has one try only.
+        A wider limit holds for a car that is steered by course: it has one try only.
         """
         remaining = self.remaining
         if self.by_course and isinstance(self.leg, Move | Follow):
@@ -138,9 +138,10 @@ class PathFollower:
         return guidance.is_settled(self.leg, remaining, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
-        """Begin the next leg where the vehicle stands; False: there is none.
+        """Begin the next leg where the vehicle stands. Return False if there is none.
 
-        A place that it stands beside, because its position was corrected meanwhile, is faced again.
+        If the vehicle stands beside the place, because its position was corrected meanwhile, it
+        drives there again.
         """
         following = self.progress.leg + 1
         target = self.progress.target
@@ -157,19 +158,19 @@ class PathFollower:
         return True
 
     def _has_missed(self, motion: Motion) -> bool:
-        """Whether it stands beside the place that it drove to."""
+        """Return whether the vehicle stands beside the place that it drove to."""
         target = self.progress.target
         if target is None or self.progress.leg != WAY:
             return False
         return distance(motion.pose, target) > self._near_enough
 
     def _sets_out_again(self, motion: Motion, target: LocalPlace, steering: Steering) -> bool:
-        """Begin the next run to a place, unless it is reached."""
+        """Begin a car's next run to a place, unless it is reached. Return whether it began."""
         before = self.progress.leg
         if before == WAY and not self._has_missed(motion):
             return False
         self.progress = set_out_to(self.progress, motion.pose, target, steering)
-        if self.progress.leg <= before:  # a run that should have been the last was not
+        if self.progress.leg <= before:  # this run should have been the last one
             self.misses += 1
         return True
 
@@ -181,7 +182,7 @@ class PathFollower:
         speed: float | None,
         slowest: Slowest = USUAL,
     ) -> Velocity:
-        """Return the velocity towards the end of the leg; ``speed`` m/s overrides what it says."""
+        """Return the velocity towards the leg's end; ``speed`` in m/s overrides the leg's own."""
         anchor = self.progress.anchor
         assert anchor is not None, "a course has an anchor"
         leg = self.leg

@@ -1,9 +1,9 @@
-"""Ways for a vehicle that steers as a car: arcs of its turning circle, straights, and reversing.
+"""Plans ways for a car: arcs of its turning circle, straights, and reversing.
 
-To a place: turn towards it on one of the two circles, then drive straight. Where that is long, or
-leaves the fence, it drives a piece forwards or backwards before, or both, as in a three-point
+To a place: an arc towards it on one of the two turning circles, then a straight. If that is long or
+leaves the fence, the car first drives a piece forwards or backwards, or both, as in a three-point
 turn. To a pose: an arc, a straight and an arc (L. E. Dubins, On Curves of Minimal Length, 1957).
-The shortest way that stays within the fence is taken.
+The cheapest way that stays within the fence is taken.
 """
 
 from cmath import phase, rect
@@ -27,27 +27,27 @@ from mav_tasks.tasks.driving.path import (
 from mav_tasks.tasks.goal import LocalPlace
 from mav_tasks.tasks.task import Bend, Pose, Progress
 
-#: of the turning radius: what is planned leaves something to steer with
+#: factor on the turning radius: a planned bend leaves room to steer
 SPARE = 1.15
-#: m between a bend and the fence, where there is room: ArduPilot's own steering with default gains
-#: reached half the curvature asked for (4.6.3, SITL), so that a bend is driven wider
+#: m between a bend and the fence, if there is room: ArduPilot's own steering with default gains
+#: reached half the curvature commanded (4.6.3, SITL), so that a bend is driven wider
 CLEARANCE = 0.3
-#: m of way that a change of direction is worth, so that it turns forwards unless that is a loop: it
-#: stands for some 3 s, and drives backwards where people do not expect it
+#: m of way that a change of direction costs, so that a car turns forwards unless that is a loop: it
+#: stands for some 3 s, and drives backwards, which people do not expect
 CUSP = 4.0
-BACKWARDS = 1.0  # of the way driven backwards, as much more it counts
-#: of the radius, lengths of the piece before the turn
+BACKWARDS = 1.0  # extra cost of a way driven backwards, as a factor
+#: lengths of the piece before the turn, as factors on the radius
 PIECES = (0.3, 0.6, 1.0, 1.5, 2.2, 3.0)
-THREE_POINT = (0.5, 0.9, 1.4)  # of the radius, the same for both pieces of a three-point turn
-THERE = 0.1  # m from a place: ArduPilot's simulated car (4.6.3) is not more exact
-HERE = 1e-3  # m and rad from a place or heading: there is no way to it
+THREE_POINT = (0.5, 0.9, 1.4)  # the same for both pieces of a three-point turn
+THERE = 0.1  # m; nearer is at the place: ArduPilot's simulated car (4.6.3) is no more exact
+HERE = 1e-3  # m and rad from a place or heading; nearer needs no way
 
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """What ways of a vehicle that steers as a car are made of.
+    """Constraints on the ways of a car.
 
-    ``radius`` is its least, m; ``reverses``: it can; ``fence``: where it may be, None = everywhere.
+    ``radius`` is its minimum turning radius, m; ``reverses``: it can; ``fence``: None = no fence.
     """
 
     radius: float
@@ -56,26 +56,26 @@ class Steering:
 
     @property
     def planned_radius(self) -> float:
-        """Return the radius of its bends, m."""
+        """Radius of planned bends, m."""
         return SPARE * self.radius
 
 
 def way_to(pose: Pose, place: LocalPlace, steering: Steering) -> Path | None:
-    """Return the whole way to a place, which may reverse; None: none stays within the fence."""
+    """Return the whole way to a place, which may reverse; None if none stays within the fence."""
     if hypot(place.north - pose.north, place.east - pose.east) < HERE:
         return (Bend(0.0, HERE),)
     return _best(pose, _ways_to(pose, place, steering), steering.fence)
 
 
 def boldest_way_to(pose: Pose, place: LocalPlace, steering: Steering) -> Path:
-    """Return the way to a place that would be taken if there were no fence."""
+    """Return the way to a place without regard to the fence."""
     way = way_to(pose, place, Steering(steering.radius, steering.reverses))
     assert way is not None, "a place is never inside both turning circles"
     return way
 
 
 def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
-    """Return the way to a pose, in one direction; None: none stays within the fence."""
+    """Return the way to a pose, in one direction; None if none stays within the fence."""
     if _is_at(pose, goal):
         return (Bend(0.0, HERE),)
     ways = list(_dubins(pose, goal, steering.planned_radius))
@@ -88,8 +88,8 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
 def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Steering) -> Progress:
     """Return the progress with which the first run of the way to a place begins.
 
-    Where no way stays within the fence it is the one that would be driven without. A place that is
-    reached as exactly as a car does is not left so as to come nearer.
+    If no way stays within the fence, it ignores the fence. A car that is as near to the
+    place as it can get stays there.
     """
     if hypot(place.north - pose.north, place.east - pose.east) <= THERE:
         return replace(progress, leg=WAY, anchor=pose, path=(Bend(0.0, HERE),), done=0.0)
@@ -99,7 +99,7 @@ def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Stee
 
 
 def is_allowed(pose: Pose, path: Path, fence: LocalFence | None, *, clear: float = 0.0) -> bool:
-    """Whether a way from a pose stays within a fence, or leads back in and stays there."""
+    """Return whether a way from a pose stays within a fence, or leads back in and stays there."""
     if fence is None:
         return True
     corners = [LocalPlace(p.north, p.east) for p in places_on(pose, path, outside=clear)]
@@ -110,7 +110,7 @@ def is_allowed(pose: Pose, path: Path, fence: LocalFence | None, *, clear: float
 
 
 def _best(pose: Pose, ways: Iterable[Path], fence: LocalFence | None) -> Path | None:
-    """Return the cheapest that is allowed, with room beside its bends if there is such a one."""
+    """Return the cheapest allowed way, if possible one with room beside its bends; None if none."""
     cheapest = sorted((way for way in ways if way), key=_cost)
     if fence is None:
         return cheapest[0] if cheapest else None
@@ -137,7 +137,7 @@ def _ways_to(pose: Pose, place: LocalPlace, steering: Steering) -> Iterator[Path
 
 
 def _beginnings(radius: float, *, reverses: bool) -> Iterator[Path]:
-    """Yield what may be driven before the turn towards a place."""
+    """Yield the pieces that may come before the turn towards a place."""
     yield ()
     bends = (0.0, 1 / radius, -1 / radius)
     directions = (1.0, -1.0) if reverses else (1.0,)
@@ -150,7 +150,7 @@ def _beginnings(radius: float, *, reverses: bool) -> Iterator[Path]:
 
 
 def _turns_to(pose: Pose, place: LocalPlace, radius: float) -> Iterator[Path]:
-    """Yield an arc and a straight to a place, for each side on which there is such a way."""
+    """Yield an arc and a straight to a place, for each side that has such a way."""
     for side in (1.0, -1.0):
         centre = _point(pose) + side * radius * 1j * rect(1.0, pose.yaw)
         to_place = complex(place.north, place.east) - centre
@@ -163,7 +163,7 @@ def _turns_to(pose: Pose, place: LocalPlace, radius: float) -> Iterator[Path]:
 
 
 def _dubins(pose: Pose, goal: Pose, radius: float) -> Iterator[Path]:
-    """Yield an arc, a straight and an arc, for each pair of sides for which there is such a way."""
+    """Yield an arc, a straight and an arc, for each pair of sides that has such a way."""
     for first, last in product((1.0, -1.0), repeat=2):
         start = _point(pose) + first * radius * 1j * rect(1.0, pose.yaw)
         end = _point(goal) + last * radius * 1j * rect(1.0, goal.yaw)
@@ -171,7 +171,7 @@ def _dubins(pose: Pose, goal: Pose, radius: float) -> Iterator[Path]:
         if abs(between) < abs(across):
             continue
         straight = sqrt(abs(between) ** 2 - across * across)
-        # two times the same circle has no direction of its own: straight from where it is
+        # coincident circles define no direction: keep the heading
         yaw = phase(between) - atan2(across, straight) if abs(between) > STRAIGHT else pose.yaw
         arcs = (turn_of(pose.yaw, yaw, first), turn_of(yaw, goal.yaw, last))
         if first == last and sum(arcs) >= tau and straight < STRAIGHT:
@@ -192,7 +192,7 @@ def _turned(pose: Pose) -> Pose:
 
 
 def _reversed(way: Path) -> Path:
-    """Return what is driven backwards where its mirror image is driven forwards."""
+    """Return a way in reverse, given the way forwards between the poses turned by pi."""
     return tuple(Bend(-bend.curvature, -bend.length) for bend in way)
 
 

@@ -1,7 +1,7 @@
-"""How an interrupted task gets back to where it was, so that it ends where it would have ended.
+"""Plans how an interrupted task gets back to its line, so that it ends where it would have ended.
 
-A task that another one pre-empted may find the vehicle anywhere; after a pause or a takeover it is
-near its line. What is cheap to correct on the way is left to steering.
+After a pre-emption the vehicle may be anywhere; after a pause or a takeover it is near its line.
+Errors that are cheap to correct on the way are left to steering.
 """
 
 from dataclasses import replace
@@ -16,18 +16,18 @@ from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
 from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate, SingleGoal
 from mav_tasks.tasks.task import Pose, Progress, Task
 
-ON_SPOT = 0.02  # m from where it was: as good as there
-OFF_TRACK = 1.0  # m, lifecycle: further off its line than this is no resumption after a takeover
+ON_SPOT = 0.02  # m; nearer counts as there
+OFF_TRACK = 1.0  # m off its line; farther off, a task does not resume after a takeover (lifecycle)
 PAST_END = 0.1  # m, the same for the end of the line
-CONVERGES = 6.0  # m of line for each metre beside it, in which steering comes back to it
-PUT_BACK = 0.3  # m against its direction, that no estimate wanders in half a minute
-BESIDE_PATH = 0.5  # m, the same for a car on a path: much more it could not steer back
-ALIGNED = radians(10)  # a heading that differs by less is put right on the way
-TURNED = radians(30)  # a heading that differs by less cannot be mistaken by a whole turn
+CONVERGES = 6.0  # m of line in which steering corrects one metre of cross-track error
+PUT_BACK = 0.3  # m against its direction; no estimate wanders as far in half a minute
+BESIDE_PATH = 0.5  # m off a car's path; steering could not correct much more
+ALIGNED = radians(10)  # rad; a smaller heading error is corrected on the way
+TURNED = radians(30)  # rad; a smaller heading error cannot hide a whole turn
 
 
 def is_off_line(task: Task, pose: Pose) -> bool:
-    """Whether somebody has taken a vehicle so far from its task that nobody should guess."""
+    """Return whether the vehicle is so far from its task's line that a person must decide."""
     progress = task.progress
     anchor = progress.anchor
     if anchor is None:
@@ -48,10 +48,10 @@ def is_off_line(task: Task, pose: Pose) -> bool:
 
 
 def was_handled(task: Task, before: Pose, after: Pose) -> bool:
-    """Whether somebody has had a vehicle while nothing was heard of it.
+    """Return whether somebody has moved a vehicle while it was silent.
 
-    On a straight line it rolls on by itself; it does not turn, and does not come back. Before it
-    was driven it stays where it is.
+    On a straight line a vehicle rolls on by itself, but does not turn or come back. Before its task
+    drove it, it stays where it is.
     """
     if task.progress.anchor is None:
         away = hypot(after.north - before.north, after.east - before.east)
@@ -72,10 +72,10 @@ def resumed(
     turns_first: bool,
     steering: Steering | None = None,
 ) -> Progress:
-    """Return the progress with which to go on from here.
+    """Return the progress with which to resume from here.
 
-    A way to a place that was left far behind is simply begun again from here, ``turns_first`` with
-    a turn on the spot.
+    The way to a place begins again here if the vehicle is far off it; ``turns_first``: with a turn
+    on the spot.
     """
     anchor, pose = progress.anchor, motion.pose
     if not isinstance(goal, GoTo) or anchor is None or progress.target is None:
@@ -99,7 +99,7 @@ def resumed(
 
 
 def _is_on_path(leg: Follow, anchor: Pose, pose: Pose, *, done: float) -> bool:
-    """Whether steering comes back to a path by itself, about where it was left."""
+    """Return whether steering can return to a path by itself, near where it was left."""
     along = nearest(anchor, leg.path, pose, around=done)
     there = pose_on(anchor, leg.path, along)
     is_aligned = abs(wrap(there.yaw - pose.yaw)) <= TURNED
@@ -118,9 +118,9 @@ def recovery_path(
     honours_yaw_rate: bool,
     steering: Steering | None = None,
 ) -> PathFollower | None:
-    """Return the way to where the task can go on exactly, or None if that is here.
+    """Return the way to where the task can resume exactly, or None if that is here.
 
-    One that is steered by course finds its heading while it drives on, unless it steers as a car.
+    A vehicle that is steered by course corrects its heading while it drives on, unless it is a car.
     """
     anchor, pose = progress.anchor, motion.pose
     assert anchor is not None, "what has begun has an anchor"
@@ -155,7 +155,7 @@ def recovery_path(
 
 
 def _entry(anchor: Pose, pose: Pose, leg: Move, done: float) -> LocalPlace | None:
-    """Where on its line a move is to be resumed, unless steering gets there by itself."""
+    """Return where a move resumes on its line, or None if steering gets there by itself."""
     length = abs(leg.distance)
     along = done_so_far(leg, anchor, pose, before=done)
     beside = abs(cross_track(anchor, pose))
@@ -170,7 +170,7 @@ def _entry(anchor: Pose, pose: Pose, leg: Move, done: float) -> LocalPlace | Non
 
 
 def _is_beside(anchor: Pose, pose: Pose, leg: Move) -> bool:
-    """Whether a car that does not reverse had better go on from here: it would drive a circle."""
+    """Return whether a car that does not reverse should go on from here, not drive a circle."""
     along = done_so_far(leg, anchor, pose, before=0.0)
     is_near = abs(cross_track(anchor, pose)) <= OFF_TRACK and -ON_SPOT <= along <= leg.distance
     return is_near and abs(wrap(anchor.yaw - pose.yaw)) <= TURNED
@@ -192,7 +192,7 @@ def _drive_back(
     steering: Steering,
     by_course: bool,
 ) -> PathFollower | None:
-    """Return the way of a car to its line, on which it arrives with the heading of the line."""
+    """Return a car's way to its line, on which it arrives with the heading of the line."""
     anchor, pose = progress.anchor, motion.pose
     assert anchor is not None, "what has begun has an anchor"
     if place is None:
@@ -200,7 +200,7 @@ def _drive_back(
             return None
         place = _on_line(anchor, leg, min(max(progress.done, 0.0), length_of(leg)))
     entry = Pose(place.north, place.east, anchor.yaw)
-    everywhere = replace(steering, fence=None)  # what is forbidden is not driven all the same
+    everywhere = replace(steering, fence=None)  # the fence still stops it on the way
     path = way_to_pose(pose, entry, steering) or way_to_pose(pose, entry, everywhere)
     assert path is not None, "there is a way to every pose"
     started = Progress(anchor=pose, target=place, leg=WAY, path=path)

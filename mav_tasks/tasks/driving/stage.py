@@ -1,4 +1,4 @@
-"""One stage of a task, a single goal or a step of a plan: how it begins, and what is done on it."""
+"""A stage of a task (a single goal, or a step of a plan): its start, and the steps on the way."""
 
 from dataclasses import dataclass, replace
 from math import inf, radians
@@ -18,14 +18,14 @@ from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
 from mav_tasks.tasks.view import VehicleView
 
-#: rad; a car that has to turn by more stops first: it may be shorter to reverse
+#: rad; a car stops before a larger turn: it may be shorter to reverse
 ROLLING_TURN = radians(100)
 ROLLING = 0.05  # m/s; a vehicle that is faster goes on to its next place without stopping
 
 
 @dataclass(frozen=True, slots=True)
 class OnTheWay:
-    """What of the steps on the way has been done in one look."""
+    """The steps on the way that one look has done."""
 
     progress: Progress
     done: tuple[int, ...] = ()
@@ -33,7 +33,7 @@ class OnTheWay:
 
 
 def steering_of(seen: VehicleView, bounds: Bounds) -> Steering | None:
-    """Return what ways of a car are made of; None for a vehicle that turns on the spot."""
+    """Return the constraints on a car's ways; None for a vehicle that turns on the spot."""
     if seen.turning is not Turning.STEERED:
         return None
     return Steering(seen.turning_radius, seen.honours_yaw_rate, bounds.local(seen.origin))
@@ -47,9 +47,9 @@ def set_out(
     *,
     steering: Steering | None = None,
 ) -> Progress | None:
-    """Return the progress with which a task goes on, or begins, here; None: its place is unknown.
+    """Return the progress with which a task starts or resumes here; None if its place is unknown.
 
-    ``steering`` of a vehicle that steers as a car.
+    ``steering`` is that of a vehicle that steers as a car.
     """
     if isinstance(goal, Plan) and progress.step < 0:
         progress = started(goal, progress)
@@ -58,7 +58,7 @@ def set_out(
     if progress.anchor is not None:
         return resumed(single, progress, motion, turns_first=turns_first, steering=steering)
     if not isinstance(single, GoTo):
-        done = 0.0 if isinstance(single, Face) else progress.done  # it means a heading, not a way
+        done = 0.0 if isinstance(single, Face) else progress.done  # its heading is absolute
         anchor = begun_from(single, anchor_of(single, 0, motion.pose, None), done)
         begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=0, done=done)
         return replace(begun_here, target=None, path=())
@@ -83,7 +83,7 @@ def may_go_on_rolling(
     *,
     steering: Steering | None = None,
 ) -> bool:
-    """Whether a stage can begin without standing first."""
+    """Return whether a stage can begin without a stop."""
     single = present_goal(goal, progress)
     target = place_of(single, seen) if isinstance(single, GoTo) else None
     if steering is not None and target is not None:
@@ -103,7 +103,7 @@ def course_of(
     driving: Driving,
     steering: Steering | None = None,
 ) -> PathFollower:
-    """Return the course of the present stage, which may lead on to the next place."""
+    """Return the path follower of the current stage, which may lead on to the next place."""
     single = present_goal(goal, progress)
     by_course = not seen.honours_yaw_rate
     stopping = PathFollower(single, progress, by_course=by_course, steering=steering)
@@ -144,9 +144,9 @@ def _off(pose: Pose, yaw: float) -> float:
 def look_on_the_way(
     plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
 ) -> OnTheWay:
-    """Do of the pending steps what can be done now.
+    """Do those pending steps that are due.
 
-    ``to_place`` is the metres to the place that is driven to, None where none is; ``elapsed`` the
+    ``to_place`` is the metres to the place that is driven to, None without one; ``elapsed`` the
     seconds since the last look.
     """
     done: list[int] = []

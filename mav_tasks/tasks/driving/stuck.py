@@ -1,7 +1,7 @@
-"""Whether a vehicle that is told to move does: the same place for too long, or for too much asked.
+"""Detects a vehicle that does not move when told to, by time or by the distance commanded.
 
-Two ways to see it: no progress towards the end of the leg, or, where a leg has no place to come
-nearer to, standing still while a velocity is asked for.
+There are two signs: no progress towards the end of the leg or, if the leg has no place to come
+nearer to, standstill while a velocity is commanded.
 """
 
 from math import hypot, inf, pi, radians
@@ -14,33 +14,33 @@ from mav_tasks.tasks.task import Pose
 from mav_tasks.tasks.view import VehicleView
 
 PROGRESS = 0.02  # m or rad, less than this in the stuck time is no progress
-FULL_TURNS = 2 * pi  # rad that it turns by itself towards its course, at the most; more is a circle
-TURNED = radians(5)  # rad, more is a turn on the spot, or in a bow, and it does follow
-LIVES = 1e-6  # m from one look to the next: an estimate that has not stopped
-SLOW = 0.3  # of the way that was asked for; more is motion
-BLIND = 1.0  # m or rad commanded without progress, or without motion: the same, but sooner
+FULL_TURNS = 2 * pi  # rad, at most, that it turns by itself towards its course; more is a circle
+TURNED = radians(5)  # rad; more is a turn on the spot or in an arc, so it does follow
+LIVES = 1e-6  # m between two looks; more shows that the estimate is not frozen
+SLOW = 0.3  # of the distance commanded; more is motion
+BLIND = 1.0  # m or rad commanded without progress or motion: stuck before the time is up
 
 
-SAID_AFTER = 1.5  # s of being asked to move without moving; the slowest rover began after 0.6
-LEAST_ASKED = 0.1  # m/s, slower is the approach of an end
-LEAST_PART = 0.1  # of the way that was asked for, or it stands
+SAID_AFTER = 1.5  # s of commands without motion before the warning; the slowest rover took 0.6
+LEAST_ASKED = 0.1  # m/s; slower is the approach to an end
+LEAST_PART = 0.1  # of the distance commanded; less is standing
 
 
 class Follows:
-    """Whether a vehicle follows at all: said long before it is stuck, so that somebody can look."""
+    """Early warning that a vehicle does not follow, long before it counts as stuck."""
 
     def __init__(self) -> None:
         self._since: float | None = None
         self._from = Pose(0.0, 0.0, 0.0)
-        self._way = 0.0  # m asked for since then
+        self._way = 0.0  # m commanded since then
         self._is_said = False
 
     def begin(self) -> None:
-        """Begin anew with another leg."""
+        """Reset for another leg."""
         self._since, self._is_said = None, False
 
     def look(self, velocity: Velocity, motion: Motion, *, seconds: float, now: float) -> str:
-        """Return in words that it does not move, once each leg; "" otherwise."""
+        """Return a warning that the vehicle does not move, once for each leg; "" otherwise."""
         speed = abs(velocity.forward)
         if speed < LEAST_ASKED:
             self._since = None
@@ -61,20 +61,20 @@ class Follows:
 
 
 class StuckWatch:
-    """The memory of one stretch of driving."""
+    """Detector of a stuck vehicle."""
 
     def __init__(self) -> None:
         self._best_remaining = inf
         self._progress_at = 0.0
         self._commanded = 0.0  # m or rad, since the last progress
         self._last = (0.0, 0.0)
-        self._course: float | None = None  # that it was told to drive in, if it was
-        self._turned = 0.0  # rad, by itself since the last progress
-        self._yaw: float | None = None  # when that was last looked at
+        self._course: float | None = None  # the commanded course, if there is one
+        self._turned = 0.0  # rad turned by itself since the last progress
+        self._yaw: float | None = None  # at the last update of that
         self._pose: Pose | None = None  # at the last look
 
     def begin(self, *, now: float) -> None:
-        """Begin anew: another leg, or nothing has been asked for yet."""
+        """Reset: another leg begins, or nothing has been commanded yet."""
         self._best_remaining = inf
         self._progress_at = now
         self._commanded = 0.0
@@ -82,14 +82,14 @@ class StuckWatch:
         self._turned, self._yaw = 0.0, None
 
     def commanded(self, velocity: Velocity, *, seconds: float) -> None:
-        """Take in what is asked of the vehicle for the next ``seconds``."""
+        """Note the velocity that is commanded for the next ``seconds``."""
         self._last = (abs(velocity.forward) * seconds, abs(velocity.yaw_rate) * seconds)
         self._course = velocity.course
 
     def is_stuck(
         self, course: PathFollower, seen: VehicleView, *, limit: float, now: float
     ) -> bool:
-        """Whether there has been no progress for ``limit`` seconds, or for much that was asked."""
+        """Return whether it made no progress for ``limit`` seconds, or over BLIND commanded."""
         leg = course.leg
         forward, turned = self._last
         lives = self._lives(seen, has_one_try=course.has_one_try)
@@ -110,11 +110,11 @@ class StuckWatch:
         return now - self._progress_at > limit or self._commanded > BLIND
 
     def _lives(self, seen: VehicleView, *, has_one_try: bool) -> bool:
-        """Whether a rover hardly moves by an estimate that is never twice the same.
+        """Return whether the estimate keeps changing although the rover hardly moves.
 
-        One that stands for seconds before its speed loop overcomes friction (PX4) is only slow; of
-        one whose estimate stands nobody knows what it does, and it soon counts as stuck. The
-        estimate of a car that is steered by course may go anywhere meanwhile, and holds it up.
+        A rover that stands for seconds before its speed loop overcomes friction (PX4) is only slow.
+        If its estimate is frozen, nobody knows what it does, and it soon counts as stuck. The
+        estimate of a car that is steered by course may drift anywhere; it still counts.
         """
         before, self._pose = self._pose, None if seen.motion is None else seen.motion.pose
         if before is None or self._pose is None:
@@ -123,7 +123,7 @@ class StuckWatch:
         return moved > LIVES and (has_one_try or moved < SLOW * self._last[0])
 
     def _turns_by_itself(self, seen: VehicleView) -> bool:
-        """Whether it was told to drive where it does not point yet."""
+        """Return whether it is still far off its commanded course; count how far it turned."""
         if self._course is None or seen.motion is None:
             return False
         yaw = seen.motion.pose.yaw
