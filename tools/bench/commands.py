@@ -56,9 +56,7 @@ def measure(profile: str | None = None) -> list[Row]:
 
 
 def measure_durable() -> list[Row]:
-    """Return the rows with the store on a disk, compared with an echo plus one fsync of that
-    disk.
-    """
+    """Return the rows with the store on a disk, compared with an echo plus one fsync."""
     packets = _packets()
     with TemporaryDirectory(dir=Path.cwd()) as folder:  # the project's disk
         sync = _fsync(Path(folder))

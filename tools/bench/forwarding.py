@@ -74,9 +74,7 @@ def _rate(vehicle: socket.socket, client: socket.socket, to: tuple[str, int]) ->
 
 
 def _pump(vehicle: socket.socket, client: socket.socket, packets: list[bytes]) -> tuple[int, float]:
-    """Send all packets through a window; return the number that arrived, and the seconds of
-    waiting.
-    """
+    """Send packets through a window; return how many arrived, and the seconds of waiting."""
     supply = iter(packets)
     arrived, waited, under_way = 0, 0.0, 0
     for packet in islice(supply, WINDOW):

@@ -1,6 +1,4 @@
-"""One pybullet rover with its MAVLink, driven by setpoints, compared with pybullet's own
-stepping.
-"""
+"""One pybullet rover with MAVLink, driven by setpoints, compared with bare stepping."""
 
 from itertools import count
 from time import perf_counter
@@ -72,9 +70,7 @@ def _plain() -> float:
 
 
 def _with_mavlink() -> float:
-    """Return simulated seconds per second of a vehicle: physics, autopilot, telemetry,
-    setpoints.
-    """
+    """Return simulated seconds per second of a whole vehicle, with telemetry and setpoints."""
     body = BulletBody(start=Pose())
     vehicle = make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
     try:
