@@ -112,9 +112,7 @@ class ArduPilotRules:
         return Intervention(Mode.HOLD)
 
     def fence_breached(self) -> Intervention:
-        """Enter HOLD: FENCE_ACTION is 2 here; 1 would drive home. 4.6.3 reports it in SYS_STATUS
-        only.
-        """
+        """Enter HOLD: FENCE_ACTION is 2 here, as 1 drives home. 4.6.3 tells SYS_STATUS only."""
         return Intervention(Mode.HOLD)
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
@@ -155,7 +153,5 @@ class ArduPilotRules:
         return HOLD
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Return the stored mission from its beginning, or the built-in square if none is
-        stored.
-        """
+        """Return the stored mission from its beginning, or else the built-in square."""
         return self._parts.missions.route() or square_around(home)

@@ -176,9 +176,7 @@ class Autopilot:
             self._flight.leave_fence()
 
     def operator_mode(self, mode: Mode, *, now: float) -> None:
-        """Change the mode at the vehicle, as an RC switch would; ignore a mode that the persona
-        lacks.
-        """
+        """Change the mode like an RC switch; ignore a mode that the persona lacks."""
         if mode in self._persona.modes.numbers:
             self._flight.enter(mode)
         self._announce(now)
@@ -189,9 +187,7 @@ class Autopilot:
         self._announce(now)
 
     def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
-        """Hold the sticks (m/s, rad/s) until the mode changes; they drive in MANUAL and
-        POSITION.
-        """
+        """Hold the sticks (m/s, rad/s) until the mode changes; for MANUAL and POSITION."""
         self._flight.set_sticks(forward_speed, yaw_rate)
         if self._realism.wire is Wire.REAL:
             self._sticks.hold(forward_speed, yaw_rate)

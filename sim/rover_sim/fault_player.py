@@ -35,9 +35,7 @@ class FaultPlayer:
         return f"FaultPlayer({len(self._begin)} to come, {len(self._end)} to end)"
 
     def play(self, elapsed: float, *, now: float) -> list[str]:
-        """Start and end the faults that are due ``elapsed`` seconds after the start; return their
-        log lines.
-        """
+        """Start and end faults due ``elapsed`` seconds after the start; return log lines."""
         said = []
         while self._begin and self._begin[0].at <= elapsed:
             fault = self._begin.pop(0)
@@ -88,9 +86,7 @@ class FaultPlayer:
 
 
 def joined(faults: Iterable[Faults]) -> Faults:
-    """Return the union of faults; plans only have flags and sets, other fields are those of the
-    first.
-    """
+    """Return the union of flags and sets, the only faults in plans; else the first value."""
     values = list(faults)
     if not values:
         return Faults()

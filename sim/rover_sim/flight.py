@@ -146,8 +146,7 @@ class FlightControl:
     def reposition(
         self, destination: Destination | None, *, keeps_place: bool = False, now: float
     ) -> bool:
-        """Drive to a place (None: stay here) in the reposition mode; return False if that is
-        refused.
+        """Drive to a place (None: stay) in the reposition mode; return False if refused.
 
         ``keeps_place``: drive on to the previous place, if there is one.
         """
@@ -169,9 +168,7 @@ class FlightControl:
         return self._rules.change_speed(speed, self.mode)
 
     def arm(self, *, forced: bool, now: float) -> bool:
-        """Arm for a client; ``forced`` skips the make's checks, but never a fault. Return
-        success.
-        """
+        """Arm for a client; return success. ``forced`` skips the make's checks, not faults."""
         if self.armed:
             return True
         if self.faults.refuse_arm:

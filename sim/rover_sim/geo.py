@@ -33,8 +33,7 @@ class Origin:
         return round(latitude * 1e7), round(longitude * 1e7)
 
     def to_global_cut(self, north: float, east: float) -> tuple[int, int]:
-        """Return latitude and longitude in degE7 as ArduPilot computes them: it truncates the
-        offsets.
+        """Return latitude and longitude in degE7, with truncated offsets like ArduPilot.
 
         (Location::offset.) An origin computed from such a position can be 1 degE7 off.
         """

@@ -69,9 +69,7 @@ class Guided:
         self._take(destination, now)
 
     def change_speed(self, speed: float) -> bool:
-        """Set the speed towards a destination; return False if the target is none or the speed
-        < 0.
-        """
+        """Set the speed towards a destination; return False without one, or for speed < 0."""
         if math.isnan(speed):
             raise SimulatedCrash("NaN in DO_CHANGE_SPEED: ArduPilot aborts")
         if speed < 0.0 or not isinstance(self._target, Destination):

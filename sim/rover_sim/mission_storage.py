@@ -93,9 +93,7 @@ class MissionStorage:
         return True
 
     def plan_id(self, mission_type: int) -> int:
-        """Return the opaque id of a list: 0 if it is empty or this make has no ids, else never
-        0.
-        """
+        """Return a list's opaque id: 0 if it is empty or the make has no ids, else not 0."""
         items = self._lists[mission_type]
         if not items or not self._conventions.has_ids:
             return 0
@@ -158,9 +156,7 @@ class MissionStorage:
                 self._ask(upload, now)
 
     def _go_to(self, item: Item, sender: Address, now: float) -> None:
-        """Drive to an item with current = 2, which older ground stations send; plans have no such
-        item.
-        """
+        """Drive to an item with current = 2, which older stations send; plans have none."""
         refusal = self._refusal(item, MISSION)
         if refusal is None:
             latitude, longitude = _place_of(item)
@@ -169,9 +165,7 @@ class MissionStorage:
         self._ack(sender, MISSION, refusal or MavMissionResult.ACCEPTED)
 
     def _handle_stray_item(self, message: Item, sender: Address) -> None:
-        """Answer a repeat of the last item: a make with ids repeats its ack, others send an
-        error.
-        """
+        """Answer a repeated last item: a make with ids repeats its ack, others send an error."""
         last = self._stored
         repeated = last is not None and (last.partner, last.mission_type, last.count) == (
             sender,

@@ -125,9 +125,7 @@ def ramped(speed: float, asked: float, parameters: Parameters) -> float:
 
 
 def yaw_limits(parameters: Parameters) -> YawLimits:
-    """Return the limits from RO_YAW_RATE_LIM (deg/s), RO_YAW_ACCEL_LIM, RO_YAW_DECEL_LIM
-    (deg/s²).
-    """
+    """Return RO_YAW_RATE_LIM (deg/s), RO_YAW_ACCEL_LIM and RO_YAW_DECEL_LIM (deg/s²)."""
     return YawLimits(
         rate=math.radians(parameters["RO_YAW_RATE_LIM"]),
         acceleration=math.radians(_limit(parameters["RO_YAW_ACCEL_LIM"])),

@@ -26,9 +26,7 @@ class Px4Guidance:
         return f"Px4Guidance({self._frame.value})"
 
     def to_course(self, estimate: Estimate, yaw: float, speed: float) -> Demand:
-        """Return the demand to drive at ``speed`` and turn to ``yaw``; it turns even at zero
-        speed.
-        """
+        """Return the demand to drive at ``speed`` and turn to ``yaw``, even at zero speed."""
         limit = speed_limit_of(self._parameters)
         rate = self._yaw_rate(estimate, wrap_angle(yaw - estimate.yaw))
         return Demand(max(-limit, min(limit, speed)), rate)

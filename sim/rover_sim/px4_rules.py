@@ -106,9 +106,7 @@ class Px4Rules:
         return f"Switching to {NAMES[wanted]} is currently not available"
 
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
-        """Return a refusal during the settling time, or in a mode that cannot run. Ignores
-        ``forced``.
-        """
+        """Return a refusal while settling or in a mode that cannot run; ignore ``forced``."""
         del forced
         if now - self._parts.started < self._parts.settling_time:
             return "Arming denied: health checks not passed yet"
@@ -163,9 +161,7 @@ class Px4Rules:
         return mode is Mode.AUTO and (missions.complete or missions.item_count == 0)
 
     def position_lost(self) -> Intervention:
-        """Land, the first failsafe action that needs no position: the rover stops and is
-        disarmed.
-        """
+        """Land, the first action that needs no position: the rover stops and is disarmed."""
         self._say("Failsafe activated")
         self._intended = Mode.LAND  # so that it does not re-enter OFFBOARD by itself
         return Intervention(Mode.LAND)

@@ -120,8 +120,9 @@ def _read_motion(message: Local | Global, base_yaw: float, speed_limit: float) -
 
 
 def _abort_on_nan(*values: float) -> None:
-    """Raise SimulatedCrash on NaN: the real one aborts with SIGFPE (SITL) or reports internal error
-    0x400 (hardware).
+    """Raise SimulatedCrash on NaN.
+
+    The real one aborts with SIGFPE (SITL) or reports internal error 0x400 (hardware).
     """
     if any(math.isnan(value) for value in values):
         raise SimulatedCrash("NaN in a setpoint: ArduPilot aborts with a floating point exception")

@@ -65,9 +65,7 @@ def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:
 
 
 def turn_then_drive(estimate: Estimate, yaw: float, speed: float) -> Demand:
-    """Return the demand to drive at ``speed`` towards ``yaw``; turn on the spot first if it is far
-    off.
-    """
+    """Return the demand to drive towards ``yaw``; turn on the spot first if it is far off."""
     error = wrap_angle(yaw - estimate.yaw)
     if speed == 0.0:
         return STOP

@@ -31,9 +31,7 @@ class Peers(Enum):
 
 
 class Vehicle:
-    """One rover. The caller passes the time in seconds; it starts with the constructor's
-    ``now``.
-    """
+    """One rover. The caller passes the time, s, which starts with the constructor's ``now``."""
 
     def __init__(
         self,

@@ -52,9 +52,7 @@ class VirtualWorld:
         self.run_until(lambda: False, within=seconds)
 
     def run_until(self, condition: Callable[[], bool], *, within: float) -> bool:
-        """Advance time until the condition holds; return whether it held within ``within``
-        seconds.
-        """
+        """Advance time until the condition holds; return whether it held within the time."""
         end = self.now + within
         while not condition():
             if not self.step(end=end):

@@ -20,9 +20,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the checks; return the exit status: 0 all passed, 1 some failed, 2 usage or no
-    vehicle.
-    """
+    """Run the checks; return the exit status: 0 passed, 1 failed, 2 usage or no vehicle."""
     parser = make_parser()
     values = parser.parse_args(arguments)
     try:

@@ -75,9 +75,7 @@ def check_answers(context: Context) -> None:
 
 
 def check_addresses(context: Context) -> None:
-    """Check acks: addressed to the sender, sent once, by the target; commands to others get
-    none.
-    """
+    """Check acks: for the sender, once, from the target; commands to others get none."""
     probe, report = context.probe, context.report
     answer = probe.command(REQUEST_MESSAGE, AUTOPILOT_VERSION)
     targets = {(each.message.target_system, each.message.target_component) for each in answer.acks}

@@ -66,9 +66,7 @@ class DriveController:
         self._stream(LOCAL_NED, POSITION, values, seconds, moves=True)
 
     def wait_standing(self, within: float, *, silent: bool = False) -> float | None:
-        """Return the seconds to standstill, with zeros or without setpoints; None if it does not
-        stop.
-        """
+        """Return the seconds to standstill, with zeros or silent; None if still moving."""
         began = self._probe.now
         while self._probe.now - began < within:
             if silent:
@@ -126,9 +124,7 @@ class Position:
 
 
 def bring_to_rest(context: Context) -> bool:
-    """Send zeros, HOLD and disarm until the heartbeat shows them; return success. Also on
-    Ctrl-C.
-    """
+    """Send zeros, HOLD and disarm until shown; return success. Runs on Ctrl-C, too."""
     probe, way = context.probe, context.way
     for _ in range(REST_TRIES):
         for _ in range(3):

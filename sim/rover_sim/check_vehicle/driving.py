@@ -127,9 +127,7 @@ def _check_velocity(context: Context, wheel: DriveController, frame: int) -> Non
 
 
 def _check_places_agree(context: Context, before: Any, after: Any) -> None:
-    """Check that two pairs of (LOCAL_POSITION_NED, GLOBAL_POSITION_INT) show the same
-    displacement.
-    """
+    """Check that LOCAL_POSITION_NED and GLOBAL_POSITION_INT show the same displacement."""
     if None in (*before, *after):
         context.report.skip("one way", "no GLOBAL_POSITION_INT")
         return

@@ -54,9 +54,7 @@ def shows(context: Context, custom_mode: int, within: float = SHOWN_WITHIN) -> f
 
 
 def enter_control(context: Context) -> Answer:
-    """Request the control mode, after a stream of zeros if the make needs it. The vehicle
-    stands.
-    """
+    """Request the control mode, after zeros if the make needs them. Never moves the vehicle."""
     if context.way.control_needs_stream:
         send_zeros(context, STREAM_FIRST)
     return ask_mode(context, context.way.control)

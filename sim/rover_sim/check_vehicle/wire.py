@@ -40,9 +40,7 @@ class Url(NamedTuple):
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine can be at the other end; a serial cable does not count as
-        local.
-        """
+        """Whether the other end must be this machine; a serial cable is not local."""
         if self.kind == SERIAL:
             return False
         host = self.place.rpartition(":")[0]

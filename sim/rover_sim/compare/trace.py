@@ -68,9 +68,7 @@ class Trace:
         return Span(self.marks[0].time, self.marks[-1].time)
 
     def span(self, mark: str) -> Span | None:
-        """Return the interval from the first mark with that name to the next mark; None: not
-        driven.
-        """
+        """Return the interval from the first such mark to the next one; None: not driven."""
         for this, following in zip(self.marks, self.marks[1:], strict=False):
             if this.name == mark:
                 return Span(this.time, following.time)

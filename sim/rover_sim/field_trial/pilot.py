@@ -66,9 +66,7 @@ class Pilot:
         return False
 
     async def stopping(self, way: Way, *, speed: float, seconds: float) -> float | None:
-        """Return the stopping distance from this speed in metres; None if the speed is not
-        reached.
-        """
+        """Return the stopping distance from ``speed``, m; None if it is not reached."""
         if not await self.ready():
             return None
         await self._stream(speed, seconds)

@@ -17,9 +17,7 @@ async def run_rows(
     stop_distance: float | None = None,
     done: Callable[[Row], None] = lambda _row: None,
 ) -> Sequence[Row]:
-    """Run rows and call ``done`` with each. The server starts after the stop distances are
-    measured.
-    """
+    """Run rows, and call ``done`` with each; measure stop distances before the server starts."""
     best = stop_distance
     if "stop" in only and best is None:
         session.say("stop: the better way, without the server")

@@ -138,9 +138,7 @@ def task_client(
 
 @pytest.fixture
 def lossy_link(rover_world: RoverWorld) -> LossyLink:
-    """Return a callable that degrades links: ``lossy_link(loss=0.3)``, for a while with
-    ``with``.
-    """
+    """Return a callable that degrades links: ``lossy_link(loss=0.3)``; ``with`` ends it."""
     return rover_world.lossy_link
 
 

@@ -94,9 +94,7 @@ class SimulatedRover:
     def place(
         self, *, north: float | None = None, east: float | None = None, yaw: float | None = None
     ) -> None:
-        """Carry the rover to a pose at once; None keeps a value. A driving rover drives on from
-        there.
-        """
+        """Move the rover to a pose at once; None keeps a value. Its motion continues."""
         now = self._body.state
         self._body.place(
             Pose(
@@ -139,9 +137,7 @@ class SimulatedRover:
         self._change_faults(outputs_frozen=frozenset())
 
     def lose_gps(self) -> None:
-        """Remove all satellites: the rover drives on for some seconds, then its position is
-        lost.
-        """
+        """Remove all satellites: after some seconds of driving, the position is lost."""
         self._change_faults(gps_lost=True)
 
     def regain_gps(self) -> None:
