@@ -1,4 +1,4 @@
-"""How a rover steers: the geometry of its wheels, and the parameters that tell its make."""
+"""How a rover steers: the geometry of its wheels, and the make's parameters for it."""
 
 from collections.abc import Mapping
 from enum import Enum

@@ -6,7 +6,8 @@ Recorded and tried on 1.17.0. It differs from PX4's guide, in ways that matter t
   plain zeros, or south if a zero is negative (0.0 * cos of a southerly heading). A differential
   rover turns to it on the spot, an Ackermann rover bends while it brakes.
 - It never drives backwards: it turns round while it drives.
-- When setpoints end, the table in ``px4_failsafe`` applies after COM_OF_LOSS_T.
+- When setpoints end, the table in ``px4_failsafe`` applies after COM_OF_LOSS_T; by default the
+  rover drives home.
 - HOLD keeps the place where it began: a rover that rolled beyond NAV_ACC_RAD drives back to it.
 - After a return it counts as landed, and disarms itself.
 """

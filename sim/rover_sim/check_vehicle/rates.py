@@ -12,7 +12,7 @@ TOLERANCE = 0.3
 
 
 def check_intervals(context: Context) -> None:
-    """Set and measure two rates of ATTITUDE, read the second back, and restore the first."""
+    """Set and measure two rates of ATTITUDE, read the second back, and restore the interval."""
     probe, report = context.probe, context.report
     before = _told(context)
     try:

@@ -40,7 +40,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return self._world.now
 
     def allow(self, seconds: float, *, real_seconds: float) -> None:
-        """Limit the time from now on; raise Stalled in a task that needs more."""
+        """Limit the time from now on; a run that needs more raises Stalled."""
         self._pace.allow(seconds, real_seconds)
 
     def run_in_executor(

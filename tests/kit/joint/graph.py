@@ -45,7 +45,7 @@ def can_happen(event: Event, state: State) -> bool:
             return state.queue is not Queue.STOPPED
         case Event.LAPSED:
             return state.queue is not Queue.STOPPED and state.grip in (Grip.TAKING, Grip.DRIVING)
-        case Event.DISARMED:  # the heartbeat shows the effect of an accepted disarm
+        case Event.DISARMED:  # the heartbeat shows it disarmed
             return state.armed and state.grip is not Grip.STOPPING
         case Event.RUN_NOW:
             return state.queue is not Queue.STOPPED

@@ -263,7 +263,7 @@ def _goes_on(state: State) -> Iterator[State]:
 
 
 def is_free(state: State) -> bool:
-    """Whether a task can take the vehicle."""
+    """Return whether a task can take the vehicle."""
     return state.driver is Driver.NOBODY and not (state.is_led and state.armed)
 
 
